@@ -1,0 +1,323 @@
+"""The Demonstrations type: what an expert did, step by step, as immutable arrays."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.demonstrations import checks
+from sarl_core.errors import InputError
+
+Actions = NDArray[np.int64] | NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One entry of the observation vector.
+
+    Attributes:
+        name: In words, as "pole angle".
+        unit: As "rad", or "" where there is none.
+    """
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ActionDimension:
+    """One component of the action.
+
+    Attributes:
+        name: In words, as "main engine".
+        kind: Whether its values are labels or come from an interval.
+        labels: Names of the labels of a discrete dimension, label 0 first.
+        first: The action that label 0 stands for.
+        low: Lower bound of an interval dimension.
+        high: Upper bound of an interval dimension.
+        bounds_from: Where the bounds come from.
+    """
+
+    name: str
+    kind: Literal["discrete", "interval"]
+    labels: tuple[str, ...] = ()
+    first: int = 0
+    low: float = 0.0
+    high: float = 0.0
+    bounds_from: Literal["action space", "demonstrated values"] = "action space"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a set of demonstrations contains, in numbers.
+
+    Attributes:
+        steps: Number of state-action pairs.
+        episodes: Number of episodes.
+        features: Length of the observation vector.
+        action_dimensions: Number of action dimensions.
+        length_mean: Steps an episode, on average.
+        return_mean: Mean return over the finished episodes (all, where none is marked as
+            finished), None without rewards.
+        return_std: Its standard deviation (n - 1), None with fewer than two such episodes.
+        label_shares: For each discrete dimension the share of each label; empty for others.
+    """
+
+    steps: int
+    episodes: int
+    features: int
+    action_dimensions: int
+    length_mean: float
+    return_mean: float | None
+    return_std: float | None
+    label_shares: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Demonstrations:
+    """N state-action pairs of an expert, in episodes.
+
+    Arrays are copied where needed, converted and made read-only; whatever is inconsistent is
+    refused with one sentence that names the column and the first row (rows count from 1).
+
+    Attributes:
+        observations: Shape (N, d), float32.
+        actions: Discrete: (N,) or (N, m) int64. Continuous: (N, m) float32.
+        episodes: Index of the episode of each step, shape (N,) int64; equal ones stand together.
+        rewards: Shape (N,) float64, or None.
+        terminated: Whether the environment ended the episode at this step, (N,) bool, or None.
+        truncated: Whether a limit ended it, (N,) bool, or None.
+        steps: Index of each step within its episode, (N,) int64; counted where not given.
+        feature_names: d names; "feature 0"... where not given.
+        feature_units: d units, "" where there is none.
+        action_names: m names, one an action dimension.
+        label_names: For each action dimension the names of its labels, () if continuous.
+        label_first: For each dimension the action that label 0 stands for (`Discrete.start`).
+        action_low: Lower bounds of continuous dimensions, m numbers; the least demonstrated
+            value where not given.
+        action_high: Upper bounds, likewise.
+        bounds_from: Whether those come from the action space or from the demonstrated values.
+        env_id: Environment, "" where unknown.
+        agent: Who demonstrated, "" where unknown.
+        seed: Seed it was recorded with, or None.
+        notes: Sentences on how the data was read (as "one episode, for want of a column").
+
+    Raises:
+        InputError: If anything above does not hold.
+    """
+
+    observations: NDArray[np.float32]
+    actions: Actions
+    episodes: NDArray[np.int64]
+    rewards: NDArray[np.float64] | None = None
+    _: KW_ONLY
+    terminated: NDArray[np.bool_] | None = None
+    truncated: NDArray[np.bool_] | None = None
+    steps: NDArray[np.int64] | None = None
+    feature_names: tuple[str, ...] | None = None
+    feature_units: tuple[str, ...] | None = None
+    action_names: tuple[str, ...] | None = None
+    label_names: tuple[tuple[str, ...], ...] | None = None
+    label_first: tuple[int, ...] | None = None
+    action_low: tuple[float, ...] | None = None
+    action_high: tuple[float, ...] | None = None
+    bounds_from: Literal["action space", "demonstrated values"] | None = None
+    env_id: str = ""
+    agent: str = ""
+    seed: int | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Convert, complete and check every field."""
+        for name, value in checks.normalise(self).items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        """Number of steps N."""
+        return len(self.observations)
+
+    def __repr__(self) -> str:
+        """Shapes and dtypes, as `Demonstrations(env_id='CartPole-v1', observations=...)`."""
+        arrays = ("observations", "actions", "episodes", "rewards", "terminated", "truncated")
+        shown = [
+            f"{name}={value.dtype}{list(value.shape)}"
+            for name in arrays
+            if (value := getattr(self, name)) is not None
+        ]
+        return (
+            f"Demonstrations(env_id={self.env_id!r}, {', '.join(shown)}, "
+            f"n_episodes={self.n_episodes}, digest='{self.digest[:12]}')"
+        )
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether the actions are labels."""
+        return bool(self.actions.dtype.kind == "i")
+
+    @cached_property
+    def action_columns(self) -> Actions:
+        """The actions with one column a dimension, shape (N, m), whatever their own shape."""
+        return cast(Actions, self.actions.reshape(len(self), -1))
+
+    @property
+    def n_episodes(self) -> int:
+        """Number of episodes."""
+        return len(self.episode_starts)
+
+    @cached_property
+    def episode_starts(self) -> NDArray[np.int64]:
+        """Row at which each episode starts, shape (episodes,)."""
+        changes = np.flatnonzero(np.diff(self.episodes)) + 1
+        return np.concatenate([[0], changes]).astype(np.int64)
+
+    @cached_property
+    def episode_lengths(self) -> NDArray[np.int64]:
+        """Steps of each episode, shape (episodes,)."""
+        return np.diff(np.append(self.episode_starts, len(self)))
+
+    @cached_property
+    def episode_returns(self) -> NDArray[np.float64] | None:
+        """Sum of rewards of each episode, shape (episodes,), or None without rewards."""
+        if self.rewards is None:
+            return None
+        return np.add.reduceat(self.rewards, self.episode_starts)
+
+    @cached_property
+    def episode_finished(self) -> NDArray[np.bool_] | None:
+        """Whether each episode ended by itself or by its limit; None where it is not recorded.
+
+        A recording that stops after a number of steps leaves its last episode unfinished.
+        """
+        if self.terminated is None and self.truncated is None:
+            return None
+        last = self.episode_starts + self.episode_lengths - 1
+        ended = np.zeros(len(last), dtype=np.bool_)
+        for flags in (self.terminated, self.truncated):
+            if flags is not None:
+                ended |= flags[last]
+        return ended
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """Names and units of the observation vector's d entries."""
+        assert self.feature_names is not None and self.feature_units is not None
+        return tuple(
+            Feature(name, unit)
+            for name, unit in zip(self.feature_names, self.feature_units, strict=True)
+        )
+
+    @cached_property
+    def action_dimensions(self) -> tuple[ActionDimension, ...]:
+        """What each component of the action is."""
+        assert self.action_names is not None
+        if self.is_discrete:
+            assert self.label_names is not None and self.label_first is not None
+            return tuple(
+                ActionDimension(name, "discrete", labels=labels, first=first)
+                for name, labels, first in zip(
+                    self.action_names, self.label_names, self.label_first, strict=True
+                )
+            )
+        assert self.action_low is not None and self.action_high is not None
+        return tuple(
+            ActionDimension(
+                name, "interval", low=low, high=high,
+                bounds_from=self.bounds_from or "demonstrated values",
+            )
+            for name, low, high in zip(
+                self.action_names, self.action_low, self.action_high, strict=True
+            )
+        )
+
+    def metadata(self) -> dict[str, Any]:
+        """Everything but the arrays, ready for JSON."""
+        return {
+            "env_id": self.env_id,
+            "agent": self.agent,
+            "seed": self.seed,
+            "features": [{"name": f.name, "unit": f.unit} for f in self.features],
+            "action_names": list(self.action_names or ()),
+            "label_names": [list(names) for names in self.label_names or ()],
+            "label_first": list(self.label_first or ()),
+            "action_low": list(self.action_low or ()),
+            "action_high": list(self.action_high or ()),
+            "bounds_from": self.bounds_from,
+            "notes": list(self.notes),
+        }
+
+    @cached_property
+    def digest(self) -> str:
+        """Fingerprint (blake2b, 32 hex digits) of the arrays and of what is known about them."""
+        digest = hashlib.blake2b(digest_size=16)
+        for name in ("observations", "actions", "episodes", "steps", "rewards", "terminated",
+                     "truncated"):
+            value = getattr(self, name)
+            if value is not None:
+                digest.update(f"{name}{value.dtype}{value.shape}".encode())
+                digest.update(np.ascontiguousarray(value).data)
+        digest.update(json.dumps(self.metadata(), sort_keys=True).encode())
+        return digest.hexdigest()
+
+    def select(self, episodes: Sequence[int] | NDArray[np.int64]) -> Demonstrations:
+        """Keep whole episodes.
+
+        Args:
+            episodes: Indices as they stand in `episodes`.
+
+        Returns:
+            The steps of these episodes, in their present order.
+
+        Raises:
+            InputError: If an episode does not exist, or none is named.
+        """
+        wanted = np.asarray(episodes, dtype=np.int64).reshape(-1)
+        missing = np.setdiff1d(wanted, self.episodes)
+        if len(wanted) == 0 or len(missing):
+            which = f"there is no episode {missing[0]}" if len(missing) else "no episode is named"
+            raise InputError(f"{which}; choose from the {self.n_episodes} episodes there are")
+        rows = np.isin(self.episodes, wanted)
+
+        def kept(value: ArrayLike | None) -> Any:
+            return None if value is None else np.asarray(value)[rows]
+
+        return replace(
+            self,
+            observations=kept(self.observations), actions=kept(self.actions),
+            episodes=kept(self.episodes), rewards=kept(self.rewards),
+            terminated=kept(self.terminated), truncated=kept(self.truncated),
+            steps=kept(self.steps),
+        )
+
+    def summary(self) -> Summary:
+        """What these demonstrations contain, in numbers."""
+        returns, finished = self.episode_returns, self.episode_finished
+        if returns is not None and finished is not None and finished.any():
+            returns = returns[finished]
+        shares: list[tuple[float, ...]] = []
+        for column, dimension in enumerate(self.action_dimensions):
+            if dimension.kind == "discrete":
+                labels = self.action_columns[:, column].astype(np.int64) - dimension.first
+                counts = np.bincount(labels, minlength=len(dimension.labels))
+                shares.append(tuple(float(count) / len(self) for count in counts))
+            else:
+                shares.append(())
+        several = returns is not None and len(returns) > 1
+        return Summary(
+            steps=len(self),
+            episodes=self.n_episodes,
+            features=self.observations.shape[1],
+            action_dimensions=len(self.action_dimensions),
+            length_mean=float(self.episode_lengths.mean()),
+            return_mean=None if returns is None else float(returns.mean()),
+            return_std=float(returns.std(ddof=1)) if several and returns is not None else None,
+            label_shares=tuple(shares),
+        )

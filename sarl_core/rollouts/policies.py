@@ -1,0 +1,324 @@
+"""Multi-layer perceptron policies in NumPy: the weights a file brings, and nothing that runs.
+
+A policy acts on a batch, and what it does in one episode does not depend on the others in the
+batch: every row is multiplied on its own (a stacked ``matmul``), so that the same seed gives the
+same episode whatever the number of environments. Randomness comes in as uniform numbers, which
+keeps ``act`` a pure function.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError
+
+Head = Literal["categorical", "gaussian", "squashed_gaussian", "greedy"]
+Activation = Literal["tanh", "relu"]
+
+_FORMAT = "sarl-policy"
+_VERSION = 1
+_VARIANCE_FLOOR = 1e-8  # what Stable-Baselines3's VecNormalize adds under the root
+_MAX_BYTES = 256 * 2**20  # an MlpPolicy takes kilobytes; more is not a policy
+
+
+@dataclass(frozen=True)
+class Normalisation:
+    """Observation statistics a policy was trained with.
+
+    Attributes:
+        mean: Running mean, shape (d,).
+        variance: Running variance, shape (d,).
+        clip: Bound on the normalised values, in standard deviations.
+    """
+
+    mean: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    clip: float
+
+    def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Normalise a batch.
+
+        Args:
+            observations: Shape (B, d).
+
+        Returns:
+            Shape (B, d), within [-clip, clip].
+        """
+        scaled = (observations - self.mean) / np.sqrt(self.variance + _VARIANCE_FLOOR)
+        return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class MlpPolicy:
+    """A trained policy: hidden layers, an output layer, and what its output means.
+
+    Attributes:
+        weights: One (inputs, outputs) matrix a layer.
+        biases: One (outputs,) vector a layer.
+        activation: Between the layers.
+        head: ``categorical``: logits, one block of ``label_counts[i]`` a dimension;
+            ``gaussian``: the mean of a normal distribution, clipped to the action space;
+            ``squashed_gaussian``: mean and log standard deviation side by side, through tanh;
+            ``greedy``: values of discrete actions, of which the largest is taken.
+        label_counts: Number of labels of each discrete dimension; empty for continuous actions.
+        log_std: Of a ``gaussian`` head, shape (m,).
+        action_low: Lower bounds of continuous actions, shape (m,).
+        action_high: Upper bounds of continuous actions, shape (m,).
+        normalisation: Of the observations, or None.
+        env_id: Environment it was trained on, or "".
+    """
+
+    weights: tuple[NDArray[np.float32], ...]
+    biases: tuple[NDArray[np.float32], ...]
+    activation: Activation
+    head: Head
+    label_counts: tuple[int, ...] = ()
+    log_std: NDArray[np.float32] | None = None
+    action_low: NDArray[np.float32] | None = None
+    action_high: NDArray[np.float32] | None = None
+    normalisation: Normalisation | None = None
+    env_id: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse weights that do not fit together.
+
+        Raises:
+            InputError: If a layer, the head or the bounds have the wrong shape.
+        """
+        width = self.n_features
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            if weight.ndim != 2 or weight.shape[0] != width or bias.shape != weight.shape[1:]:
+                raise InputError(
+                    f"layer {layer} of the policy has weights {weight.shape} and biases "
+                    f"{bias.shape}, which do not fit {width} inputs; export the policy again"
+                )
+            width = weight.shape[1]
+        if width != self._expected_outputs():
+            raise InputError(
+                f"the policy's last layer has {width} outputs where its head "
+                f"({self.head}) needs {self._expected_outputs()}; export the policy again"
+            )
+
+    @property
+    def n_features(self) -> int:
+        """Length of the observation vector it takes."""
+        return int(self.weights[0].shape[0])
+
+    @property
+    def n_dimensions(self) -> int:
+        """Number of action dimensions."""
+        if self.action_low is not None:
+            return int(self.action_low.shape[0])
+        return len(self.label_counts)
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether it gives labels and not continuous actions."""
+        return self.head in ("categorical", "greedy")
+
+    def _expected_outputs(self) -> int:
+        if self.is_discrete:
+            return sum(self.label_counts)
+        return self.n_dimensions * (2 if self.head == "squashed_gaussian" else 1)
+
+    def outputs(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Run the network.
+
+        Args:
+            observations: Shape (B, d), float32.
+
+        Returns:
+            What the last layer gives, shape (B, outputs): logits, values, or means.
+        """
+        hidden = observations
+        if self.normalisation is not None:
+            hidden = self.normalisation(hidden)
+        # (B, 1, d) @ (d, h): one product a row, so that a row's result does not hang on the batch.
+        stacked = hidden[:, None, :]
+        last = len(self.weights) - 1
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            stacked = stacked @ weight + bias
+            if layer < last:
+                stacked = (
+                    np.tanh(stacked) if self.activation == "tanh" else np.maximum(stacked, 0.0)
+                )
+        result: NDArray[np.float32] = stacked[:, 0, :]
+        return result
+
+    def act(
+        self, observations: NDArray[np.float32], uniforms: NDArray[np.float64] | None = None
+    ) -> NDArray[np.int64] | NDArray[np.float32]:
+        """Choose actions.
+
+        Args:
+            observations: Shape (B, d), float32.
+            uniforms: Numbers in [0, 1), shape (B, m), to sample with; None takes the most
+                likely action.
+
+        Returns:
+            Labels (B, m) int64, or continuous actions (B, m) float32 within the bounds.
+        """
+        outputs = self.outputs(observations)
+        if self.is_discrete:
+            return self._labels(outputs, uniforms if self.head == "categorical" else None)
+        return self._continuous(outputs, uniforms)
+
+    def log_probabilities(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Log-probabilities of the labels of a ``categorical`` policy with one dimension.
+
+        Args:
+            observations: Shape (B, d), float32.
+
+        Returns:
+            Shape (B, labels).
+        """
+        logits = self.outputs(observations).astype(np.float64)
+        shifted = logits - logits.max(axis=1, keepdims=True)
+        result: NDArray[np.float64] = shifted - np.log(
+            np.exp(shifted).sum(axis=1, keepdims=True)
+        )
+        return result
+
+    def _labels(
+        self, outputs: NDArray[np.float32], uniforms: NDArray[np.float64] | None
+    ) -> NDArray[np.int64]:
+        labels = np.empty((len(outputs), len(self.label_counts)), dtype=np.int64)
+        start = 0
+        for dimension, count in enumerate(self.label_counts):
+            logits = outputs[:, start : start + count].astype(np.float64)
+            start += count
+            if uniforms is None:
+                labels[:, dimension] = logits.argmax(axis=1)
+                continue
+            cumulative = np.exp(logits - logits.max(axis=1, keepdims=True)).cumsum(axis=1)
+            drawn = uniforms[:, dimension, None] * cumulative[:, -1:]
+            # The last label catches what rounding leaves over.
+            labels[:, dimension] = (cumulative[:, :-1] <= drawn).sum(axis=1)
+        return labels
+
+    def _continuous(
+        self, outputs: NDArray[np.float32], uniforms: NDArray[np.float64] | None
+    ) -> NDArray[np.float32]:
+        from scipy.special import ndtri
+
+        assert self.action_low is not None and self.action_high is not None
+        m = self.n_dimensions
+        actions = outputs[:, :m]
+        if uniforms is not None:
+            noise = ndtri(np.clip(uniforms, 1e-12, 1.0 - 1e-12)).astype(np.float32)
+            if self.head == "squashed_gaussian":
+                # The bounds Stable-Baselines3's SAC puts on the logarithm.
+                log_std = np.clip(outputs[:, m:], -20.0, 2.0)
+            else:
+                assert self.log_std is not None
+                log_std = np.broadcast_to(self.log_std, actions.shape)
+            actions = actions + np.exp(log_std) * noise
+        if self.head == "squashed_gaussian":
+            span = self.action_high - self.action_low
+            actions = self.action_low + 0.5 * (np.tanh(actions) + 1.0) * span
+        return np.clip(actions, self.action_low, self.action_high).astype(np.float32)
+
+    def save(self, path: str | Path) -> None:
+        """Write the policy as `.npz`: arrays and strings only, no pickle.
+
+        Args:
+            path: File to write; it appears whole or not at all.
+        """
+        arrays: dict[str, NDArray[np.generic]] = {
+            "format": np.array(_FORMAT),
+            "version": np.array(_VERSION),
+            "activation": np.array(self.activation),
+            "head": np.array(self.head),
+            "env_id": np.array(self.env_id),
+            "label_counts": np.array(self.label_counts, dtype=np.int64),
+        }
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            arrays[f"weight_{layer}"] = weight
+            arrays[f"bias_{layer}"] = bias
+        for name in ("log_std", "action_low", "action_high"):
+            value = getattr(self, name)
+            if value is not None:
+                arrays[name] = value
+        if self.normalisation is not None:
+            arrays["observation_mean"] = self.normalisation.mean
+            arrays["observation_variance"] = self.normalisation.variance
+            arrays["observation_clip"] = np.array(self.normalisation.clip)
+        target = Path(path)
+        with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".npz", delete=False) as file:
+            np.savez(file, allow_pickle=False, **arrays)
+        os.replace(file.name, target)
+
+    @classmethod
+    def load(cls, path: str | Path) -> MlpPolicy:
+        """Read a policy that `save` wrote.
+
+        Args:
+            path: An `.npz` file.
+
+        Returns:
+            The policy.
+
+        Raises:
+            InputError: If the file is no such policy; nothing in it is executed.
+        """
+        arrays = _read_arrays(Path(path))
+        if str(arrays.get("format", "")) != _FORMAT or int(arrays.get("version", 0)) != _VERSION:
+            raise InputError(
+                f"{path} is not a policy of this program (format {_FORMAT}, version {_VERSION}); "
+                "export one with `train-expert`, or give a Stable-Baselines3 .zip"
+            )
+        head, activation = str(arrays["head"]), str(arrays["activation"])
+        if head not in get_args(Head) or activation not in get_args(Activation):
+            raise InputError(f"{path} names the head {head!r} and activation {activation!r}, "
+                             "of which this version does not know both; export it again")
+        layers = sum(1 for name in arrays if name.startswith("weight_"))
+        normalisation = None
+        if "observation_mean" in arrays:
+            normalisation = Normalisation(
+                mean=arrays["observation_mean"],
+                variance=arrays["observation_variance"],
+                clip=float(arrays["observation_clip"]),
+            )
+        try:
+            return cls(
+                weights=tuple(arrays[f"weight_{layer}"] for layer in range(layers)),
+                biases=tuple(arrays[f"bias_{layer}"] for layer in range(layers)),
+                activation=activation,  # type: ignore[arg-type]  # checked above
+                head=head,  # type: ignore[arg-type]  # checked above
+                label_counts=tuple(int(count) for count in arrays["label_counts"]),
+                log_std=arrays.get("log_std"),
+                action_low=arrays.get("action_low"),
+                action_high=arrays.get("action_high"),
+                normalisation=normalisation,
+                env_id=str(arrays["env_id"]),
+            )
+        except (KeyError, IndexError) as error:
+            raise InputError(
+                f"{path} lacks a part of its policy ({error}); export the policy again"
+            ) from error
+
+
+def _read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > _MAX_BYTES:
+            raise InputError(
+                f"{path} unpacks to {size / 2**20:.0f} MB, more than any MlpPolicy has; "
+                "give a policy file"
+            )
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except InputError:
+        raise
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path} cannot be read as a policy ({error}); give an .npz policy") \
+            from error
