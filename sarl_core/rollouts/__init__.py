@@ -1,0 +1,1 @@
+"""Agents in environments: running, recording, training and rendering them."""

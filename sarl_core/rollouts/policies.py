@@ -8,17 +8,16 @@ keeps ``act`` a pure function.
 
 from __future__ import annotations
 
-import os
-import tempfile
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.rollouts.files import read_limited_npz, whole_file
 
 Head = Literal["categorical", "gaussian", "squashed_gaussian", "greedy"]
 Activation = Literal["tanh", "relu"]
@@ -26,7 +25,6 @@ Activation = Literal["tanh", "relu"]
 _FORMAT = "sarl-policy"
 _VERSION = 1
 _VARIANCE_FLOOR = 1e-8  # what Stable-Baselines3's VecNormalize adds under the root
-_MAX_BYTES = 256 * 2**20  # an MlpPolicy takes kilobytes; more is not a policy
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,8 @@ class Normalisation:
             Shape (B, d), within [-clip, clip].
         """
         scaled = (observations - self.mean) / np.sqrt(self.variance + _VARIANCE_FLOOR)
-        return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+        clipped: NDArray[np.float32] = np.clip(scaled, -self.clip, self.clip).astype(np.float32)
+        return clipped
 
 
 @dataclass(frozen=True)
@@ -91,8 +90,15 @@ class MlpPolicy:
         """Refuse weights that do not fit together.
 
         Raises:
-            InputError: If a layer, the head or the bounds have the wrong shape.
+            InputError: If a layer, the head, the bounds or the normalisation have the wrong
+                shape, or a number is missing (NaN).
         """
+        if not self.weights or self.weights[0].ndim != 2:
+            raise InputError("the policy has no layers; export the policy again")
+        self._check_layers()
+        self._check_vectors()
+
+    def _check_layers(self) -> None:
         width = self.n_features
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             if weight.ndim != 2 or weight.shape[0] != width or bias.shape != weight.shape[1:]:
@@ -100,12 +106,37 @@ class MlpPolicy:
                     f"layer {layer} of the policy has weights {weight.shape} and biases "
                     f"{bias.shape}, which do not fit {width} inputs; export the policy again"
                 )
+            if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+                raise InputError(
+                    f"layer {layer} of the policy holds NaN or infinity, as after a training "
+                    "that diverged; train it again"
+                )
             width = weight.shape[1]
         if width != self._expected_outputs():
             raise InputError(
                 f"the policy's last layer has {width} outputs where its head "
                 f"({self.head}) needs {self._expected_outputs()}; export the policy again"
             )
+
+    def _check_vectors(self) -> None:
+        m, d = self.n_dimensions, self.n_features
+        expected = {"action_low": m, "action_high": m, "log_std": m}
+        vectors = {name: getattr(self, name) for name in expected}
+        if self.normalisation is not None:
+            expected |= {"observation_mean": d, "observation_variance": d}
+            vectors["observation_mean"] = self.normalisation.mean
+            vectors["observation_variance"] = self.normalisation.variance
+        needed = () if self.is_discrete else ("action_low", "action_high")
+        needed += ("log_std",) if self.head == "gaussian" else ()
+        for name, length in expected.items():
+            vector = vectors[name]
+            if vector is None and name not in needed:
+                continue
+            if vector is None or vector.shape != (length,) or np.isnan(vector).any():
+                raise InputError(
+                    f"the policy's {name.replace('_', ' ')} is not a row of {length} numbers; "
+                    "export the policy again"
+                )
 
     @property
     def n_features(self) -> int:
@@ -209,7 +240,8 @@ class MlpPolicy:
     ) -> NDArray[np.float32]:
         from scipy.special import ndtri
 
-        assert self.action_low is not None and self.action_high is not None
+        assert self.action_low is not None
+        assert self.action_high is not None
         m = self.n_dimensions
         actions = outputs[:, :m]
         if uniforms is not None:
@@ -231,8 +263,11 @@ class MlpPolicy:
 
         Args:
             path: File to write; it appears whole or not at all.
+
+        Raises:
+            InputError: If the folder does not exist.
         """
-        arrays: dict[str, NDArray[np.generic]] = {
+        arrays: dict[str, Any] = {
             "format": np.array(_FORMAT),
             "version": np.array(_VERSION),
             "activation": np.array(self.activation),
@@ -251,10 +286,8 @@ class MlpPolicy:
             arrays["observation_mean"] = self.normalisation.mean
             arrays["observation_variance"] = self.normalisation.variance
             arrays["observation_clip"] = np.array(self.normalisation.clip)
-        target = Path(path)
-        with tempfile.NamedTemporaryFile(dir=target.parent, suffix=".npz", delete=False) as file:
+        with whole_file(Path(path)) as unfinished, unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
-        os.replace(file.name, target)
 
     @classmethod
     def load(cls, path: str | Path) -> MlpPolicy:
@@ -269,56 +302,48 @@ class MlpPolicy:
         Raises:
             InputError: If the file is no such policy; nothing in it is executed.
         """
-        arrays = _read_arrays(Path(path))
-        if str(arrays.get("format", "")) != _FORMAT or int(arrays.get("version", 0)) != _VERSION:
+        arrays = read_limited_npz(Path(path))
+        if str(arrays.get("format", "")) != _FORMAT or str(arrays.get("version")) != str(_VERSION):
             raise InputError(
                 f"{path} is not a policy of this program (format {_FORMAT}, version {_VERSION}); "
                 "export one with `train-expert`, or give a Stable-Baselines3 .zip"
             )
-        head, activation = str(arrays["head"]), str(arrays["activation"])
+        head, activation = str(arrays.get("head")), str(arrays.get("activation"))
         if head not in get_args(Head) or activation not in get_args(Activation):
             raise InputError(f"{path} names the head {head!r} and activation {activation!r}, "
                              "of which this version does not know both; export it again")
-        layers = sum(1 for name in arrays if name.startswith("weight_"))
-        normalisation = None
-        if "observation_mean" in arrays:
-            normalisation = Normalisation(
-                mean=arrays["observation_mean"],
-                variance=arrays["observation_variance"],
-                clip=float(arrays["observation_clip"]),
-            )
         try:
-            return cls(
-                weights=tuple(arrays[f"weight_{layer}"] for layer in range(layers)),
-                biases=tuple(arrays[f"bias_{layer}"] for layer in range(layers)),
-                activation=activation,  # type: ignore[arg-type]  # checked above
-                head=head,  # type: ignore[arg-type]  # checked above
-                label_counts=tuple(int(count) for count in arrays["label_counts"]),
-                log_std=arrays.get("log_std"),
-                action_low=arrays.get("action_low"),
-                action_high=arrays.get("action_high"),
-                normalisation=normalisation,
-                env_id=str(arrays["env_id"]),
-            )
-        except (KeyError, IndexError) as error:
+            return cls(activation=activation, head=head,  # type: ignore[arg-type]  # checked above
+                       **_parts(arrays))
+        except (KeyError, IndexError, TypeError, ValueError) as error:
             raise InputError(
                 f"{path} lacks a part of its policy ({error}); export the policy again"
             ) from error
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
 
 
-def _read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > _MAX_BYTES:
-            raise InputError(
-                f"{path} unpacks to {size / 2**20:.0f} MB, more than any MlpPolicy has; "
-                "give a policy file"
-            )
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except InputError:
-        raise
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path} cannot be read as a policy ({error}); give an .npz policy") \
-            from error
+def _parts(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """The fields of a policy from the arrays of its file."""
+    layers = sum(1 for name in arrays if name.startswith("weight_"))
+
+    def optional(name: str) -> NDArray[np.float32] | None:
+        return arrays[name].astype(np.float32) if name in arrays else None
+
+    normalisation = None
+    if "observation_mean" in arrays:
+        normalisation = Normalisation(
+            mean=arrays["observation_mean"].astype(np.float32),
+            variance=arrays["observation_variance"].astype(np.float32),
+            clip=float(arrays["observation_clip"]),
+        )
+    return {
+        "weights": tuple(arrays[f"weight_{i}"].astype(np.float32) for i in range(layers)),
+        "biases": tuple(arrays[f"bias_{i}"].astype(np.float32) for i in range(layers)),
+        "label_counts": tuple(int(count) for count in arrays["label_counts"]),
+        "log_std": optional("log_std"),
+        "action_low": optional("action_low"),
+        "action_high": optional("action_high"),
+        "normalisation": normalisation,
+        "env_id": str(arrays["env_id"]),
+    }

@@ -7,9 +7,7 @@ policy by validation episodes is kept, and the card reports episodes never used 
 from __future__ import annotations
 
 import json
-import os
 import platform
-import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.rollouts.files import write_card
 from sarl_core.rollouts.policies import MlpPolicy, Normalisation
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ def train_expert(
     sampled = _returns(env_id, recipe, policy, episodes=100, seed=_REPORT_SEED, stochastic=True)
     card = _card(env_id, recipe, seed, total, best_steps, returns, sampled,
                  time.monotonic() - started, out)
-    _write_json(out.with_suffix(".json"), card)
+    write_card(out.with_suffix(".json"), card)
     return card
 
 
@@ -287,8 +286,6 @@ def _card(
     }
 
 
-def _write_json(path: Path, value: Mapping[str, Any]) -> None:
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
-        json.dump(value, file, indent=2)
-        file.write("\n")
-    os.replace(file.name, path)
+def write_card(path: Path, value: Mapping[str, Any]) -> None:
+    with whole_file(path) as unfinished:
+        unfinished.write_text(json.dumps(value, indent=2) + "\n", encoding="utf-8")

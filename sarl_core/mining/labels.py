@@ -1,0 +1,129 @@
+"""From actions to labels: what the tree predicts, and the divider for continuous actions."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+from sarl_core.errors import InputError
+
+MAX_DIVIDER = 100
+
+
+@dataclass(frozen=True)
+class LabelledDimension:
+    """One action dimension and its labels.
+
+    Attributes:
+        name: Of the action dimension.
+        label_names: One name a label.
+        edges: Of a continuous dimension, the k + 1 edges of its k intervals, ascending; () if
+            it is discrete.
+        first: Of a discrete dimension, the action that label 0 stands for.
+        bounds_from: Of a continuous dimension, where the outer edges come from.
+    """
+
+    name: str
+    label_names: tuple[str, ...]
+    edges: tuple[float, ...] = ()
+    first: int = 0
+    bounds_from: str = "action space"
+
+    @classmethod
+    def of_edges(
+        cls, name: str, edges: Sequence[float], *, bounds_from: str = "action space"
+    ) -> LabelledDimension:
+        """A continuous dimension, its intervals named by their edges.
+
+        Args:
+            name: Of the action dimension.
+            edges: k + 1 numbers, ascending.
+            bounds_from: Where the outer ones come from.
+
+        Returns:
+            A dimension with k labels.
+        """
+        names = tuple(f"{low:.4g} to {high:.4g}" for low, high in pairwise(edges))
+        return cls(name, names, edges=tuple(map(float, edges)), bounds_from=bounds_from)
+
+    @property
+    def is_interval(self) -> bool:
+        """Whether the labels are intervals of a continuous action."""
+        return bool(self.edges)
+
+    @property
+    def n_labels(self) -> int:
+        """Number of labels."""
+        return len(self.label_names)
+
+    @cached_property
+    def inner_edges(self) -> tuple[float, ...]:
+        """The edges between the intervals."""
+        return self.edges[1:-1]
+
+    def label_of(self, value: float) -> int:
+        """The label of one action.
+
+        Args:
+            value: An action of this dimension.
+
+        Returns:
+            Its label. On an inner edge: the upper interval; outside the edges: the nearest.
+        """
+        if self.edges:
+            return bisect_right(self.inner_edges, value)
+        return int(value) - self.first
+
+    def labels_of(self, values: NDArray[np.generic]) -> NDArray[np.int64]:
+        """The labels of many actions, as `label_of`.
+
+        Args:
+            values: Shape (N,).
+
+        Returns:
+            Shape (N,).
+        """
+        if self.edges:
+            found = np.searchsorted(self.inner_edges, values.astype(np.float64), side="right")
+            return found.astype(np.int64)
+        return values.astype(np.int64) - self.first
+
+
+def label_dimensions(
+    demonstrations: Demonstrations, divider: int = 2
+) -> tuple[LabelledDimension, ...]:
+    """What the labels of demonstrations are (DESIGN 3.1; the paper's divider).
+
+    Args:
+        demonstrations: The actions and their bounds.
+        divider: Number of equal-width intervals of each continuous dimension, 2 or more.
+
+    Returns:
+        One entry an action dimension.
+
+    Raises:
+        InputError: If the divider is out of range.
+    """
+    if not isinstance(divider, (int, np.integer)) or not 2 <= divider <= MAX_DIVIDER:
+        raise InputError(
+            f"the divider is {divider}; give a whole number from 2 to {MAX_DIVIDER}"
+        )
+    return tuple(_labelled(dimension, int(divider)) for dimension in
+                 demonstrations.action_dimensions)
+
+
+def _labelled(dimension: ActionDimension, divider: int) -> LabelledDimension:
+    if dimension.kind == "discrete":
+        return LabelledDimension(dimension.name, dimension.labels, first=dimension.first)
+    low, high = dimension.low, dimension.high
+    if not low < high:  # all demonstrated values are the same: any width will do
+        high = low + 1.0
+    edges = np.linspace(low, high, divider + 1).tolist()
+    return LabelledDimension.of_edges(dimension.name, edges, bounds_from=dimension.bounds_from)

@@ -1,0 +1,277 @@
+"""The rule set at every threshold at once (DESIGN 3.6).
+
+Support shrinks along a path. So node v is a rule at (s, c) exactly when s <= support(v) and
+c lies above the confidence of all its ancestors and not above its own: a rectangle. Whatever is
+summed over rules is, over a grid of thresholds, a sum of rectangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.errors import InputError
+from sarl_core.mining.tree import PolicyTree
+
+Floats = NDArray[np.float64]
+
+# The grid of the paper's Figures 2 and 3. Written as quotients, so that 0.15 is 0.15.
+PAPER_SUPPORTS: Floats = np.arange(11) / 20
+PAPER_CONFIDENCES: Floats = np.arange(21) / 20
+
+
+class Rectangles(NamedTuple):
+    """Where in the threshold plane each node of a tree is a rule; empty ones left out.
+
+    Attributes:
+        node: Node numbers, (k,).
+        support: The node is a rule up to this minimum support, inclusive, (k,).
+        above: ... and above this minimum confidence, exclusive (-inf at the root), (k,).
+        confidence: ... up to this minimum confidence, inclusive, (k,).
+    """
+
+    node: NDArray[np.int64]
+    support: Floats
+    above: Floats
+    confidence: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """Sums over the rule set, for every pair of thresholds of a grid.
+
+    All layers have the shape (supports, confidences).
+
+    Attributes:
+        supports: Minimum supports, ascending.
+        confidences: Minimum confidences, ascending.
+        rule_count: Number of rules, over all action dimensions, int64.
+        mean_length: Mean number of queries a rule, 0 where there is no rule.
+        coverage: Share of pairs to which a rule applies, averaged over action dimensions.
+        fidelity: Share of the covered pairs whose label the rule gives; NaN where none is
+            covered.
+        dimensions: The same for each action dimension alone; () in such a part itself.
+    """
+
+    supports: Floats
+    confidences: Floats
+    rule_count: NDArray[np.int64]
+    mean_length: Floats
+    coverage: Floats
+    fidelity: Floats
+    dimensions: tuple[Landscape, ...] = ()
+
+
+def rule_rectangles(
+    tree: PolicyTree, *, lift_min: float = 0.0, max_depth: int | None = None
+) -> Rectangles:
+    """The thresholds at which each node is a rule.
+
+    Args:
+        tree: With n nodes.
+        lift_min: Nodes with less lift never qualify.
+        max_depth: Nodes below this depth are ignored.
+
+    Returns:
+        One rectangle for each node that is a rule anywhere.
+    """
+    above = confidence_above(tree, lift_min=lift_min)
+    rule = (above < tree.confidence) & (tree.lift >= lift_min)
+    if max_depth is not None:
+        rule &= tree.depth <= max_depth
+    node = np.flatnonzero(rule)
+    return Rectangles(node, tree.support[node], above[node], tree.confidence[node])
+
+
+def confidence_above(tree: PolicyTree, *, lift_min: float = 0.0) -> Floats:
+    """Highest confidence among the ancestors of each node that qualify by their lift.
+
+    Args:
+        tree: With n nodes.
+        lift_min: Ancestors with less lift do not count.
+
+    Returns:
+        Shape (n,); -inf where there is no such ancestor.
+    """
+    counting = np.where(tree.lift >= lift_min, tree.confidence, -np.inf)
+    above = np.full(tree.n_nodes, -np.inf)
+    # By depth, so that a parent is final before its children ask.
+    by_depth = np.argsort(tree.depth, kind="stable")
+    ends = np.cumsum(np.bincount(tree.depth))
+    for start, end in zip(ends[:-1], ends[1:], strict=True):
+        level = by_depth[start:end]
+        parent = tree.parent[level]
+        above[level] = np.maximum(above[parent], counting[parent])
+    return above
+
+
+def threshold_landscape(
+    trees: Sequence[PolicyTree],
+    supports: ArrayLike,
+    confidences: ArrayLike,
+    *,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+) -> Landscape:
+    """Count, measure and test the rule sets of every cell of a threshold grid, in one pass.
+
+    Exact: every cell equals mining at its thresholds (the paper's Figures 2 and 3).
+
+    Args:
+        trees: One an action dimension.
+        supports: Minimum supports, ascending, shape (S,).
+        confidences: Minimum confidences, ascending, shape (C,).
+        lift_min: Minimum lift of a rule.
+        max_depth: Longest rule.
+
+    Returns:
+        Layers of shape (S, C), for all dimensions and for each.
+
+    Raises:
+        InputError: If there is no tree, or a grid is empty, not ascending or not finite.
+    """
+    if not trees:
+        raise InputError("there is no tree to draw a landscape of; grow the trees first")
+    supports = _axis(supports, "supports")
+    confidences = _axis(confidences, "confidences")
+    sums = [_sums(tree, supports, confidences, lift_min, max_depth) for tree in trees]
+    parts = tuple(
+        _layers(supports, confidences, one, tree.source.steps, ())
+        for one, tree in zip(sums, trees, strict=True)
+    )
+    if len(parts) == 1:
+        whole = _layers(supports, confidences, sums[0], trees[0].source.steps, parts)
+    else:
+        total = _Sums(*(np.sum(layer, axis=0) for layer in zip(*sums, strict=True)))
+        steps = sum(tree.source.steps for tree in trees)
+        whole = _layers(supports, confidences, total, steps, parts)
+    return whole
+
+
+class _Sums(NamedTuple):
+    rules: NDArray[np.int64]
+    length: NDArray[np.int64]
+    covered: NDArray[np.int64]
+    correct: NDArray[np.int64]
+
+
+def _axis(values: ArrayLike, name: str) -> Floats:
+    axis = np.asarray(values, dtype=np.float64)
+    if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
+        raise InputError(f"the {name} of a landscape must be finite numbers in ascending order")
+    return axis
+
+
+def _sums(
+    tree: PolicyTree, supports: Floats, confidences: Floats, lift_min: float,
+    max_depth: int | None,
+) -> _Sums:
+    rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
+    # Row s is inside while s <= support; column c while above < c <= confidence.
+    rows = np.searchsorted(supports, rectangles.support, side="right")
+    first = np.searchsorted(confidences, rectangles.above, side="right")
+    last = np.searchsorted(confidences, rectangles.confidence, side="right")
+    inside = (rows > 0) & (first < last)
+    node, rows = rectangles.node[inside], rows[inside] - 1
+    first, last = first[inside], last[inside]
+    width = len(confidences) + 1  # one more column, for rectangles that reach the right edge
+    corners = np.concatenate([rows * width + first, rows * width + last])
+    size = len(supports) * width
+
+    def total(weights: NDArray[np.int64] | None) -> NDArray[np.int64]:
+        one = np.ones(len(node), dtype=np.int64) if weights is None else weights[node]
+        # Sums of whole numbers below 2**53, so exact in bincount's floating point.
+        edges = np.bincount(corners, np.concatenate([one, -one]), minlength=size)
+        plane = edges.reshape(len(supports), width)[:, :-1]
+        # Along confidence from the left; along support from the largest downwards, because
+        # every rectangle begins at support 0.
+        along = np.cumsum(plane, axis=1)
+        return np.cumsum(along[::-1], axis=0)[::-1].astype(np.int64)
+
+    return _Sums(total(None), total(tree.depth), total(tree.samples), total(tree.correct))
+
+
+def _layers(
+    supports: Floats, confidences: Floats, sums: _Sums, steps: int, parts: tuple[Landscape, ...]
+) -> Landscape:
+    some = np.maximum(sums.rules, 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        fidelity = sums.correct / sums.covered
+    return Landscape(
+        supports=supports,
+        confidences=confidences,
+        rule_count=sums.rules,
+        mean_length=sums.length / some,
+        coverage=sums.covered / steps,
+        fidelity=fidelity,
+        dimensions=parts,
+    )
+
+
+class Changes(NamedTuple):
+    """Thresholds next to a point at which the rule set changes; None where there is none.
+
+    Attributes:
+        support_below: Setting the minimum support here changes the rule set.
+        support_above: Likewise.
+        confidence_below: Likewise for the minimum confidence.
+        confidence_above: Likewise.
+    """
+
+    support_below: float | None
+    support_above: float | None
+    confidence_below: float | None
+    confidence_above: float | None
+
+
+def next_changes(
+    trees: Sequence[PolicyTree],
+    *,
+    supp_min: float,
+    conf_min: float,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+) -> Changes:
+    """The nearest thresholds at which anything changes.
+
+    A rule set is the same between two edges of the rectangles. Going up, a rule is lost just
+    above its edge, so the value given is the next float; going down, it comes back at the edge.
+
+    Args:
+        trees: One an action dimension.
+        supp_min: Minimum support in force.
+        conf_min: Minimum confidence in force.
+        lift_min: Minimum lift in force.
+        max_depth: Longest rule.
+
+    Returns:
+        The nearest value below and above for each threshold, within [0, 1].
+    """
+    below_s, above_s, below_c, above_c = [], [], [], []
+    for tree in trees:
+        rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
+        # At this confidence, a rule vanishes above its support ...
+        here = (rectangles.above < conf_min) & (conf_min <= rectangles.confidence)
+        edges = rectangles.support[here]
+        above_s += np.nextafter(edges[edges >= supp_min], np.inf).tolist()
+        below_s += edges[edges < supp_min].tolist()
+        # ... and at this support, above its confidence and at that of its ancestors.
+        here = rectangles.support >= supp_min
+        edges = np.concatenate([rectangles.confidence[here], rectangles.above[here]])
+        above_c += np.nextafter(edges[edges >= conf_min], np.inf).tolist()
+        below_c += edges[edges < conf_min].tolist()
+
+    def pick(values: list[float], *, largest: bool) -> float | None:
+        inside = [value for value in values if 0.0 <= value <= 1.0]
+        if not inside:
+            return None
+        return max(inside) if largest else min(inside)
+
+    return Changes(
+        pick(below_s, largest=True), pick(above_s, largest=False),
+        pick(below_c, largest=True), pick(above_c, largest=False),
+    )

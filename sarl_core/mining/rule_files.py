@@ -1,0 +1,307 @@
+"""The rule file: JSON, thresholds at full precision, and nothing in it that is not understood."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.errors import InputError
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.tree import Source
+
+FORMAT = "sarl-rules"
+VERSION = 1
+_MAX_BYTES = 256 * 2**20
+
+
+def rules_to_json(rule_set: RuleSet) -> str:
+    """A rule set as the text of a rule file.
+
+    Args:
+        rule_set: To write.
+
+    Returns:
+        JSON; numbers read back as the same floats.
+    """
+    return json.dumps(_document(rule_set), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSet:
+    """Read the text of a rule file.
+
+    Args:
+        text: JSON, UTF-8.
+        name: Of the file, for errors.
+
+    Returns:
+        The rule set.
+
+    Raises:
+        InputError: If it is no rule file, or holds anything this version does not know.
+    """
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name} is not JSON ({error}); give a rule file that `mine` wrote") \
+            from error
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise InputError(
+            f"{name} is not a rule file (its format is not {FORMAT!r}); "
+            "give one that `mine` wrote"
+        )
+    if document.get("version") != VERSION:
+        raise InputError(
+            f"{name} has version {document.get('version')!r} of the rule format, and this program "
+            f"reads version {VERSION}; use a program of its version"
+        )
+    return _rule_set(_Reader(document, name, ""))
+
+
+def save_rules(rule_set: RuleSet, path: Path) -> None:
+    """Write a rule file; it appears whole or not at all.
+
+    Args:
+        rule_set: To write.
+        path: A `.json` file.
+
+    Raises:
+        InputError: If the folder cannot be written to.
+    """
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8"
+        ) as file:
+            file.write(rules_to_json(rule_set))
+        os.replace(file.name, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); give another place") \
+            from error
+
+
+def load_rules(path: Path) -> RuleSet:
+    """Read a rule file.
+
+    Args:
+        path: A `.json` file.
+
+    Returns:
+        The rule set.
+
+    Raises:
+        InputError: If it cannot be read or is no rule file.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{path} has over {_MAX_BYTES >> 20} MB, more than any rule file")
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); give a rule file") from error
+    return rules_from_json(text, name=str(path))
+
+
+def _document(rule_set: RuleSet) -> dict[str, Any]:
+    source, thresholds = rule_set.source, rule_set.thresholds
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "env_id": source.env_id,
+        "features": [{"name": f.name, "unit": f.unit} for f in source.features],
+        "actions": [_action(action) for action in rule_set.actions],
+        "thresholds": {
+            "support": thresholds.support, "confidence": thresholds.confidence,
+            "lift": thresholds.lift, "max_depth": thresholds.max_depth,
+        },
+        "divider": rule_set.divider,
+        "demonstrations": {
+            "digest": source.digest, "steps": source.steps, "episodes": source.episodes,
+        },
+        "rules": [_rule(rule) for rule in rule_set.rules],
+    }
+
+
+def _action(action: LabelledDimension) -> dict[str, Any]:
+    if action.is_interval:
+        return {"name": action.name, "kind": "interval", "edges": list(action.edges),
+                "bounds_from": action.bounds_from}
+    return {"name": action.name, "kind": "discrete", "labels": list(action.label_names),
+            "first": action.first}
+
+
+def _rule(rule: Rule) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "id": rule.id,
+        "dimension": rule.dimension,
+        "conditions": [condition._asdict() for condition in rule.conditions],
+        "action": rule.action,
+        "support": rule.support,
+        "confidence": rule.confidence,
+        "lift": rule.lift,
+        "samples": rule.samples,
+        "length": rule.length,
+        "enabled": rule.enabled,
+        "origin": rule.origin,
+    }
+    if rule.demonstrated_value is not None:
+        entry["demonstrated_value"] = rule.demonstrated_value
+    return entry
+
+
+class _Reader:
+    """One object of the document: hands out what was asked for and refuses the rest."""
+
+    def __init__(self, value: Any, name: str, place: str) -> None:
+        if not isinstance(value, Mapping):
+            raise InputError(f"{name}: {place or 'it'} is not an object; write the file again")
+        self._value = dict(value)
+        self._name, self._place = name, place
+
+    def fail(self, what: str) -> InputError:
+        where = f" in {self._place}" if self._place else ""
+        return InputError(f"{self._name}: {what}{where}; mend it or mine the rules again")
+
+    def take(self, key: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
+        value = self._value.pop(key, default)
+        if value is ...:
+            raise self.fail(f"{key!r} is missing")
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        boolean = isinstance(value, bool) and bool not in kinds
+        if value is not default and (boolean or not isinstance(value, kinds)):
+            raise self.fail(f"{key!r} is {value!r}, of the wrong kind")
+        return value
+
+    def number(self, key: str, default: Any = ...) -> float:
+        value = float(self.take(key, (int, float), default))
+        if not math.isfinite(value):
+            raise self.fail(f"{key!r} is {value}, not a finite number")
+        return value
+
+    def parts(self, key: str) -> list[_Reader]:
+        place = f"{self._place} {key}".strip()
+        return [
+            _Reader(value, self._name, f"{place} {number}")
+            for number, value in enumerate(self.take(key, list), start=1)
+        ]
+
+    def part(self, key: str) -> _Reader:
+        return _Reader(self.take(key, dict), self._name, f"{self._place} {key}".strip())
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        values = self.take(key, list)
+        if not all(isinstance(value, str) for value in values):
+            raise self.fail(f"{key!r} holds something that is no text")
+        return tuple(values)
+
+    def finish(self) -> None:
+        """Refuse what nobody asked for, by name."""
+        if self._value:
+            raise self.fail(f"{next(iter(self._value))!r} is not known to this version")
+
+
+def _rule_set(document: _Reader) -> RuleSet:
+    document.take("format", str)
+    document.take("version", int)
+    features = tuple(_read_feature(part) for part in document.parts("features"))
+    actions = tuple(_read_action(part) for part in document.parts("actions"))
+    if not features or not actions:
+        raise document.fail("there are no features or no actions")
+    thresholds = document.part("thresholds")
+    demonstrations = document.part("demonstrations")
+    rule_set = RuleSet(
+        rules=tuple(_read_rule(part, len(features), actions) for part in document.parts("rules")),
+        actions=actions,
+        source=Source(
+            env_id=document.take("env_id", str),
+            features=features,
+            digest=demonstrations.take("digest", str),
+            steps=demonstrations.take("steps", int),
+            episodes=demonstrations.take("episodes", int),
+        ),
+        thresholds=Thresholds(
+            support=thresholds.number("support"),
+            confidence=thresholds.number("confidence"),
+            lift=thresholds.number("lift", 0.0),
+            max_depth=thresholds.take("max_depth", (int, type(None)), None),
+        ),
+        divider=document.take("divider", int),
+    )
+    for part in (thresholds, demonstrations, document):
+        part.finish()
+    ids = [rule.id for rule in rule_set.rules]
+    if len(set(ids)) < len(ids):
+        doubled = next(one for one in ids if ids.count(one) > 1)
+        raise document.fail(f"the rule id {doubled!r} stands twice")
+    return rule_set
+
+
+def _read_feature(part: _Reader) -> Feature:
+    feature = Feature(part.take("name", str), part.take("unit", str, ""))
+    part.finish()
+    return feature
+
+
+def _read_action(part: _Reader) -> LabelledDimension:
+    name, kind = part.take("name", str), part.take("kind", str)
+    if kind == "discrete":
+        action = LabelledDimension(name, part.texts("labels"), first=part.take("first", int, 0))
+        if not action.label_names:
+            raise part.fail("'labels' is empty")
+    elif kind == "interval":
+        edges = part.take("edges", list)
+        numeric = all(
+            isinstance(edge, (int, float)) and not isinstance(edge, bool) and math.isfinite(edge)
+            for edge in edges
+        )
+        if not numeric or len(edges) < 3 or sorted(set(edges)) != edges:
+            raise part.fail("'edges' must be three or more numbers in ascending order")
+        action = LabelledDimension.of_edges(
+            name, edges, bounds_from=part.take("bounds_from", str, "action space")
+        )
+    else:
+        raise part.fail(f"the kind {kind!r} is neither 'discrete' nor 'interval'")
+    part.finish()
+    return action
+
+
+def _read_rule(part: _Reader, n_features: int, actions: tuple[LabelledDimension, ...]) -> Rule:
+    conditions = []
+    for entry in part.parts("conditions"):
+        feature, op = entry.take("feature", int), entry.take("op", str)
+        if not 0 <= feature < n_features:
+            raise entry.fail(f"there is no feature {feature}")
+        if op not in ("<=", ">"):
+            raise entry.fail(f"the operator {op!r} is neither '<=' nor '>'")
+        conditions.append(Condition(feature, op, entry.number("threshold")))  # type: ignore[arg-type]
+        entry.finish()
+    dimension, action = part.take("dimension", int), part.take("action", int)
+    if not 0 <= dimension < len(actions):
+        raise part.fail(f"there is no action dimension {dimension}")
+    if not 0 <= action < actions[dimension].n_labels:
+        raise part.fail(f"the action {action} is none of the {actions[dimension].n_labels} labels")
+    origin = part.take("origin", str, "mined")
+    if origin not in ("mined", "manual"):
+        raise part.fail(f"the origin {origin!r} is neither 'mined' nor 'manual'")
+    if part.take("length", int, len(conditions)) != len(conditions):
+        raise part.fail(f"'length' does not match its {len(conditions)} conditions")
+    value = part.take("demonstrated_value", (int, float), None)
+    rule = Rule(
+        id=part.take("id", str),
+        dimension=dimension,
+        conditions=tuple(conditions),
+        action=action,
+        support=part.number("support"),
+        confidence=part.number("confidence"),
+        lift=part.number("lift"),
+        samples=part.take("samples", int),
+        enabled=part.take("enabled", bool, True),
+        origin=origin,  # type: ignore[arg-type]  # one of the two, checked above
+        demonstrated_value=None if value is None else float(value),
+    )
+    part.finish()
+    return rule

@@ -1,0 +1,395 @@
+"""Rules, rule sets, and Algorithm 1: cutting every path at its first qualifying node."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.landscape import confidence_above
+from sarl_core.mining.tree import PolicyTree, Source, grow_policy_trees
+
+Operator = Literal["<=", ">"]
+
+
+class Condition(NamedTuple):
+    """One query of a rule.
+
+    Attributes:
+        feature: Index into the observation vector.
+        op: Whether the feature must be at most the threshold, or above it.
+        threshold: At full precision; a float32 state is compared with it as it is.
+    """
+
+    feature: int
+    op: Operator
+    threshold: float
+
+
+class Bounds(NamedTuple):
+    """What a rule asks of one feature, all its queries together: low < x <= high.
+
+    Attributes:
+        feature: Index into the observation vector.
+        low: Exclusive; -inf where there is none.
+        high: Inclusive; inf where there is none.
+    """
+
+    feature: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Conditions joined by *and*, and the label that follows.
+
+    Attributes:
+        id: Unique within its rule set; of a mined rule "dimension.node".
+        dimension: Action dimension it speaks of.
+        conditions: In path order; () applies always.
+        action: The label.
+        support: Share of all pairs to which it applies.
+        confidence: Share of those that carry its label.
+        lift: Confidence over the label's share of all pairs.
+        samples: Number of pairs to which it applies.
+        enabled: Whether a shield uses it.
+        origin: Whether it was mined or written by a person.
+        demonstrated_value: Of a continuous dimension, the median action shown where it
+            applies; None otherwise.
+    """
+
+    id: str
+    dimension: int
+    conditions: tuple[Condition, ...]
+    action: int
+    support: float
+    confidence: float
+    lift: float
+    samples: int
+    enabled: bool = True
+    origin: Literal["mined", "manual"] = "mined"
+    demonstrated_value: float | None = None
+
+    @property
+    def length(self) -> int:
+        """Number of queries."""
+        return len(self.conditions)
+
+    @property
+    def joint_support(self) -> float:
+        """Share of all pairs to which it applies and that carry its label."""
+        return self.support * self.confidence
+
+    @property
+    def correct(self) -> int:
+        """Number of pairs to which it applies and that carry its label."""
+        return round(self.confidence * self.samples)
+
+    @cached_property
+    def bounds(self) -> tuple[Bounds, ...]:
+        """The conditions with several bounds on one feature made one interval."""
+        found: dict[int, Bounds] = {}
+        for feature, op, threshold in self.conditions:
+            before = found.get(feature, Bounds(feature, -np.inf, np.inf))
+            found[feature] = (
+                before._replace(high=min(before.high, threshold)) if op == "<="
+                else before._replace(low=max(before.low, threshold))
+            )
+        return tuple(found.values())
+
+    @property
+    def merged_length(self) -> int:
+        """Number of features it asks about."""
+        return len(self.bounds)
+
+    def applies(self, observations: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether its conditions hold.
+
+        Args:
+            observations: Shape (B, d), float32.
+
+        Returns:
+            Shape (B,).
+        """
+        holds = np.ones(len(observations), dtype=np.bool_)
+        for feature, op, threshold in self.conditions:
+            below = observations[:, feature] <= np.float64(threshold)
+            holds &= below if op == "<=" else ~below
+        return holds
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The thresholds of a rule set.
+
+    Attributes:
+        support: Minimum support.
+        confidence: Minimum confidence.
+        lift: Minimum lift.
+        max_depth: Longest rule, None without limit.
+    """
+
+    support: float
+    confidence: float
+    lift: float = 0.0
+    max_depth: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no rule set can have.
+
+        Raises:
+            InputError: If a threshold is out of range.
+        """
+        for name, value in (("support", self.support), ("confidence", self.confidence)):
+            if not 0.0 <= value <= 1.0:
+                raise InputError(f"the minimum {name} is {value}; give a share from 0 to 1")
+        if not (np.isfinite(self.lift) and self.lift >= 0.0):
+            raise InputError(f"the minimum lift is {self.lift}; give 0 or more")
+        if self.max_depth is not None and self.max_depth < 0:
+            raise InputError(f"the maximum depth is {self.max_depth}; give 0 or more, or none")
+
+
+UNFILTERED = Thresholds(support=0.0, confidence=1.0)
+"""The paper's Table 1, "unfiltered"."""
+FILTERED = Thresholds(support=0.005, confidence=0.95)
+"""The paper's Table 1, "filtered"."""
+
+
+@dataclass(frozen=True)
+class RuleSet:
+    """Rules, with what they were mined from and how.
+
+    Attributes:
+        rules: Rules of one action dimension never overlap unless a person added some.
+        actions: Action dimensions and their labels.
+        source: Environment, features and fingerprint of the demonstrations.
+        thresholds: In force when it was mined.
+        divider: Number of intervals of continuous dimensions.
+    """
+
+    rules: tuple[Rule, ...]
+    actions: tuple[LabelledDimension, ...]
+    source: Source
+    thresholds: Thresholds
+    divider: int = 2
+
+    def __len__(self) -> int:
+        """Number of rules."""
+        return len(self.rules)
+
+    def __repr__(self) -> str:
+        """Its size, as `RuleSet('CartPole-v1', rules=12, support>=0.005, confidence>=0.95)`."""
+        return (
+            f"RuleSet({self.source.env_id!r}, rules={len(self)}, "
+            f"support>={self.thresholds.support:g}, confidence>={self.thresholds.confidence:g})"
+        )
+
+    @property
+    def rule_count(self) -> int:
+        """Number of rules."""
+        return len(self.rules)
+
+    @property
+    def mean_length(self) -> float:
+        """Mean number of queries a rule, 0 without rules."""
+        return sum(rule.length for rule in self.rules) / max(len(self), 1)
+
+    @property
+    def coverage(self) -> float:
+        """Share of pairs to which a rule applies, averaged over action dimensions."""
+        pairs = self.source.steps * len(self.actions)
+        return sum(rule.samples for rule in self.rules) / pairs
+
+    @property
+    def fidelity(self) -> float:
+        """Share of the covered pairs whose label the rule gives; NaN where none is covered."""
+        covered = sum(rule.samples for rule in self.rules)
+        return sum(rule.correct for rule in self.rules) / covered if covered else float("nan")
+
+    def of_dimension(self, dimension: int) -> tuple[Rule, ...]:
+        """The rules of one action dimension.
+
+        Args:
+            dimension: Its index.
+
+        Returns:
+            In their order.
+        """
+        return tuple(rule for rule in self.rules if rule.dimension == dimension)
+
+    def save(self, path: str | Path) -> None:
+        """Write the rule file (DESIGN section 5); it appears whole or not at all.
+
+        Args:
+            path: A `.json` file.
+        """
+        from sarl_core.mining.rule_files import save_rules
+
+        save_rules(self, Path(path))
+
+    @classmethod
+    def load(cls, path: str | Path) -> RuleSet:
+        """Read a rule file.
+
+        Args:
+            path: A `.json` file.
+
+        Returns:
+            The rule set.
+
+        Raises:
+            InputError: If the file is no rule file, or holds anything this version does not know.
+        """
+        from sarl_core.mining.rule_files import load_rules
+
+        return load_rules(Path(path))
+
+
+def cut_nodes(
+    tree: PolicyTree,
+    *,
+    supp_min: float,
+    conf_min: float,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+) -> NDArray[np.int64]:
+    """The nodes at which Algorithm 1 cuts the paths of a tree.
+
+    Args:
+        tree: With n nodes.
+        supp_min: Minimum support.
+        conf_min: Minimum confidence.
+        lift_min: Minimum lift.
+        max_depth: Nodes below this depth are ignored.
+
+    Returns:
+        Node numbers, ascending. No one lies below another.
+    """
+    qualifies = (
+        (tree.support >= supp_min) & (tree.confidence >= conf_min) & (tree.lift >= lift_min)
+    )
+    if max_depth is not None:
+        qualifies &= tree.depth <= max_depth
+    # An ancestor has at least the node's support, so only its confidence can spare it.
+    first = confidence_above(tree, lift_min=lift_min) < conf_min
+    return np.flatnonzero(qualifies & first)
+
+
+def mine_rules(
+    demonstrations_or_trees: Demonstrations | Sequence[PolicyTree],
+    *,
+    supp_min: float,
+    conf_min: float,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+    divider: int = 2,
+) -> RuleSet:
+    """Mine a rule set (the paper's Algorithm 1; DESIGN 3.4).
+
+    Args:
+        demonstrations_or_trees: N pairs, or trees grown from them.
+        supp_min: Minimum support of a rule, 0 to 1.
+        conf_min: Minimum confidence, 0 to 1.
+        lift_min: Minimum lift.
+        max_depth: Longest rule; needs no new tree.
+        divider: Number of intervals of continuous dimensions; trees carry their own.
+
+    Returns:
+        The rules, by action dimension and node.
+
+    Raises:
+        InputError: If a threshold is out of range or there is nothing to mine.
+    """
+    thresholds = Thresholds(supp_min, conf_min, lift_min, max_depth)
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        trees: Sequence[PolicyTree] = grow_policy_trees(demonstrations_or_trees, divider=divider)
+    else:
+        trees = tuple(demonstrations_or_trees)
+    if not trees:
+        raise InputError("there is no tree to mine; give demonstrations, or grow the trees first")
+    rules = []
+    for tree in trees:
+        nodes = cut_nodes(
+            tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
+        )
+        rules += _rules_at(tree, nodes)
+    return RuleSet(
+        rules=tuple(rules),
+        actions=tuple(tree.dimension for tree in trees),
+        source=trees[0].source,
+        thresholds=thresholds,
+        divider=trees[0].divider,
+    )
+
+
+def node_of(rule: Rule) -> int:
+    """The tree node at which a mined rule was cut.
+
+    Args:
+        rule: A mined one.
+
+    Returns:
+        Node number in the tree of its dimension.
+    """
+    return int(rule.id.rsplit(".", 1)[1])
+
+
+def _rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
+    numbers = zip(
+        nodes.tolist(), tree.label[nodes].tolist(), tree.support[nodes].tolist(),
+        tree.confidence[nodes].tolist(), tree.lift[nodes].tolist(), tree.samples[nodes].tolist(),
+        strict=True,
+    )
+    return [
+        Rule(
+            id=f"{tree.index}.{node}",
+            dimension=tree.index,
+            conditions=conditions,
+            action=label,
+            support=support,
+            confidence=confidence,
+            lift=lift,
+            samples=samples,
+            demonstrated_value=_demonstrated(tree, node),
+        )
+        for (node, label, support, confidence, lift, samples), conditions in zip(
+            numbers, _conditions(tree, nodes), strict=True
+        )
+    ]
+
+
+def _demonstrated(tree: PolicyTree, node: int) -> float | None:
+    if not tree.dimension.is_interval:
+        return None
+    return float(np.median(tree.demonstrated[tree.rows(node)]))
+
+
+def _conditions(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[tuple[Condition, ...]]:
+    """`conditions_to` for many nodes; rules share the beginnings of their paths."""
+    known: dict[int, tuple[Condition, ...]] = {0: ()}
+    parent, left = tree.parent.tolist(), tree.children_left.tolist()
+    feature, threshold = tree.feature.tolist(), tree.threshold.tolist()
+    result = []
+    for node in nodes.tolist():
+        missing = []
+        at = node
+        while at not in known:
+            missing.append(at)
+            at = parent[at]
+        so_far = known[at]
+        for below in reversed(missing):
+            above = parent[below]
+            op: Operator = "<=" if left[above] == below else ">"
+            so_far = (*so_far, Condition(feature[above], op, threshold[above]))
+            known[below] = so_far
+        result.append(so_far)
+    return result

@@ -1,0 +1,303 @@
+"""Growing a decision tree and reading it, once, into neutral and immutable arrays.
+
+Nothing outside this file touches scikit-learn's tree, so that another learner can hand over the
+same type. The demonstrations are kept in the order of the leaves, which makes the rows that reach
+a node a slice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.errors import InputError
+from sarl_core.mining.labels import LabelledDimension, label_dimensions
+
+LEAF = -1
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where trees and rules come from.
+
+    Attributes:
+        env_id: Environment, "" where unknown.
+        features: Names and units of the observation vector's d entries.
+        digest: Fingerprint of the demonstrations.
+        steps: Number N of state-action pairs.
+        episodes: Number of episodes.
+    """
+
+    env_id: str
+    features: tuple[Feature, ...]
+    digest: str
+    steps: int
+    episodes: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PolicyTree:
+    """A decision tree of one action dimension, with n nodes over N demonstrated pairs.
+
+    Attributes:
+        index: Which action dimension.
+        dimension: The action dimension and its labels.
+        divider: Number of intervals of continuous dimensions.
+        source: What it was grown from.
+        feature: Feature queried at each node, (n,) int64; `LEAF` at leaves.
+        threshold: A state goes left where ``x[feature] <= threshold``, (n,) float64.
+        children_left: Node number of the left child, (n,) int64, `LEAF` at leaves.
+        children_right: Node number of the right child, (n,) int64, `LEAF` at leaves.
+        parent: Node number of the parent, (n,) int64, -1 at the root.
+        depth: Number of queries above each node, (n,) int64.
+        counts: Demonstrated pairs of each label at each node, (n, labels) int64.
+        sample_order: Row numbers of the demonstrations, sorted by leaf, (N,) int64.
+        sample_start: Where each node's rows begin in `sample_order`, (n,) int64.
+        demonstrated: Action of each row in this dimension, (N,); what a projection may use.
+    """
+
+    index: int
+    dimension: LabelledDimension
+    divider: int
+    source: Source
+    feature: NDArray[np.int64]
+    threshold: NDArray[np.float64]
+    children_left: NDArray[np.int64]
+    children_right: NDArray[np.int64]
+    parent: NDArray[np.int64]
+    depth: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    sample_order: NDArray[np.int64]
+    sample_start: NDArray[np.int64]
+    demonstrated: NDArray[np.int64] | NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __repr__(self) -> str:
+        """Its size, as `PolicyTree('push', nodes=301, depth=14, steps=15000)`."""
+        return (
+            f"PolicyTree({self.dimension.name!r}, nodes={self.n_nodes}, "
+            f"depth={int(self.depth.max())}, steps={self.source.steps})"
+        )
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.feature)
+
+    @cached_property
+    def samples(self) -> NDArray[np.int64]:
+        """Pairs that reach each node, (n,)."""
+        return self.counts.sum(axis=1)
+
+    @cached_property
+    def label(self) -> NDArray[np.int64]:
+        """Most frequent label at each node, the lowest where several are, (n,)."""
+        return self.counts.argmax(axis=1).astype(np.int64)
+
+    @cached_property
+    def correct(self) -> NDArray[np.int64]:
+        """Pairs at each node that carry its label, (n,)."""
+        return self.counts.max(axis=1)
+
+    @cached_property
+    def support(self) -> NDArray[np.float64]:
+        """Share of all pairs that reach each node, (n,)."""
+        return self.samples / self.samples[0]
+
+    @cached_property
+    def confidence(self) -> NDArray[np.float64]:
+        """Share of each node's pairs that carry its label, (n,)."""
+        return self.correct / self.samples
+
+    @cached_property
+    def lift(self) -> NDArray[np.float64]:
+        """Confidence over the label's share of all pairs, (n,)."""
+        shares = self.counts[0] / self.samples[0]
+        return self.confidence / shares[self.label]
+
+    def path(self, node: int) -> tuple[int, ...]:
+        """Node numbers from the root to a node, both included.
+
+        Args:
+            node: Node number.
+
+        Returns:
+            The root first.
+        """
+        found = [int(node)]
+        while (above := int(self.parent[found[-1]])) >= 0:
+            found.append(above)
+        return tuple(reversed(found))
+
+    def rows(self, node: int) -> NDArray[np.int64]:
+        """Rows of the demonstrations that reach a node.
+
+        Args:
+            node: Node number.
+
+        Returns:
+            Row numbers, shape (samples[node],).
+        """
+        start = int(self.sample_start[node])
+        return self.sample_order[start : start + int(self.samples[node])]
+
+    def apply(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """The leaf that each state reaches.
+
+        Args:
+            observations: Shape (B, d), float32.
+
+        Returns:
+            Node numbers, shape (B,).
+        """
+        return walk(
+            observations, self.feature, self.threshold, self.children_left, self.children_right
+        )
+
+
+def walk(
+    observations: NDArray[np.float32],
+    feature: NDArray[np.int64],
+    threshold: NDArray[np.float64],
+    children_left: NDArray[np.int64],
+    children_right: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Send states down a tree, all at once, one level a turn.
+
+    Args:
+        observations: Shape (B, d), float32.
+        feature: Feature queried at each node, `LEAF` where a walk ends, (n,).
+        threshold: Shape (n,).
+        children_left: Shape (n,).
+        children_right: Shape (n,).
+
+    Returns:
+        Where each state's walk ends, shape (B,).
+    """
+    nodes = np.zeros(len(observations), dtype=np.int64)
+    active = np.arange(len(observations)) if feature[0] != LEAF else np.zeros(0, dtype=np.int64)
+    while len(active):
+        here = nodes[active]
+        left = observations[active, feature[here]] <= threshold[here]
+        here = np.where(left, children_left[here], children_right[here])
+        nodes[active] = here
+        active = active[feature[here] != LEAF]
+    return nodes
+
+
+def grow_policy_trees(
+    demonstrations: Demonstrations,
+    *,
+    divider: int = 2,
+    max_depth: int | None = None,
+    seed: int = 0,
+) -> tuple[PolicyTree, ...]:
+    """Grow one CART tree an action dimension (the paper's "Derive Safety Rules").
+
+    Args:
+        demonstrations: N pairs.
+        divider: Number of intervals of each continuous dimension.
+        max_depth: Of the trees; None grows them fully. A limit can also be set afterwards,
+            at the thresholds, without growing anything again.
+        seed: For choosing among equally good queries.
+
+    Returns:
+        One tree an action dimension.
+
+    Raises:
+        InputError: If the divider or the depth is out of range.
+    """
+    from sklearn.tree import DecisionTreeClassifier
+
+    if max_depth is not None and max_depth < 1:
+        raise InputError(f"the maximum depth is {max_depth}; give 1 or more, or none")
+    source = Source(
+        env_id=demonstrations.env_id,
+        features=demonstrations.features,
+        digest=demonstrations.digest,
+        steps=len(demonstrations),
+        episodes=demonstrations.n_episodes,
+    )
+    trees = []
+    for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
+        demonstrated = np.ascontiguousarray(demonstrations.action_columns[:, index])
+        labels = dimension.labels_of(demonstrated)
+        learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
+        learner.fit(demonstrations.observations, labels)
+        trees.append(
+            _read(learner, demonstrations.observations, labels, index, dimension, int(divider),
+                  source, demonstrated)
+        )
+    return tuple(trees)
+
+
+def _read(
+    learner: object,
+    observations: NDArray[np.float32],
+    labels: NDArray[np.int64],
+    index: int,
+    dimension: LabelledDimension,
+    divider: int,
+    source: Source,
+    demonstrated: NDArray[np.int64] | NDArray[np.float32],
+) -> PolicyTree:
+    tree = learner.tree_  # type: ignore[attr-defined]  # scikit-learn has no types
+    left = np.asarray(tree.children_left, dtype=np.int64)
+    right = np.asarray(tree.children_right, dtype=np.int64)
+    levels = _levels(left, right)
+    n = len(left)
+    parent = np.full(n, -1, dtype=np.int64)
+    depth = np.zeros(n, dtype=np.int64)
+    leaves = np.asarray(tree.apply(observations), dtype=np.int64)
+    # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
+    counts = np.bincount(
+        leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
+    ).reshape(n, dimension.n_labels)
+    for number, level in enumerate(levels):
+        depth[level] = number
+        inner = level[left[level] != LEAF]
+        parent[left[inner]] = inner
+        parent[right[inner]] = inner
+    for level in reversed(levels):
+        inner = level[left[level] != LEAF]
+        counts[inner] = counts[left[inner]] + counts[right[inner]]
+    samples = counts.sum(axis=1)
+    start = np.zeros(n, dtype=np.int64)
+    for level in levels:
+        inner = level[left[level] != LEAF]
+        start[left[inner]] = start[inner]
+        start[right[inner]] = start[inner] + samples[left[inner]]
+    return PolicyTree(
+        index=index,
+        dimension=dimension,
+        divider=divider,
+        source=source,
+        feature=np.where(left == LEAF, LEAF, tree.feature).astype(np.int64),
+        threshold=np.array(tree.threshold, dtype=np.float64),
+        children_left=left,
+        children_right=right,
+        parent=parent,
+        depth=depth,
+        counts=counts.astype(np.int64),
+        # Stable, so that the rows of a leaf keep their order in time.
+        sample_order=np.argsort(start[leaves], kind="stable").astype(np.int64),
+        sample_start=start,
+        demonstrated=demonstrated,
+    )
+
+
+def _levels(left: NDArray[np.int64], right: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Node numbers, one array a depth, the root first."""
+    levels = [np.zeros(1, dtype=np.int64)]
+    while len(inner := levels[-1][left[levels[-1]] != LEAF]):
+        levels.append(np.concatenate([left[inner], right[inner]]))
+    return levels

@@ -1,0 +1,202 @@
+"""The shield (the paper's Algorithm 2): an action that breaks a matching rule is replaced.
+
+It is post-posed and learned from data: it guarantees nothing beyond doing what its rules say.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.errors import InputError
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.matching import Matcher
+from sarl_core.shielding.projection import Projection, replacements
+
+__all__ = ["BatchDecision", "Decision", "Projection", "Shield"]
+
+
+class Decision(NamedTuple):
+    """What the shield made of one action; the heart of the flight recorder (DESIGN 3.9).
+
+    Attributes:
+        executed: The action to execute; the proposed object itself if it breaks no rule.
+        proposed: The agent's action.
+        rules: For each action dimension the index of the rule in force, in the rule set's
+            order, or None.
+        intervened: Whether the shield changed the action.
+        margin: Distance of the state to the nearest threshold on the paths walked, in the
+            feature's own unit; inf where there is no threshold.
+    """
+
+    executed: Any
+    proposed: Any
+    rules: tuple[int | None, ...]
+    intervened: bool
+    margin: float
+
+
+class BatchDecision(NamedTuple):
+    """What the shield made of B actions.
+
+    Attributes:
+        executed: Shape and dtype of the proposed actions.
+        proposed: The agent's actions.
+        rules: Index of the rule in force or -1, (B, m) int64.
+        intervened: Shape (B,).
+        margin: Shape (B,).
+    """
+
+    executed: NDArray[Any]
+    proposed: NDArray[Any]
+    rules: NDArray[np.int64]
+    intervened: NDArray[np.bool_]
+    margin: NDArray[np.float64]
+
+
+class Shield:
+    """A rule set in force.
+
+    Rules that are not enabled are left out; rules that a person added come before mined ones.
+
+    Attributes:
+        rule_set: The rules.
+        projection: How a continuous action is replaced.
+    """
+
+    def __init__(self, rule_set: RuleSet, *, projection: Projection = "centre") -> None:
+        """Prepare for deciding.
+
+        Args:
+            rule_set: The rules.
+            projection: A continuous action that breaks a rule becomes the ``centre`` of the
+                rule's interval, is moved to the nearest value in it (``clip``), or becomes what
+                the ``expert`` showed there (the median).
+
+        Raises:
+            InputError: If the projection is unknown, or the rules hold no demonstrated values
+                that ``expert`` could use.
+        """
+        if projection not in get_args(Projection):
+            raise InputError(
+                f"the projection {projection!r} is none of centre, clip, expert; choose one"
+            )
+        self.rule_set = rule_set
+        self.projection = projection
+        self._actions = rule_set.actions
+        self._n_features = len(rule_set.source.features)
+        self._matchers = tuple(
+            Matcher.of(
+                [(index, rule) for index, rule in enumerate(rule_set.rules)
+                 if rule.dimension == dimension and rule.enabled]
+            )
+            for dimension in range(len(rule_set.actions))
+        )
+        self._labels = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
+        self._label_list: list[int] = self._labels.tolist()
+        self._replace = replacements(rule_set, projection)
+        self._single = len(self._actions) == 1 and not self._actions[0].is_interval
+        self._first = self._actions[0].first
+
+    def decide(self, observation: ArrayLike, action: Any) -> Decision:
+        """Check one action and replace it if it breaks a rule.
+
+        Args:
+            observation: Shape (d,); compared as float32.
+            action: In the environment's own form: an integer, or an array with m entries.
+
+        Returns:
+            The decision. An action that breaks no rule is passed on as it is, bit for bit.
+
+        Raises:
+            InputError: If the observation has another length than the rules' features.
+        """
+        state = np.asarray(observation, dtype=np.float32).tolist()
+        if len(state) != self._n_features:
+            raise self._wrong_width(len(state))
+        if self._single:
+            rule, margin = self._matchers[0].match(state)
+            if rule is None:
+                return Decision(action, action, (None,), False, margin)
+            wanted = self._label_list[rule] + self._first
+            if action == wanted:
+                return Decision(action, action, (rule,), False, margin)
+            return Decision(_like(action, wanted), action, (rule,), True, margin)
+        return self._decide_each(state, action)
+
+    def _decide_each(self, state: list[float], action: Any) -> Decision:
+        values = np.asarray(action)
+        flat = values.reshape(-1)
+        executed = None
+        found: list[int | None] = []
+        nearest = float("inf")
+        for dimension, matcher in enumerate(self._matchers):
+            rule, margin = matcher.match(state)
+            nearest = min(nearest, margin)
+            found.append(rule)
+            if rule is None:
+                continue
+            value = flat[dimension]
+            if self._actions[dimension].label_of(float(value)) != self._label_list[rule]:
+                executed = flat.copy() if executed is None else executed
+                executed[dimension] = self._replace.one(rule, float(value))
+        if executed is None:
+            return Decision(action, action, tuple(found), False, nearest)
+        changed = executed.reshape(values.shape)
+        return Decision(changed, action, tuple(found), True, nearest)
+
+    def decide_batch(self, observations: ArrayLike, actions: ArrayLike) -> BatchDecision:
+        """Check many actions at once, each exactly as `decide` would.
+
+        Args:
+            observations: Shape (B, d); compared as float32.
+            actions: B actions in the environment's own form.
+
+        Returns:
+            The decisions.
+
+        Raises:
+            InputError: If the observations have another length than the rules' features.
+        """
+        states = np.ascontiguousarray(observations, dtype=np.float32)
+        if states.ndim != 2 or states.shape[1] != self._n_features:
+            raise self._wrong_width(states.shape[-1] if states.ndim else 0)
+        proposed = np.asarray(actions)
+        flat = proposed.reshape(len(states), -1)
+        rules = np.empty((len(states), len(self._actions)), dtype=np.int64)
+        margin = np.full(len(states), np.inf)
+        executed = flat
+        intervened = np.zeros(len(states), dtype=np.bool_)
+        for dimension, matcher in enumerate(self._matchers):
+            rules[:, dimension], near = matcher.match_batch(states)
+            margin = np.minimum(margin, near)
+            column = flat[:, dimension]
+            ruled = np.flatnonzero(rules[:, dimension] >= 0)
+            labels = self._actions[dimension].labels_of(column[ruled])
+            broken = ruled[labels != self._labels[rules[ruled, dimension]]]
+            if len(broken):
+                executed = flat.copy() if executed is flat else executed
+                executed[broken, dimension] = self._replace.many(
+                    rules[broken, dimension], column[broken]
+                )
+                intervened[broken] = True
+        return BatchDecision(
+            executed.reshape(proposed.shape), proposed, rules, intervened, margin
+        )
+
+    def _wrong_width(self, got: int) -> InputError:
+        env_id = self.rule_set.source.env_id or "another environment"
+        return InputError(
+            f"the rules ask about {self._n_features} features (of {env_id}) and the observation "
+            f"has {got}; use rules of this environment"
+        )
+
+
+def _like(action: Any, value: int) -> Any:
+    """A discrete action of the same kind as the one that was proposed."""
+    if type(action) is int:
+        return value
+    given = np.asarray(action)
+    return given.dtype.type(value) if given.ndim == 0 else np.full_like(given, value)

@@ -1,0 +1,91 @@
+"""The shield around a vectorised environment of Stable-Baselines3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces.utils import flatten
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+
+from sarl_core.shielding.shield import BatchDecision, Shield
+from sarl_core.shielding.wrappers import StepRecord, check_fit, is_flat
+
+
+class ShieldedVecEnv(VecEnvWrapper):
+    """Environments side by side, every action of each passing through one shield.
+
+    The record of each step is in ``infos[i]["shield"]``.
+    """
+
+    def __init__(self, venv: VecEnv, shield: Shield, *, penalty: float = 0.0) -> None:
+        """Wrap a vectorised environment.
+
+        Args:
+            venv: To wrap; its observations must be those the rules speak of, not normalised.
+            shield: The rules in force.
+            penalty: Taken off the reward at every intervention.
+
+        Raises:
+            InputError: If the rules are not for the spaces of this environment.
+        """
+        check_fit(venv.observation_space, venv.action_space, shield)
+        super().__init__(venv)
+        self.shield = shield
+        self.penalty = penalty
+        self._states = np.empty((0, 0), dtype=np.float32)
+        self._decision: BatchDecision | None = None
+        self._episodes = np.full(self.num_envs, -1)
+        self._steps = np.zeros(self.num_envs, dtype=np.int64)
+
+    def reset(self) -> VecEnvObs:
+        """Start an episode in each environment."""
+        observations = self.venv.reset()
+        self._remember(observations)
+        self._episodes += 1
+        self._steps[:] = 0
+        return observations
+
+    def step_async(self, actions: np.ndarray[Any, Any]) -> None:
+        """Check the actions and hand on what the shield makes of them."""
+        self._decision = self.shield.decide_batch(self._states, actions)
+        self.venv.step_async(self._decision.executed)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Wait for the environments and record the step in each."""
+        observations, rewards, dones, infos = self.venv.step_wait()
+        decision = self._decision
+        assert decision is not None
+        for i, info in enumerate(infos):
+            info["shield"] = StepRecord(
+                int(self._episodes[i]), int(self._steps[i]), self._states[i],
+                decision.proposed[i], decision.executed[i],
+                tuple(int(rule) if rule >= 0 else None for rule in decision.rules[i]),
+                bool(decision.intervened[i]), float(decision.margin[i]),
+            )
+        if self.penalty:
+            rewards = rewards - self.penalty * decision.intervened.astype(rewards.dtype)
+        self._remember(observations)
+        self._steps = np.where(dones, 0, self._steps + 1)
+        self._episodes += dones
+        return observations, rewards, dones, infos
+
+    def _remember(self, observations: Any) -> None:
+        space = self.venv.observation_space
+        if is_flat(space):
+            self._states = np.array(observations, dtype=np.float32)
+            return
+        rows = [
+            flatten(space, _row(observations, i)) for i in range(self.num_envs)
+        ]
+        self._states = np.array(rows, dtype=np.float32)
+
+
+def _row(observations: Any, i: int) -> Any:
+    """The observation of one environment out of what a vectorised one stacks."""
+    if isinstance(observations, dict):
+        return {name: value[i] for name, value in observations.items()}
+    if isinstance(observations, tuple):
+        return tuple(value[i] for value in observations)
+    return observations[i]

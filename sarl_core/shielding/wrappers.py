@@ -1,0 +1,162 @@
+"""The shield around a Gymnasium environment: in learning, in evaluation, in rendering."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, SupportsFloat
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces.utils import flatten
+
+from sarl_core.errors import InputError
+from sarl_core.shielding.shield import Shield
+
+
+class StepRecord(NamedTuple):
+    """The record of one shielded step (DESIGN 3.9), in ``info["shield"]``.
+
+    Attributes:
+        episode: Number of resets before this step, less one.
+        step: Index of the step within its episode.
+        observation: What the agent saw, (d,) float32.
+        proposed: The agent's action.
+        executed: The action that was executed.
+        rules: For each action dimension the index of the rule in force, or None.
+        intervened: Whether the shield changed the action.
+        margin: Distance to the nearest threshold on the paths walked.
+    """
+
+    episode: int
+    step: int
+    observation: np.ndarray[Any, np.dtype[np.float32]]
+    proposed: Any
+    executed: Any
+    rules: tuple[int | None, ...]
+    intervened: bool
+    margin: float
+
+
+class ShieldedEnv(
+    gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs
+):
+    """An environment whose every action passes through a shield.
+
+    Whoever acts in it, a learner, an evaluation or a renderer, cannot do otherwise. The record
+    of each step is in ``info["shield"]``.
+    """
+
+    def __init__(
+        self, env: gymnasium.Env[Any, Any], shield: Shield, *, penalty: float = 0.0
+    ) -> None:
+        """Wrap an environment.
+
+        Args:
+            env: To wrap.
+            shield: The rules in force.
+            penalty: Taken off the reward at every intervention.
+
+        Raises:
+            InputError: If the rules are not for the spaces of this environment.
+        """
+        gymnasium.utils.RecordConstructorArgs.__init__(self, shield=shield, penalty=penalty)
+        super().__init__(env)
+        check_fit(env.observation_space, env.action_space, shield)
+        self.shield = shield
+        self.penalty = penalty
+        self._flat = is_flat(env.observation_space)
+        self._observation: Any = None
+        self._episode = -1
+        self._step = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode, as the wrapped environment does."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._remember(observation)
+        self._episode += 1
+        self._step = 0
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Check the action, execute what the shield makes of it, and record it."""
+        if self._observation is None:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        state = self._observation
+        decision = self.shield.decide(state, action)
+        observation, reward, terminated, truncated, info = self.env.step(decision.executed)
+        info["shield"] = StepRecord(
+            self._episode, self._step, state, decision.proposed, decision.executed,
+            decision.rules, decision.intervened, decision.margin,
+        )
+        if decision.intervened and self.penalty:
+            reward = float(reward) - self.penalty
+        self._step += 1
+        self._remember(observation)
+        return observation, reward, terminated, truncated, info
+
+    def _remember(self, observation: Any) -> None:
+        if not self._flat:
+            observation = flatten(self.env.observation_space, observation)
+        # A copy: an environment may write the next observation into the same array.
+        self._observation = np.array(observation, dtype=np.float32)
+
+
+def is_flat(space: gymnasium.Space[Any]) -> bool:
+    """Whether observations of a space are vectors already.
+
+    Args:
+        space: Observation space.
+
+    Returns:
+        False where `flatten` is needed.
+    """
+    return isinstance(space, gymnasium.spaces.Box) and len(space.shape) == 1
+
+
+def check_fit(
+    observation_space: gymnasium.Space[Any], action_space: gymnasium.Space[Any], shield: Shield
+) -> None:
+    """Refuse rules that are not for these spaces.
+
+    Args:
+        observation_space: Of the environment.
+        action_space: Of the environment.
+        shield: The rules.
+
+    Raises:
+        InputError: If the number of features or the kind and number of actions differ.
+    """
+    spaces = gymnasium.spaces
+    source, actions = shield.rule_set.source, shield.rule_set.actions
+    rules_of = f"the rules (of {source.env_id or 'an unnamed environment'})"
+    features = spaces.utils.flatdim(observation_space)
+    if features != len(source.features):
+        raise InputError(
+            f"{rules_of} ask about {len(source.features)} features and the environment's "
+            f"observations have {features}; use rules of this environment"
+        )
+    if isinstance(action_space, spaces.Discrete):
+        counts: list[int] | None = [int(action_space.n)]
+    elif isinstance(action_space, spaces.MultiDiscrete):
+        counts = [int(n) for n in action_space.nvec.reshape(-1)]
+    elif isinstance(action_space, spaces.MultiBinary):
+        counts = [2] * spaces.utils.flatdim(action_space)
+    else:
+        counts = None
+    wanted = None if actions[0].is_interval else [action.n_labels for action in actions]
+    dimensions = spaces.utils.flatdim(action_space) if counts is None else len(counts)
+    if dimensions != len(actions) or (counts is None) != (wanted is None) or (
+        counts is not None and wanted is not None
+        and any(have < need for have, need in zip(counts, wanted, strict=True))
+    ):
+        raise InputError(
+            f"{rules_of} prescribe {_actions_in_words(wanted, len(actions))} and the environment "
+            f"takes {_actions_in_words(counts, dimensions)}; use rules of this environment"
+        )
+
+
+def _actions_in_words(counts: list[int] | None, dimensions: int) -> str:
+    if counts is None:
+        return f"{dimensions} continuous action dimension{'s' if dimensions > 1 else ''}"
+    return "discrete actions with " + ", ".join(str(count) for count in counts) + " labels"
