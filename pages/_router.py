@@ -1,0 +1,44 @@
+"""Where every visit begins: page settings, what is chosen (in the sidebar), navigation."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import streamlit as st
+
+# Pages are run as scripts; the house and the shared state are found from here.
+for folder in (Path(__file__).parents[1], Path(__file__).parent):
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
+
+import _state as state  # noqa: E402  # found by the line above
+
+st.set_page_config(
+    page_title="SARL Explorer",
+    page_icon=":material/account_tree:",
+    layout="wide",
+    initial_sidebar_state="auto",
+)
+
+PAGES = [
+    st.Page(
+        "demonstrations.py", title="Demonstrations", icon=":material/dataset:", default=True,
+        help="What the expert did: choose a shipped set or upload your own, and look at it.",
+    ),
+    st.Page(
+        "thresholds.py", title="Thresholds", icon=":material/tune:",
+        help="How many rules, how long and how good, at every pair of thresholds.",
+    ),
+    st.Page(
+        "rules.py", title="Rules", icon=":material/rule:",
+        help="Every rule in plain language, with the evidence behind it.",
+    ),
+    st.Page(
+        "replay.py", title="Replay", icon=":material/play_circle:",
+        help="An agent in its environment, with the rules as a shield and without.",
+    ),
+]
+page = st.navigation(PAGES)
+state.sidebar()
+page.run()

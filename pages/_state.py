@@ -1,0 +1,333 @@
+"""What is chosen, and the cached ways to everything that follows from it.
+
+The URL holds every choice. Widgets that can bind themselves to it; the choices that cannot (the
+data set, whose name on screen is not its name in the URL, and the rule, which is a selection in
+a table) go through `url_choice`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import streamlit as st
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
+from sarl_core.mining.landscape import Changes, Landscape, next_changes, threshold_landscape
+from sarl_core.mining.pareto import ParetoPoint, pareto_front
+from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds, mine_rules
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+
+SHIPPED = {
+    "lunar_lander": ("Lunar Lander", "LunarLander-v3"),
+    "cartpole": ("Cart Pole", "CartPole-v1"),
+    "pendulum": ("Pendulum", "Pendulum-v1"),
+}
+UPLOAD = "upload"
+DEFAULT_DATA = "lunar_lander"
+MIN_DIVIDER, MAX_DIVIDER = 2, 10
+DATA_FOLDER = Path(__file__).parents[1] / "data" / "demonstrations"
+
+
+# --- what is chosen ----------------------------------------------------------------------------
+
+
+def url_choice(name: str, options: Sequence[str], default: str) -> str:
+    """A choice that the URL holds and that survives a change of page.
+
+    Args:
+        name: URL parameter.
+        options: What it may be.
+        default: Taken where the URL says nothing, or something else.
+
+    Returns:
+        One of `options`.
+    """
+    kept = f"_{name}"
+    value = st.query_params.get(name)
+    if value not in options:
+        value = st.session_state.get(kept, default)
+    if value not in options:
+        value = default
+    set_url_choice(name, value, default)
+    return value
+
+
+def set_url_choice(name: str, value: str, default: str = "") -> None:
+    """Choose, from a widget's callback or by `url_choice`.
+
+    Args:
+        name: URL parameter.
+        value: Its new value.
+        default: Value that needs no place in the URL.
+    """
+    st.session_state[f"_{name}"] = value
+    if value != default:
+        if st.query_params.get(name) != value:
+            st.query_params[name] = value
+    elif name in st.query_params:
+        del st.query_params[name]
+
+
+def dataset_names() -> tuple[str, ...]:
+    """What the URL parameter `data` may be: the shipped sets, and "upload"."""
+    return (*SHIPPED, UPLOAD)
+
+
+def dataset_label(name: str) -> str:
+    """What a data set is called on screen."""
+    return SHIPPED[name][0] if name in SHIPPED else "Your upload"
+
+
+def chosen_dataset() -> str:
+    """Name of the chosen data set, one of `dataset_names`."""
+    return url_choice("data", dataset_names(), DEFAULT_DATA)
+
+
+def choose_dataset(name: str) -> None:
+    """Choose a data set; for callbacks."""
+    set_url_choice("data", name, DEFAULT_DATA)
+
+
+def set_upload(demonstrations: Demonstrations, *, file_name: str = "") -> None:
+    """Keep uploaded demonstrations for this session, and choose them.
+
+    Args:
+        demonstrations: Read and checked.
+        file_name: Shown where the data is named.
+    """
+    st.session_state["_upload"] = demonstrations
+    st.session_state["_upload_name"] = file_name
+    choose_dataset(UPLOAD)
+
+
+def uploaded() -> Demonstrations | None:
+    """The demonstrations uploaded in this session, if any."""
+    return cast("Demonstrations | None", st.session_state.get("_upload"))
+
+
+def chosen_demonstrations() -> Demonstrations | None:
+    """The demonstrations that every page works on; None while nothing is uploaded.
+
+    A shipped file that cannot be read is said on the page, which then stops.
+    """
+    name = chosen_dataset()
+    if name == UPLOAD:
+        return uploaded()
+    try:
+        return shipped_demonstrations(name)
+    except SarlError as error:
+        st.error(str(error), icon=":material/error:")
+        st.stop()
+
+
+def require_demonstrations() -> Demonstrations:
+    """The chosen demonstrations; where there are none, say what to do and stop the page."""
+    demonstrations = chosen_demonstrations()
+    if demonstrations is None:
+        st.info(
+            "Nothing has been uploaded in this session. Upload a file on the Demonstrations "
+            "page, or choose a shipped set in the sidebar.",
+            icon=":material/upload_file:",
+        )
+        st.page_link("demonstrations.py", label="Go to Demonstrations",
+                     icon=":material/arrow_forward:")
+        st.stop()
+    return demonstrations
+
+
+def _number(name: str, default: float, low: float, high: float) -> float:
+    """A number that a widget may hold, on whatever page; else the URL's; else the default."""
+    value = st.session_state.get(name)
+    if value is None:
+        value = st.query_params.get(name, default)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = default
+    if not (math.isfinite(number) and low <= number <= high):
+        number = default
+    st.session_state[name] = number
+    return number
+
+
+def chosen_thresholds() -> Thresholds:
+    """The thresholds in force (URL: support, confidence, lift, depth; depth 0 is no limit)."""
+    depth = int(_number("depth", 0, 0, 64))
+    return Thresholds(
+        support=_number("support", FILTERED.support, 0.0, 1.0),
+        confidence=_number("confidence", FILTERED.confidence, 0.0, 1.0),
+        lift=_number("lift", 0.0, 0.0, 1000.0),
+        max_depth=depth or None,
+    )
+
+
+def chosen_divider() -> int:
+    """Number of intervals of continuous actions (URL: divider)."""
+    value = int(_number("divider", MIN_DIVIDER, MIN_DIVIDER, MAX_DIVIDER))
+    st.session_state["divider"] = value
+    return value
+
+
+# --- what follows, cached ----------------------------------------------------------------------
+# Streamlit samples large arguments when it hashes them, so everything large is passed with a
+# leading underscore and stands in the key by its digest.
+
+
+@st.cache_resource(max_entries=4, show_spinner="Reading the demonstrations …")
+def shipped_demonstrations(name: str) -> Demonstrations:
+    """A shipped set.
+
+    Args:
+        name: One of `SHIPPED`.
+
+    Returns:
+        Its demonstrations, shared between sessions (they are immutable).
+    """
+    from sarl_core.demonstrations.formats import load_demonstrations
+
+    return load_demonstrations(DATA_FOLDER / f"{name}.parquet")
+
+
+@st.cache_resource(max_entries=12, show_spinner="Growing the decision tree …")
+def _trees(digest: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
+    return grow_policy_trees(_demonstrations, divider=divider)
+
+
+def trees(demonstrations: Demonstrations, divider: int) -> tuple[PolicyTree, ...]:
+    """The trees of demonstrations, one an action dimension; grown once.
+
+    Args:
+        demonstrations: N pairs.
+        divider: Number of intervals of continuous actions; without meaning for discrete ones.
+
+    Returns:
+        Shared between sessions (they are immutable).
+    """
+    if demonstrations.is_discrete:
+        divider = MIN_DIVIDER
+    return _trees(demonstrations.digest, divider, demonstrations)
+
+
+def _key(grown: tuple[PolicyTree, ...]) -> tuple[str, int]:
+    return grown[0].source.digest, grown[0].divider
+
+
+@st.cache_resource(max_entries=48, show_spinner=False)
+def _rule_set(key: tuple[str, int], thresholds: Thresholds,
+              _trees: tuple[PolicyTree, ...]) -> RuleSet:
+    return mine_rules(
+        _trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
+        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+    )
+
+
+def rule_set(
+    grown: tuple[PolicyTree, ...] | None = None, thresholds: Thresholds | None = None
+) -> RuleSet:
+    """The rule set in force, or that of other trees and thresholds.
+
+    Args:
+        grown: Trees; those of the chosen data and divider where not given.
+        thresholds: The chosen ones where not given.
+
+    Returns:
+        Mined once for each combination.
+    """
+    if grown is None:
+        grown = trees(require_demonstrations(), chosen_divider())
+    return _rule_set(_key(grown), thresholds or chosen_thresholds(), grown)
+
+
+@st.cache_resource(max_entries=48, show_spinner=False)
+def _landscape(
+    key: tuple[str, int], supports: tuple[float, ...], confidences: tuple[float, ...],
+    lift: float, depth: int | None, _trees: tuple[PolicyTree, ...],
+) -> Landscape:
+    return threshold_landscape(_trees, supports, confidences, lift_min=lift, max_depth=depth)
+
+
+def landscape(
+    grown: tuple[PolicyTree, ...],
+    supports: NDArray[np.float64] | Sequence[float],
+    confidences: NDArray[np.float64] | Sequence[float],
+    *,
+    lift: float = 0.0,
+    depth: int | None = None,
+) -> Landscape:
+    """The landscape over a grid, computed once for each combination."""
+    return _landscape(
+        _key(grown), tuple(map(float, supports)), tuple(map(float, confidences)), lift, depth,
+        grown,
+    )
+
+
+@st.cache_resource(max_entries=24, show_spinner=False)
+def _pareto(
+    key: tuple[str, int], lift: float, depth: int | None, _trees: tuple[PolicyTree, ...]
+) -> tuple[ParetoPoint, ...]:
+    return pareto_front(_trees, lift_min=lift, max_depth=depth)
+
+
+def pareto(
+    grown: tuple[PolicyTree, ...], *, lift: float = 0.0, depth: int | None = None
+) -> tuple[ParetoPoint, ...]:
+    """The rule sets that no other one beats, found once for each combination."""
+    return _pareto(_key(grown), lift, depth, grown)
+
+
+@st.cache_data(max_entries=200, show_spinner=False)
+def _changes(
+    key: tuple[str, int], thresholds: Thresholds, _trees: tuple[PolicyTree, ...]
+) -> Changes:
+    return next_changes(
+        _trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
+        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+    )
+
+
+def changes(grown: tuple[PolicyTree, ...], thresholds: Thresholds) -> Changes:
+    """The nearest thresholds at which anything changes."""
+    return _changes(_key(grown), thresholds, grown)
+
+
+# --- how it looks ------------------------------------------------------------------------------
+
+
+def is_dark() -> bool:
+    """Whether the visitor's theme is dark."""
+    return str(st.context.theme.get("type", "light")) == "dark"
+
+
+def sidebar() -> None:
+    """The choice of data and the thresholds in force, the same on every page."""
+    name = chosen_dataset()
+    thresholds, divider = chosen_thresholds(), chosen_divider()
+    # The widget follows the URL, so a link and the browser's "back" both reach it.
+    st.session_state["_data_choice"] = name
+    with st.sidebar:
+        st.selectbox(
+            "Data", dataset_names(), format_func=dataset_label, key="_data_choice",
+            on_change=lambda: choose_dataset(st.session_state["_data_choice"]),
+        )
+        demonstrations = chosen_demonstrations()
+        if demonstrations is None:
+            st.caption("Nothing uploaded yet: see the Demonstrations page.")
+            return
+        lines = [
+            f"{len(demonstrations):,} steps in {demonstrations.n_episodes:,} episodes",
+            f"Support at least **{thresholds.support:g}**",
+            f"Confidence at least **{thresholds.confidence:g}**",
+        ]
+        if not demonstrations.is_discrete:
+            lines.append(f"Divider **{divider}**")
+        if thresholds.lift:
+            lines.append(f"Lift at least **{thresholds.lift:g}**")
+        if thresholds.max_depth:
+            lines.append(f"Depth at most **{thresholds.max_depth}**")
+        st.caption("  \n".join(lines))
