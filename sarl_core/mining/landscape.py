@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -102,7 +103,7 @@ def confidence_above(tree: PolicyTree, *, lift_min: float = 0.0) -> Floats:
     # By depth, so that a parent is final before its children ask.
     by_depth = np.argsort(tree.depth, kind="stable")
     ends = np.cumsum(np.bincount(tree.depth))
-    for start, end in zip(ends[:-1], ends[1:], strict=True):
+    for start, end in pairwise(ends.tolist()):
         level = by_depth[start:end]
         parent = tree.parent[level]
         above[level] = np.maximum(above[parent], counting[parent])
@@ -161,7 +162,8 @@ class _Sums(NamedTuple):
 
 def _axis(values: ArrayLike, name: str) -> Floats:
     axis = np.asarray(values, dtype=np.float64)
-    if axis.ndim != 1 or len(axis) == 0 or not np.isfinite(axis).all() or (np.diff(axis) <= 0).any():
+    usable = axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all()
+    if not usable or (np.diff(axis) <= 0).any():
         raise InputError(f"the {name} of a landscape must be finite numbers in ascending order")
     return axis
 

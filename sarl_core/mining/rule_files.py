@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -79,7 +78,7 @@ def save_rules(rule_set: RuleSet, path: Path) -> None:
             "w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8"
         ) as file:
             file.write(rules_to_json(rule_set))
-        os.replace(file.name, path)
+        Path(file.name).replace(path)
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); give another place") \
             from error
@@ -277,7 +276,7 @@ def _read_rule(part: _Reader, n_features: int, actions: tuple[LabelledDimension,
             raise entry.fail(f"there is no feature {feature}")
         if op not in ("<=", ">"):
             raise entry.fail(f"the operator {op!r} is neither '<=' nor '>'")
-        conditions.append(Condition(feature, op, entry.number("threshold")))  # type: ignore[arg-type]
+        conditions.append(Condition(feature, op, entry.number("threshold")))
         entry.finish()
     dimension, action = part.take("dimension", int), part.take("action", int)
     if not 0 <= dimension < len(actions):
@@ -300,7 +299,7 @@ def _read_rule(part: _Reader, n_features: int, actions: tuple[LabelledDimension,
         lift=part.number("lift"),
         samples=part.take("samples", int),
         enabled=part.take("enabled", bool, True),
-        origin=origin,  # type: ignore[arg-type]  # one of the two, checked above
+        origin=origin,
         demonstrated_value=None if value is None else float(value),
     )
     part.finish()

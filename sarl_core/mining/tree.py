@@ -96,22 +96,22 @@ class PolicyTree:
     @cached_property
     def samples(self) -> NDArray[np.int64]:
         """Pairs that reach each node, (n,)."""
-        return self.counts.sum(axis=1)
+        return np.asarray(self.counts.sum(axis=1))
 
     @cached_property
     def label(self) -> NDArray[np.int64]:
         """Most frequent label at each node, the lowest where several are, (n,)."""
-        return self.counts.argmax(axis=1).astype(np.int64)
+        return np.asarray(self.counts.argmax(axis=1), dtype=np.int64)
 
     @cached_property
     def correct(self) -> NDArray[np.int64]:
         """Pairs at each node that carry its label, (n,)."""
-        return self.counts.max(axis=1)
+        return np.asarray(self.counts.max(axis=1))
 
     @cached_property
     def support(self) -> NDArray[np.float64]:
         """Share of all pairs that reach each node, (n,)."""
-        return self.samples / self.samples[0]
+        return np.asarray(self.samples / self.samples[0])
 
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
@@ -122,7 +122,7 @@ class PolicyTree:
     def lift(self) -> NDArray[np.float64]:
         """Confidence over the label's share of all pairs, (n,)."""
         shares = self.counts[0] / self.samples[0]
-        return self.confidence / shares[self.label]
+        return np.asarray(self.confidence / shares[self.label])
 
     def path(self, node: int) -> tuple[int, ...]:
         """Node numbers from the root to a node, both included.
@@ -229,7 +229,7 @@ def grow_policy_trees(
     )
     trees = []
     for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
-        demonstrated = np.ascontiguousarray(demonstrations.action_columns[:, index])
+        demonstrated = demonstrations.action_columns[:, index].copy()
         labels = dimension.labels_of(demonstrated)
         learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
         learner.fit(demonstrations.observations, labels)

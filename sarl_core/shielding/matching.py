@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.rules import Rule
 
 _NO_RULE = -1
 # States walked together: few enough for the processor's cache, enough to be worth a call.
@@ -30,6 +30,9 @@ class _Node(NamedTuple):
     rule: int
 
 
+_NOTHING = _Node(-1, 0.0, -1, -1, _NO_RULE)
+
+
 class Matcher:
     """The rules of one action dimension, arranged for finding the one that applies."""
 
@@ -40,12 +43,9 @@ class Matcher:
             scanned: Rules to try one by one, first.
             nodes: The tree of the others, root first.
         """
-        self._scanned = [
-            (index, [tuple(condition) for condition in rule.conditions]) for index, rule in scanned
-        ]
-        self._scanned_rules = list(scanned)
+        self._scanned = list(scanned)
         # One flat list for single states: nothing is faster in plain Python.
-        self._nodes = [tuple(node) for node in nodes]
+        self._nodes = list(nodes)
         self._feature = np.array([node.feature for node in nodes], dtype=np.int64)
         self._threshold = np.array([node.threshold for node in nodes], dtype=np.float64)
         self._children = np.array(
@@ -65,11 +65,11 @@ class Matcher:
         """
         manual = [entry for entry in rules if entry[1].origin == "manual"]
         mined = [entry for entry in rules if entry[1].origin == "mined"]
-        nodes: list[_Node] = []
-        if _grow(mined, 0, nodes):
+        nodes = _tree_of(mined)
+        if nodes is not None:
             return cls(manual, nodes)
         # A file whose mined rules are not of one tree: what its order says, holds.
-        return cls([*manual, *mined], [_Node(-1, 0.0, -1, -1, _NO_RULE)])
+        return cls([*manual, *mined], [_NOTHING])
 
     def match(self, state: list[float]) -> tuple[int | None, float]:
         """The rule that applies to one state.
@@ -81,9 +81,9 @@ class Matcher:
             Its index in the rule set or None, and the distance to the nearest threshold asked.
         """
         margin = float("inf")
-        for index, conditions in self._scanned:
-            for feature, op, threshold in conditions:
-                gap = state[feature] - threshold  # type: ignore[index]
+        for index, rule in self._scanned:
+            for feature, op, threshold in rule.conditions:
+                gap = state[feature] - threshold
                 distance = -gap if gap < 0 else gap
                 if distance < margin:
                     margin = distance
@@ -92,18 +92,18 @@ class Matcher:
             else:
                 return index, margin
         nodes = self._nodes
-        feature, threshold, left, right, rule = nodes[0]
+        feature, threshold, left, right, found = nodes[0]
         while feature >= 0:
             gap = state[feature] - threshold
             if gap <= 0:
                 if -gap < margin:
                     margin = -gap
-                feature, threshold, left, right, rule = nodes[left]
+                feature, threshold, left, right, found = nodes[left]
             else:
                 if gap < margin:
                     margin = gap
-                feature, threshold, left, right, rule = nodes[right]
-        return (rule if rule >= 0 else None), margin
+                feature, threshold, left, right, found = nodes[right]
+        return (found if found >= 0 else None), margin
 
     def match_batch(
         self, states: NDArray[np.float32]
@@ -129,7 +129,7 @@ class Matcher:
     ) -> NDArray[np.int64]:
         """Try the scanned rules; fill in what is found and give the rows that are left."""
         left = np.arange(len(states))
-        for index, rule in self._scanned_rules:
+        for index, rule in self._scanned:
             holding = left
             for feature, op, threshold in rule.conditions:
                 gap = states[holding, feature] - np.float64(threshold)
@@ -161,35 +161,36 @@ class Matcher:
             nodes = self._children[2 * nodes + (gap > 0)]
 
 
-def _grow(rules: Sequence[Numbered], depth: int, nodes: list[_Node]) -> bool:
-    """Append the tree of some rules that agree on their first queries.
+def _tree_of(rules: Sequence[Numbered]) -> list[_Node] | None:
+    """Put rules that share the beginnings of their paths together again.
 
     Args:
-        rules: They agree on `depth` queries.
-        depth: Number of queries above.
-        nodes: Appended to; the root of this part first.
+        rules: Each with its index in the rule set.
 
     Returns:
-        Whether the rules are those of one tree.
+        The nodes, root first; None if the rules are not those of one tree.
     """
-    place = len(nodes)
-    nodes.append(_Node(-1, 0.0, -1, -1, _NO_RULE))
-    if not rules:
-        return True
-    if any(rule.length == depth for _, rule in rules):
-        nodes[place] = _Node(-1, 0.0, -1, -1, rules[0][0])
-        return len(rules) == 1
-    asked = rules[0][1].conditions[depth]
-    left: list[Numbered] = []
-    right: list[Numbered] = []
-    for entry in rules:
-        condition: Condition = entry[1].conditions[depth]
-        if condition[::2] != asked[::2]:
-            return False
-        (left if condition.op == "<=" else right).append(entry)
-    left_place = len(nodes)
-    if not _grow(left, depth + 1, nodes):
-        return False
-    right_place = len(nodes)
-    nodes[place] = _Node(asked.feature, asked.threshold, left_place, right_place, _NO_RULE)
-    return _grow(right, depth + 1, nodes)
+    nodes = [_NOTHING]
+    # A stack and no recursion, because a tree may be deeper than Python's calls may go.
+    waiting = [(0, 0, list(rules))]
+    while waiting:
+        place, depth, group = waiting.pop()
+        if not group:
+            continue
+        if any(rule.length == depth for _, rule in group):
+            if len(group) > 1:
+                return None
+            nodes[place] = _NOTHING._replace(rule=group[0][0])
+            continue
+        feature, _, threshold = group[0][1].conditions[depth]
+        sides: dict[str, list[Numbered]] = {"<=": [], ">": []}
+        for entry in group:
+            condition = entry[1].conditions[depth]
+            if (condition.feature, condition.threshold) != (feature, threshold):
+                return None
+            sides[condition.op].append(entry)
+        left, right = len(nodes), len(nodes) + 1
+        nodes[place] = _Node(feature, threshold, left, right, _NO_RULE)
+        nodes += [_NOTHING, _NOTHING]
+        waiting += [(left, depth + 1, sides["<="]), (right, depth + 1, sides[">"])]
+    return nodes
