@@ -1,0 +1,55 @@
+"""The colours: one for each label, the same in every table, tree, bar and overlay.
+
+The first seven are those of Okabe and Ito, told apart with every kind of colour vision and legible
+on light and on dark; their vermilion is kept for interventions. Should a label need an eighth, a
+second ring follows.
+"""
+
+from __future__ import annotations
+
+LABEL_COLOURS = (
+    "#0072B2",  # blue
+    "#E69F00",  # orange
+    "#009E73",  # green
+    "#CC79A7",  # purple
+    "#56B4E9",  # sky
+    "#D9C514",  # yellow, darkened for white ground
+    "#8C8C8C",  # grey
+    "#7A4FBF",
+    "#A0612B",
+    "#5F8F3E",
+)
+INTERVENTION_COLOUR = "#D55E00"  # vermilion
+MARKER_COLOUR = "#D55E00"  # what is chosen: a point, a rule's path, its interval
+MUTED_COLOUR = "#8796A3"  # what is there for comparison
+LAYER_SCALE = (
+    # Perceptually even, from ground to ink, legible with every kind of colour vision.
+    (0.0, "#f4ecd8"), (0.2, "#c9dcc0"), (0.4, "#8fc3b5"), (0.6, "#4f9fae"), (0.8, "#2c6f99"),
+    (1.0, "#1c3f6e"),
+)
+
+
+def label_colour(index: int) -> str:
+    """The colour of a label.
+
+    Args:
+        index: The label.
+
+    Returns:
+        As "#0072B2".
+    """
+    return LABEL_COLOURS[index % len(LABEL_COLOURS)]
+
+
+def faded(colour: str, opacity: float) -> str:
+    """A colour that lets the ground through.
+
+    Args:
+        colour: As "#0072B2".
+        opacity: 0 to 1.
+
+    Returns:
+        As "rgba(0,114,178,0.3)".
+    """
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
