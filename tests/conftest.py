@@ -1,0 +1,19 @@
+"""What several test folders share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations
+
+
+@pytest.fixture(scope="session")
+def lander_like() -> Demonstrations:
+    """Two thousand noisy steps with eight features and four labels."""
+    rng = np.random.default_rng(7)
+    observations = rng.normal(size=(2000, 8)).astype(np.float32)
+    labels = (observations[:, 0] * observations[:, 1] > 0) + 2 * (observations[:, 2] > 0.5)
+    noisy = rng.random(2000) < 0.1
+    labels = np.where(noisy, rng.integers(0, 4, 2000), labels)
+    return Demonstrations(observations, labels, np.repeat(np.arange(20), 100))

@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
+from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from tests.mining.strategies import labelled_states
+
+
+@pytest.fixture(scope="module")
+def document(lander_like):
+    return json.loads(rules_to_json(mine_rules(lander_like, supp_min=0.02, conf_min=0.8)))
+
+
+def read(document):
+    return rules_from_json(json.dumps(document), name="rules.json")
+
+
+@settings(max_examples=40, deadline=None)
+@given(labelled_states(), st.floats(0, 1), st.floats(0, 1))
+def test_what_is_written_is_read(demonstrations, supp, conf):
+    rules = mine_rules(demonstrations, supp_min=supp, conf_min=conf)
+    assert rules_from_json(rules_to_json(rules)) == rules
+
+
+def test_continuous_rules_come_back(tmp_path):
+    rng = np.random.default_rng(0)
+    demonstrations = Demonstrations(
+        rng.normal(size=(300, 2)), rng.normal(size=(300, 2)).astype(np.float32),
+        np.zeros(300, dtype=int), feature_names=("pole angle", "speed"),
+        feature_units=("rad", "m/s"), action_names=("hip", "knee"),
+        action_low=(-9.0, -9.0), action_high=(9.0, 9.0), env_id="Walker",
+    )
+    rules = mine_rules(demonstrations, supp_min=0.01, conf_min=0.9, divider=3)
+    path = tmp_path / "rules.json"
+    rules.save(path)
+    assert RuleSet.load(path) == rules
+    assert [p.name for p in tmp_path.iterdir()] == ["rules.json"]
+    written = json.loads(path.read_text())
+    assert (written["format"], written["version"], written["divider"]) == ("sarl-rules", 1, 3)
+    assert written["features"][0] == {"name": "pole angle", "unit": "rad"}
+    assert written["actions"][1]["kind"] == "interval"
+    assert written["actions"][1]["edges"] == [-9.0, -3.0, 3.0, 9.0]
+    assert written["demonstrations"]["digest"] == demonstrations.digest
+    rule = written["rules"][0]
+    assert set(rule) >= {"id", "dimension", "conditions", "action", "support", "confidence",
+                         "lift", "samples", "length", "enabled", "origin"}
+
+
+BAD = {
+    "another format": (lambda d: d.update(format="other"), "format"),
+    "a later version": (lambda d: d.update(version=2), "version 2"),
+    "an unknown key": (lambda d: d.update(colour="red"), "'colour'"),
+    "an unknown key in a rule": (lambda d: d["rules"][0].update(weight=1), "'weight'"),
+    "an unknown key in a condition": (
+        lambda d: d["rules"][0]["conditions"][0].update(unit="m"), "'unit'"),
+    "an unknown threshold": (lambda d: d["thresholds"].update(gini=1), "'gini'"),
+    "an unknown kind": (lambda d: d["actions"][0].update(kind="fuzzy"), "'fuzzy'"),
+    "an unknown operator": (
+        lambda d: d["rules"][0]["conditions"][0].update(op="<"), "operator '<'"),
+    "an unknown feature": (
+        lambda d: d["rules"][0]["conditions"][0].update(feature=99), "feature 99"),
+    "an unknown label": (lambda d: d["rules"][0].update(action=17), "action 17"),
+    "an unknown dimension": (lambda d: d["rules"][0].update(dimension=3), "dimension 3"),
+    "an unknown origin": (lambda d: d["rules"][0].update(origin="dream"), "'dream'"),
+    "a missing key": (lambda d: d["rules"][0].pop("support"), "'support' is missing"),
+    "a wrong length": (lambda d: d["rules"][0].update(length=77), "'length'"),
+    "a text for a number": (lambda d: d["rules"][0].update(support="all"), "'support'"),
+    "a truth value for a number": (lambda d: d["rules"][0].update(samples=True), "'samples'"),
+    "a threshold that is no number": (
+        lambda d: d["rules"][0]["conditions"][0].update(threshold=float("nan")), "finite"),
+    "a doubled id": (lambda d: d["rules"].append(d["rules"][0]), "stands twice"),
+    "no features": (lambda d: d.update(features=[]), "features"),
+    "an impossible threshold": (lambda d: d["thresholds"].update(support=3.0), "support is 3"),
+    "a rule that is a number": (lambda d: d["rules"].append(5), "not an object"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_not_understood_is_refused_by_name(document, case):
+    spoil, names = BAD[case]
+    copy = json.loads(json.dumps(document))
+    spoil(copy)
+    with pytest.raises(InputError) as caught:
+        read(copy)
+    assert names in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1, 2]", "null", '{"format": "sarl-rules"}', "\xff"])
+def test_what_is_no_rule_file_is_refused(text, tmp_path):
+    path = tmp_path / "rules.json"
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match="rules.json"):
+        RuleSet.load(path)
+
+
+def test_a_missing_file_and_a_missing_folder_are_said(tmp_path, lander_like):
+    with pytest.raises(InputError, match="cannot be read"):
+        RuleSet.load(tmp_path / "none.json")
+    with pytest.raises(InputError, match="cannot be written"):
+        mine_rules(lander_like, supp_min=0.1, conf_min=0.5).save(tmp_path / "no" / "rules.json")
