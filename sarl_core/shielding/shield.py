@@ -196,7 +196,6 @@ class Shield:
 
 def _like(action: Any, value: int) -> Any:
     """A discrete action of the same kind as the one that was proposed."""
-    if type(action) is int:
-        return value
-    given = np.asarray(action)
-    return given.dtype.type(value) if given.ndim == 0 else np.full_like(given, value)
+    if isinstance(action, np.ndarray):
+        return np.full_like(action, value)
+    return action.dtype.type(value) if isinstance(action, np.generic) else value
