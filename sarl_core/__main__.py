@@ -1,0 +1,10 @@
+"""``python -m sarl_core``."""
+
+from __future__ import annotations
+
+import sys
+
+from sarl_core.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

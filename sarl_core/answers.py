@@ -1,0 +1,213 @@
+"""What the commands answer, as documents for JSON and as text for people."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sarl_core import terminal
+from sarl_core.demonstrations.checks import find_warnings
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+    from sarl_core.mining.rules import RuleSet
+
+_RULES_SHOWN = 5
+
+
+def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[str, Any]:
+    """What is in demonstrations.
+
+    Args:
+        demonstrations: N pairs.
+        path: Their file.
+
+    Returns:
+        A document for JSON.
+    """
+    finished = demonstrations.episode_finished
+    returns = demonstrations.episode_returns
+    return {
+        "file": str(path),
+        "env_id": demonstrations.env_id,
+        "agent": demonstrations.agent,
+        "seed": demonstrations.seed,
+        "steps": len(demonstrations),
+        "episodes": demonstrations.n_episodes,
+        "episodes_finished": None if finished is None else int(finished.sum()),
+        "lengths": _spread(demonstrations.episode_lengths),
+        "returns": None if returns is None else _spread(returns, finished),
+        "features": [
+            {"name": feature.name, "unit": feature.unit, **_spread(column)}
+            for feature, column in zip(
+                demonstrations.features, demonstrations.observations.T, strict=True
+            )
+        ],
+        "actions": [
+            _describe_action(dimension, column)
+            for dimension, column in zip(
+                demonstrations.action_dimensions, demonstrations.action_columns.T, strict=True
+            )
+        ],
+        "notes": list(demonstrations.notes),
+        "warnings": list(find_warnings(demonstrations)),
+        "digest": demonstrations.digest,
+    }
+
+
+def _describe_action(dimension: ActionDimension, values: NDArray[Any]) -> dict[str, Any]:
+    if dimension.kind == "discrete":
+        labels = values.astype(np.int64) - dimension.first
+        shares = np.bincount(labels, minlength=len(dimension.labels)) / len(values)
+        return {
+            "name": dimension.name,
+            "kind": "discrete",
+            "labels": [
+                {"action": dimension.first + label, "name": name, "share": share}
+                for label, (name, share) in enumerate(
+                    zip(dimension.labels, shares.tolist(), strict=True)
+                )
+            ],
+        }
+    return {
+        "name": dimension.name,
+        "kind": "interval",
+        "low": dimension.low,
+        "high": dimension.high,
+        "bounds_from": dimension.bounds_from,
+        **_spread(values),
+    }
+
+
+def _spread(values: NDArray[Any], kept: NDArray[np.bool_] | None = None) -> dict[str, float]:
+    """Least, median, mean and largest value; of the finished episodes, where some are."""
+    numbers = values.astype(np.float64)
+    if kept is not None and kept.any():
+        numbers = numbers[kept]
+    return {
+        "min": float(numbers.min()),
+        "median": float(np.median(numbers)),
+        "mean": float(numbers.mean()),
+        "max": float(numbers.max()),
+    }
+
+
+def print_demonstrations(document: dict[str, Any]) -> None:
+    """Print what `describe_demonstrations` found.
+
+    Args:
+        document: What it gave.
+    """
+    origin = document["env_id"] or "an environment that the file does not name"
+    by = f", by {document['agent']}" if document["agent"] else ""
+    terminal.print_lines([
+        f"{document['file']}: {document['steps']:,} steps of {origin}{by}", "",
+    ])
+    terminal.print_facts(_facts(document))
+    terminal.print_table(
+        ("feature", "unit", "least", "median", "largest"),
+        [
+            (entry["name"], entry["unit"], *_numbers(entry))
+            for entry in document["features"]
+        ],
+    )
+    for action in document["actions"]:
+        if action["kind"] == "discrete":
+            terminal.print_table(
+                (action["name"], "action", "share"),
+                [
+                    (label["name"], str(label["action"]), f"{label['share']:.1%}")
+                    for label in action["labels"]
+                ],
+            )
+        else:
+            terminal.print_table(
+                (action["name"], "bounds", "least", "median", "largest"),
+                [("", f"{action['low']:g} to {action['high']:g} ({action['bounds_from']})",
+                  *_numbers(action))],
+            )
+    sentences = [f"note: {note}" for note in document["notes"]]
+    sentences += [f"warning: {warning}" for warning in document["warnings"]]
+    terminal.print_lines(sentences or ["No warnings."])
+
+
+def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
+    finished = document["episodes_finished"]
+    unfinished = "" if finished is None else f" ({finished:,} of them finished)"
+    facts = [("episodes", f"{document['episodes']:,}{unfinished}")]
+    for name in ("lengths", "returns"):
+        spread = document[name]
+        if spread is not None:
+            facts.append((name, f"mean {spread['mean']:,.1f}, from {spread['min']:,.1f} to "
+                                f"{spread['max']:,.1f}"))
+    return [*facts, ("digest", document["digest"])]
+
+
+def _numbers(spread: dict[str, float]) -> tuple[str, str, str]:
+    least, median, largest = (f"{spread[name]:.4g}" for name in ("min", "median", "max"))
+    return least, median, largest
+
+
+def describe_rules(rule_set: RuleSet, path: Path) -> dict[str, Any]:
+    """What was mined, without the rules themselves.
+
+    Args:
+        rule_set: The rules.
+        path: Their file.
+
+    Returns:
+        A document for JSON.
+    """
+    thresholds = rule_set.thresholds
+    return {
+        "file": str(path),
+        "env_id": rule_set.source.env_id,
+        "steps": rule_set.source.steps,
+        "thresholds": {
+            "support": thresholds.support, "confidence": thresholds.confidence,
+            "lift": thresholds.lift, "max_depth": thresholds.max_depth,
+        },
+        "divider": rule_set.divider,
+        "rules": rule_set.rule_count,
+        "mean_length": rule_set.mean_length,
+        "coverage": rule_set.coverage,
+        "fidelity": rule_set.fidelity,
+        "rules_per_dimension": {
+            action.name: len(rule_set.of_dimension(index))
+            for index, action in enumerate(rule_set.actions)
+        },
+    }
+
+
+def print_rules(rule_set: RuleSet, path: Path) -> None:
+    """Print what was mined, and the rules that apply most often, in words.
+
+    Args:
+        rule_set: The rules.
+        path: Their file.
+    """
+    from sarl_core.explaining.language import rule_sentence
+
+    facts = [
+        ("rules", f"{rule_set.rule_count:,}"),
+        ("mean length", f"{rule_set.mean_length:.2f} conditions"),
+        ("coverage", f"{rule_set.coverage:.1%} of the demonstrated states have a rule"),
+    ]
+    if len(rule_set):
+        facts.append(
+            ("fidelity", f"{rule_set.fidelity:.1%} of these carry the action that the rule gives")
+        )
+    terminal.print_lines([f"Wrote {path}"])
+    terminal.print_facts(facts)
+    if not len(rule_set):
+        terminal.print_lines(["No rule reaches these thresholds; lower one of them."])
+        return
+    often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
+    terminal.print_lines(["", "The rules that apply most often:"])
+    terminal.print_lines(
+        f"  {number}. {rule_sentence(rule, rule_set)}" for number, rule in enumerate(often, 1)
+    )

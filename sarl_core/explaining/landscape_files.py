@@ -1,0 +1,178 @@
+"""A threshold landscape as a file: JSON, CSV, an interactive page, or a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError, WorkError
+from sarl_core.mining.landscape import Landscape
+from sarl_core.rollouts.files import whole_file
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+MAX_VALUES = 10_001  # an axis in steps of 0.0001
+MAX_CELLS = 4_000_000  # as a file, half a gigabyte
+
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+_LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
+
+
+def parse_grid(text: str, name: str) -> NDArray[np.float64]:
+    """Read the thresholds of a grid, written ``a:b:step``.
+
+    Args:
+        text: As "0:0.5:0.05"; b is included if the steps reach it.
+        name: Of the option, for errors.
+
+    Returns:
+        The thresholds, ascending. Each is the float nearest to the decimal number, so that
+        three steps of 0.05 are 0.15 and nothing beside it.
+
+    Raises:
+        InputError: If it is not of this form, leaves [0, 1] or has too many values.
+    """
+    try:
+        first, last, step = (Decimal(part) for part in text.split(":"))
+    except (ValueError, InvalidOperation) as error:
+        raise InputError(
+            f"{name} is {text!r}; give the first value, the last and the step, as 0:0.5:0.05"
+        ) from error
+    if not all(value.is_finite() for value in (first, last, step)) or step <= 0 or last < first:
+        raise InputError(
+            f"{name} is {text!r}; the step must be above 0 and the last value not below the first"
+        )
+    if first < 0 or last > 1:
+        raise InputError(f"{name} is {text!r}; thresholds are shares from 0 to 1")
+    if (last - first) / step >= MAX_VALUES:
+        raise InputError(
+            f"{name} is {text!r}, more than {MAX_VALUES:,} values; give a larger step"
+        )
+    count = int((last - first) / step) + 1
+    return np.array([float(first + index * step) for index in range(count)])
+
+
+def save_landscape(landscape: Landscape, names: Sequence[str], path: Path) -> None:
+    """Write a landscape; the file appears whole or not at all.
+
+    Args:
+        landscape: To write.
+        names: Of the action dimensions.
+        path: A `.json`, `.csv`, `.html` (opens without a network) or `.png` file.
+
+    Raises:
+        InputError: If the path has another ending, or the grid too many cells for a file.
+        WorkError: If the file cannot be written, or no browser is there to draw a PNG.
+    """
+    if landscape.rule_count.size > MAX_CELLS:
+        raise InputError(
+            f"the grid has {landscape.rule_count.size:,} cells, more than {MAX_CELLS:,}; "
+            "give larger steps"
+        )
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        document = landscape_document(landscape, names)
+        content = json.dumps(document, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    elif suffix == ".csv":
+        content = _csv(landscape, names).encode()
+    elif suffix in (".html", ".png"):
+        from sarl_core.explaining.threshold_figures import landscape_figure
+
+        figure = landscape_figure(landscape)
+        content = figure_to_png(figure) if suffix == ".png" else (
+            figure.to_html(include_plotlyjs=True).encode()
+        )
+    else:
+        raise InputError(f"{path} ends in none of .json, .csv, .html, .png; choose one")
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(content)
+
+
+def landscape_document(landscape: Landscape, names: Sequence[str]) -> dict[str, Any]:
+    """A landscape for JSON.
+
+    Args:
+        landscape: To write.
+        names: Of the action dimensions.
+
+    Returns:
+        `supports`, `confidences`, the four layers as one list a support with one entry a
+        confidence (fidelity null where nothing is covered), and under `dimensions` the layers of
+        each action dimension with its `name`.
+    """
+    return {
+        "supports": landscape.supports.tolist(),
+        "confidences": landscape.confidences.tolist(),
+        **_layers(landscape),
+        "dimensions": [
+            {"name": name, **_layers(part)}
+            for name, part in zip(names, landscape.dimensions, strict=True)
+        ],
+    }
+
+
+def _layers(landscape: Landscape) -> dict[str, Any]:
+    layers = {layer: getattr(landscape, layer).tolist() for layer in _LAYERS}
+    # NaN, the only number that is not itself, is where nothing is covered.
+    layers["fidelity"] = [
+        [None if value != value else value for value in row]
+        for row in layers["fidelity"]
+    ]
+    return layers
+
+
+def _csv(landscape: Landscape, names: Sequence[str]) -> str:
+    """One row a cell; with several action dimensions, of the whole and of each."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("dimension", "support", "confidence", *_LAYERS))
+    parts = [("all", landscape)]
+    if len(names) > 1:
+        parts += zip(names, landscape.dimensions, strict=True)
+    for name, part in parts:
+        layers = _layers(part)
+        for row, support in enumerate(part.supports.tolist()):
+            writer.writerows(
+                (name, support, confidence, *(layers[layer][row][column] for layer in _LAYERS))
+                for column, confidence in enumerate(part.confidences.tolist())
+            )
+    return text.getvalue()
+
+
+def figure_to_png(figure: go.Figure, *, width: int = 1400, height: int = 620) -> bytes:
+    """Draw a Plotly figure as a picture.
+
+    Args:
+        figure: To draw.
+        width: In pixels, before doubling for sharpness.
+        height: Likewise.
+
+    Returns:
+        A PNG file.
+
+    Raises:
+        WorkError: If there is no Chromium or Chrome to draw it with.
+    """
+    browser = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if browser is not None:
+        os.environ.setdefault("BROWSER_PATH", browser)
+    try:
+        picture: bytes = figure.to_image(format="png", width=width, height=height, scale=2)
+    except Exception as error:  # whatever Kaleido or the browser has to complain about
+        reason = str(error).strip().splitlines()
+        raise WorkError(
+            "the picture could not be drawn, which takes Chromium or Chrome "
+            f"({reason[0] if reason else type(error).__name__}); install it, or write .html"
+        ) from error
+    return picture
