@@ -321,7 +321,7 @@ def mine_rules(
         nodes = cut_nodes(
             tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
         )
-        rules += _rules_at(tree, nodes)
+        rules += rules_at(tree, nodes)
     return RuleSet(
         rules=tuple(rules),
         actions=tuple(tree.dimension for tree in trees),
@@ -343,7 +343,16 @@ def node_of(rule: Rule) -> int:
     return int(rule.id.rsplit(".", 1)[1])
 
 
-def _rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
+def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
+    """The rules that a cut at these nodes gives.
+
+    Args:
+        tree: With n nodes.
+        nodes: Node numbers, (k,), as `cut_nodes` gives them, or some of them.
+
+    Returns:
+        One rule a node, in their order.
+    """
     numbers = zip(
         nodes.tolist(), tree.label[nodes].tolist(), tree.support[nodes].tolist(),
         tree.confidence[nodes].tolist(), tree.lift[nodes].tolist(), tree.samples[nodes].tolist(),
