@@ -158,13 +158,19 @@ class Shield:
             The decisions.
 
         Raises:
-            InputError: If the observations have another length than the rules' features.
+            InputError: If the observations have another length than the rules' features, or
+                the actions another number than the observations.
         """
         states = np.ascontiguousarray(observations, dtype=np.float32)
         if states.ndim != 2 or states.shape[1] != self._n_features:
             raise self._wrong_width(states.shape[-1] if states.ndim else 0)
         proposed = np.asarray(actions)
-        flat = proposed.reshape(len(states), -1)
+        if proposed.size != len(states) * len(self._actions):
+            raise InputError(
+                f"there are {proposed.size} action values for {len(states)} states with "
+                f"{len(self._actions)} action dimensions; give one action a state"
+            )
+        flat = proposed.reshape(len(states), len(self._actions))
         rules = np.empty((len(states), len(self._actions)), dtype=np.int64)
         margin = np.full(len(states), np.inf)
         executed = flat
