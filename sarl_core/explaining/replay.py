@@ -1,0 +1,224 @@
+"""A recorded episode for people: what the agent wanted, what was done, and which rule said so."""
+
+from __future__ import annotations
+
+import html
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.explaining.language import action_text, number_text, sentence
+from sarl_core.explaining.replay_figures import Track
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.steps import StepTable
+
+
+@dataclass(frozen=True)
+class ActionView:
+    """One action dimension at one step.
+
+    Attributes:
+        dimension: Its name.
+        proposed: What the agent wanted, in words.
+        executed: What was done, in words.
+        proposed_label: Its label.
+        executed_label: Its label.
+        changed: Whether the shield changed it.
+        rule: The rule in force as a sentence, "" where none applies.
+        rule_id: Its id, "" where none applies.
+    """
+
+    dimension: str
+    proposed: str
+    executed: str
+    proposed_label: int
+    executed_label: int
+    changed: bool
+    rule: str
+    rule_id: str
+
+
+@dataclass(frozen=True)
+class StepView:
+    """One step.
+
+    Attributes:
+        step: Its index.
+        actions: One entry an action dimension.
+        margin: Distance to the nearest threshold, inf where none was looked at.
+        state: Name, value and unit of each feature.
+    """
+
+    step: int
+    actions: tuple[ActionView, ...]
+    margin: float
+    state: tuple[tuple[str, str, str], ...]
+
+    @property
+    def intervened(self) -> bool:
+        """Whether the shield changed anything."""
+        return any(action.changed for action in self.actions)
+
+
+def environment_dimensions(
+    description: EnvironmentDescription, rule_set: RuleSet | None, *, divider: int = 2
+) -> tuple[LabelledDimension, ...]:
+    """The labels by which an environment's actions are named and coloured.
+
+    Args:
+        description: Of the environment.
+        rule_set: Whose intervals are used where the actions are continuous, or None.
+        divider: Number of intervals without a rule set.
+
+    Returns:
+        One entry an action dimension.
+    """
+    if description.action_low is None or description.action_high is None:
+        return tuple(
+            LabelledDimension(name, labels, first=first)
+            for name, labels, first in zip(
+                description.action_names, description.label_names, description.label_first,
+                strict=True,
+            )
+        )
+    if rule_set is not None:
+        return rule_set.actions
+    return tuple(
+        LabelledDimension.of_edges(name, _edges(low, high, divider).tolist())
+        for name, low, high in zip(
+            description.action_names, description.action_low, description.action_high, strict=True
+        )
+    )
+
+
+def tracks(
+    steps: StepTable, dimensions: tuple[LabelledDimension, ...], *, shielded: bool
+) -> tuple[Track, ...]:
+    """The rows of the intervention strip.
+
+    Args:
+        steps: Of one episode, T of them.
+        dimensions: The m action dimensions.
+        shielded: Whether a shield was there; without one there is one row a dimension.
+
+    Returns:
+        For each dimension what the agent wanted and what was done, and at last the
+        interventions.
+    """
+    found = []
+    for index, dimension in enumerate(dimensions):
+        name = f"{dimension.name}: " if len(dimensions) > 1 else ""
+        executed = dimension.labels_of(steps.executed[:, index]).astype(np.float64)
+        if not shielded:
+            found.append(Track(f"{name}action", executed, dimension))
+            continue
+        wanted = dimension.labels_of(steps.proposed[:, index]).astype(np.float64)
+        found.append(Track(f"{name}wanted", wanted, dimension))
+        found.append(Track(f"{name}done", executed, dimension))
+    if shielded:
+        marks = np.where(steps.intervened, 0.0, np.nan)
+        found.append(Track("changed", marks, None))
+    return tuple(found)
+
+
+def step_view(
+    steps: StepTable, row: int, dimensions: tuple[LabelledDimension, ...],
+    features: tuple[Feature, ...], rule_set: RuleSet | None,
+) -> StepView:
+    """One step in words.
+
+    Args:
+        steps: Of one episode.
+        row: Which of them.
+        dimensions: The m action dimensions.
+        features: The d features.
+        rule_set: The rules of the shield, or None.
+
+    Returns:
+        The step.
+    """
+    views = []
+    for index, dimension in enumerate(dimensions):
+        proposed, executed = steps.proposed[row, index], steps.executed[row, index]
+        rule = int(steps.rules[row, index])
+        known = rule_set is not None and rule >= 0
+        views.append(ActionView(
+            dimension=dimension.name,
+            proposed=_in_words(float(proposed), dimension),
+            executed=_in_words(float(executed), dimension),
+            proposed_label=dimension.label_of(float(proposed)),
+            executed_label=dimension.label_of(float(executed)),
+            changed=bool(proposed != executed),
+            rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
+            rule_id=rule_set.rules[rule].id if known and rule_set else "",
+        ))
+    state = tuple(
+        (feature.name, number_text(float(value)), feature.unit)
+        for feature, value in zip(features, steps.observation[row], strict=True)
+    )
+    return StepView(int(steps.step[row]), tuple(views), float(steps.margin[row]), state)
+
+
+def step_texts(
+    steps: StepTable, dimensions: tuple[LabelledDimension, ...], rule_set: RuleSet | None
+) -> tuple[str, ...]:
+    """A tooltip for each step.
+
+    Args:
+        steps: Of one episode, T of them.
+        dimensions: The m action dimensions.
+        rule_set: The rules of the shield, or None.
+
+    Returns:
+        T texts, with ``<br>`` between the lines.
+    """
+    lines: list[list[str]] = [[f"step {step}"] for step in steps.step.tolist()]
+    for index, dimension in enumerate(dimensions):
+        prefix = f"{dimension.name}: " if len(dimensions) > 1 else ""
+        pairs = zip(steps.proposed[:, index].tolist(), steps.executed[:, index].tolist(),
+                    steps.rules[:, index].tolist(), strict=True)
+        for line, (proposed, executed, rule) in zip(lines, pairs, strict=True):
+            done = html.escape(_in_words(executed, dimension))
+            if proposed != executed:
+                wanted = html.escape(_in_words(proposed, dimension))
+                line.append(f"{prefix}wanted {wanted}, done {done}")
+            else:
+                line.append(f"{prefix}{done}")
+            if rule_set is not None:
+                line.append(f"rule {rule_set.rules[rule].id}" if rule >= 0 else "no rule applies")
+    return tuple("<br>".join(line) for line in lines)
+
+
+def margin_text(margin: float) -> str:
+    """The distance to the nearest threshold, in words.
+
+    Args:
+        margin: In the feature's own unit; inf where no threshold was looked at.
+
+    Returns:
+        As "0.013 from the nearest threshold".
+    """
+    if math.isinf(margin):
+        return "no threshold was looked at"
+    return f"{number_text(margin)} from the nearest threshold"
+
+
+def _in_words(value: float, dimension: LabelledDimension) -> str:
+    if dimension.is_interval:
+        return f"{dimension.name} {number_text(value)}"
+    label = dimension.label_of(value)
+    if not 0 <= label < dimension.n_labels:
+        return f"{dimension.name} {value:g}"
+    return action_text(label, dimension)
+
+
+def _edges(low: float, high: float, divider: int) -> NDArray[np.float64]:
+    """Edges of equal intervals; of [-1, 1] where a side is open, since any will do to colour."""
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        low, high = -1.0, 1.0
+    return np.linspace(low, high, divider + 1)

@@ -1,0 +1,221 @@
+"""Figures of a replay: what the shield did when, and what it was worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR, label_colour
+from sarl_core.mining.labels import LabelledDimension
+
+SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it
+UNSHIELDED_COLOUR = MUTED_COLOUR
+_CURRENT = MUTED_COLOUR
+_ROW_HEIGHT = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One row of the strip: a label a step.
+
+    Attributes:
+        name: What the row shows, as "agent wanted".
+        labels: Shape (T,), NaN where there is none.
+        dimension: Whose labels these are; None for a row of marks.
+    """
+
+    name: str
+    labels: NDArray[np.float64]
+    dimension: LabelledDimension | None
+
+
+@dataclass(frozen=True, eq=False)
+class ReturnLine:
+    """The return of one run as it grew.
+
+    Attributes:
+        name: As "with the rules".
+        returns: Sum of rewards after each step, (T,).
+        colour: Of the line.
+    """
+
+    name: str
+    returns: NDArray[np.float64]
+    colour: str
+
+
+@dataclass(frozen=True, eq=False)
+class ReturnRow:
+    """The returns of several episodes.
+
+    Attributes:
+        name: As "with the rules".
+        returns: One an episode, (E,).
+        mean: Their mean.
+        low: Lower end of the 95 % interval of the mean.
+        high: Its upper end.
+        colour: Of the points.
+    """
+
+    name: str
+    returns: NDArray[np.float64]
+    mean: float
+    low: float
+    high: float
+    colour: str
+
+
+def intervention_strip(
+    tracks: Sequence[Track], texts: Sequence[str], *, current: int
+) -> go.Figure:
+    """What the agent wanted, what was executed and where the two differ, step by step.
+
+    Plotly reports no click on a heatmap, so points too small to see lie over it; each carries
+    its step in ``customdata``.
+
+    Args:
+        tracks: From top to bottom.
+        texts: What to say about each step, T entries.
+        current: The step to mark.
+
+    Returns:
+        A heatmap with T columns.
+    """
+    n_steps = len(texts)
+    steps = np.arange(n_steps)
+    figure = go.Figure()
+    for row, track in enumerate(tracks):
+        n_labels = track.dimension.n_labels if track.dimension is not None else 1
+        figure.add_heatmap(
+            x=steps, y=[row], z=track.labels[None, :], zmin=-0.5, zmax=n_labels - 0.5,
+            colorscale=_steps_of_colour(n_labels, marks=track.dimension is None),
+            showscale=False, hoverinfo="skip", ygap=5,
+        )
+    figure.add_scatter(
+        x=np.tile(steps, len(tracks)), y=np.repeat(np.arange(len(tracks)), n_steps),
+        mode="markers", marker={"size": 1, "opacity": 0},
+        customdata=np.tile(steps, len(tracks))[:, None], text=list(texts) * len(tracks),
+        hovertemplate="%{text}<extra></extra>",
+    )
+    figure.add_vline(x=current, line={"color": _CURRENT, "width": 2})
+    figure.update_layout(**_layout(_ROW_HEIGHT * len(tracks) + 42), hoverdistance=-1)
+    figure.update_xaxes(
+        title={"text": "step", "standoff": 2}, range=[-0.5, max(n_steps, 2) - 0.5],
+        fixedrange=True, showgrid=False, zeroline=False, nticks=8,
+    )
+    figure.update_yaxes(
+        tickvals=list(range(len(tracks))), ticktext=[track.name for track in tracks],
+        range=[len(tracks) - 0.5, -0.5], fixedrange=True, showgrid=False, zeroline=False,
+        ticklabelstandoff=6,
+    )
+    return figure
+
+
+def return_figure(lines: Sequence[ReturnLine], *, current: int) -> go.Figure:
+    """The return of each run as it grew.
+
+    Args:
+        lines: One a run.
+        current: The step to mark.
+
+    Returns:
+        Lines, named at the top.
+    """
+    figure = go.Figure()
+    for line in lines:
+        figure.add_scatter(
+            x=np.arange(len(line.returns)), y=line.returns, mode="lines", name=line.name,
+            line={"color": line.colour, "width": 2.2},
+            hovertemplate=f"{line.name}, step %{{x}}: %{{y:,.1f}}<extra></extra>",
+        )
+        figure.add_scatter(
+            x=[len(line.returns) - 1], y=line.returns[-1:], mode="markers", showlegend=False,
+            marker={"color": line.colour, "size": 8},
+            hovertemplate=f"{line.name} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
+        )
+    figure.add_vline(x=current, line={"color": _CURRENT, "width": 1, "dash": "dot"})
+    figure.update_layout(**_layout(210))
+    figure.update_layout(
+        showlegend=len(lines) > 1, margin={"t": 30 if len(lines) > 1 else 8},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+    )
+    longest = max(len(line.returns) for line in lines)
+    figure.update_xaxes(title={"text": "step", "standoff": 2}, fixedrange=True, nticks=8,
+                        range=[-0.5, max(longest, 2) - 0.5])
+    figure.update_yaxes(title={"text": "return so far", "standoff": 4}, fixedrange=True, nticks=5)
+    return figure
+
+
+def comparison_figure(rows: Sequence[ReturnRow]) -> go.Figure:
+    """Returns over several episodes, run against run.
+
+    Args:
+        rows: From top to bottom.
+
+    Returns:
+        A point an episode, and the mean with its 95 % interval.
+    """
+    figure = go.Figure()
+    for position, row in enumerate(rows):
+        spread = _spread(len(row.returns))
+        figure.add_scatter(
+            x=row.returns, y=position + spread, mode="markers",
+            marker={"color": row.colour, "size": 7, "opacity": 0.45},
+            customdata=np.arange(len(row.returns)) + 1,
+            hovertemplate="episode %{customdata}: %{x:,.1f}<extra></extra>",
+        )
+        figure.add_scatter(
+            x=[row.mean], y=[position], mode="markers",
+            marker={"color": row.colour, "size": 13, "symbol": "diamond"},
+            error_x={
+                "type": "data", "symmetric": False, "array": [row.high - row.mean],
+                "arrayminus": [row.mean - row.low], "thickness": 3, "width": 8,
+                "color": row.colour,
+            },
+            hovertemplate=(
+                f"mean {row.mean:,.1f}, 95 % interval {row.low:,.1f} to {row.high:,.1f}"
+                "<extra></extra>"
+            ),
+        )
+    figure.update_layout(**_layout(70 + 62 * len(rows)))
+    figure.update_xaxes(title={"text": "return of an episode", "standoff": 2}, fixedrange=True,
+                        nticks=8, zeroline=False)
+    figure.update_yaxes(
+        tickvals=list(range(len(rows))), ticktext=[row.name for row in rows],
+        range=[len(rows) - 0.5, -0.5], fixedrange=True, showgrid=False, zeroline=False,
+        ticklabelstandoff=6,
+    )
+    return figure
+
+
+def _spread(count: int) -> NDArray[np.float64]:
+    """Small offsets, the same each time, that keep equal points apart."""
+    golden = 0.6180339887498949
+    numbers = np.arange(1, count + 1, dtype=np.float64)
+    return np.asarray((numbers * golden % 1.0 - 0.5) * 0.42)
+
+
+def _steps_of_colour(n_labels: int, *, marks: bool) -> list[list[Any]]:
+    """A colour scale of plain steps, one a label."""
+    scale: list[list[Any]] = []
+    for label in range(n_labels):
+        colour = INTERVENTION_COLOUR if marks else label_colour(label)
+        scale += [[label / n_labels, colour], [(label + 1) / n_labels, colour]]
+    return scale
+
+
+def _layout(height: int) -> dict[str, Any]:
+    return {
+        "height": height,
+        "margin": {"l": 8, "r": 12, "t": 8, "b": 8},
+        "showlegend": False,
+        "hovermode": "closest",
+        "dragmode": False,
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+    }
