@@ -1,0 +1,1 @@
+"""What the expert did: the `Demonstrations` type, its checks, its file formats."""

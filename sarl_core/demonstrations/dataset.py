@@ -209,7 +209,8 @@ class Demonstrations:
     @cached_property
     def features(self) -> tuple[Feature, ...]:
         """Names and units of the observation vector's d entries."""
-        assert self.feature_names is not None and self.feature_units is not None
+        assert self.feature_names is not None
+        assert self.feature_units is not None
         return tuple(
             Feature(name, unit)
             for name, unit in zip(self.feature_names, self.feature_units, strict=True)
@@ -220,14 +221,16 @@ class Demonstrations:
         """What each component of the action is."""
         assert self.action_names is not None
         if self.is_discrete:
-            assert self.label_names is not None and self.label_first is not None
+            assert self.label_names is not None
+            assert self.label_first is not None
             return tuple(
                 ActionDimension(name, "discrete", labels=labels, first=first)
                 for name, labels, first in zip(
                     self.action_names, self.label_names, self.label_first, strict=True
                 )
             )
-        assert self.action_low is not None and self.action_high is not None
+        assert self.action_low is not None
+        assert self.action_high is not None
         return tuple(
             ActionDimension(
                 name, "interval", low=low, high=high,

@@ -7,12 +7,13 @@ environment itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from sarl_core.demonstrations.checks import MAX_FEATURES
 from sarl_core.errors import InputError
 
 
@@ -30,6 +31,7 @@ class EnvironmentDescription:
         action_low: m lower bounds of continuous actions, else None.
         action_high: m upper bounds, else None.
         action_shape: Shape of one action; () for a single discrete one.
+        max_steps: Steps after which an episode is cut off, None if never.
     """
 
     env_id: str
@@ -41,6 +43,7 @@ class EnvironmentDescription:
     action_low: tuple[float, ...] | None
     action_high: tuple[float, ...] | None
     action_shape: tuple[int, ...]
+    max_steps: int | None = None
 
     @property
     def is_discrete(self) -> bool:
@@ -121,7 +124,7 @@ def make_environment(env_id: str, **parameters: Any) -> Any:
 
     try:
         return gymnasium.make(env_id, disable_env_checker=True, **parameters)
-    except (gymnasium.error.Error, ImportError, AttributeError, TypeError, ValueError) as error:
+    except Exception as error:  # other people's code, which may raise anything
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise InputError(
             f"the environment {env_id!r} cannot be made ({reason}); "
@@ -146,7 +149,8 @@ def describe_environment(env_id: str) -> EnvironmentDescription:
     env = make_environment(env_id)
     try:
         d = _feature_count(env_id, env.observation_space)
-        return _describe(env_id, env.action_space, d)
+        limit = env.spec.max_episode_steps if env.spec is not None else None
+        return replace(_describe(env_id, env.action_space, d), max_steps=limit)
     finally:
         env.close()
 
@@ -160,12 +164,18 @@ def _feature_count(env_id: str, space: Any) -> int:
             "cannot read; choose an environment with a vector of features"
         )
     try:
-        return int(spaces.utils.flatdim(space))
+        d = int(spaces.utils.flatdim(space))
     except (NotImplementedError, ValueError) as error:
         raise InputError(
             f"{env_id} gives observations ({type(space).__name__}) that have no fixed length; "
             "choose an environment with a vector of features"
         ) from error
+    if d > MAX_FEATURES:
+        raise InputError(
+            f"{env_id} gives {d:,} features, more than the {MAX_FEATURES:,} that rules a person "
+            "reads could use; choose an environment with fewer"
+        )
+    return d
 
 
 def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
@@ -215,7 +225,8 @@ def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
 
 def _catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> _Names:
     """Names from the catalogue if they fit the spaces, else numbers."""
-    family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0].removesuffix("Hardcore")
+    name = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1]
+    family = name.rsplit("-v", 1)[0].removesuffix("Hardcore")
     for key in (family, f"{family}Continuous"):
         names = _CATALOGUE.get(key)
         if (

@@ -1,0 +1,367 @@
+"""From what a file holds to `Demonstrations`: one way for every format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.checks import MAX_LABELS
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
+from sarl_core.demonstrations.formats.columns import only_counted
+from sarl_core.demonstrations.formats.metadata import Metadata
+from sarl_core.demonstrations.requirements import (
+    column_of_numbers,
+    flags,
+    require_finite,
+    require_labels,
+    require_length,
+    require_order,
+    require_within,
+    whole_numbers,
+)
+from sarl_core.errors import InputError
+
+_FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a file holds, its format forgotten.
+
+    Attributes:
+        observations: Shape (N, d), or (N + episodes, d) with one more at each episode's end.
+        actions: Shape (N,) or (N, m), numbers of any type.
+        observation_columns: What the d columns are called in messages.
+        action_columns: What the m columns are called in messages.
+        feature_names: d names, None where the file has none.
+        action_names: m names, None where the file has none.
+        episodes: Shape (N,), None where the file has none.
+        steps: Shape (N,), likewise.
+        rewards: Shape (N,), likewise.
+        terminated: Shape (N,), likewise.
+        truncated: Shape (N,), likewise.
+        rows: Shape (N,), the rows the steps had in the file, from 0; None if they are those.
+        guess_labels: Whether one column of floats that are whole numbers may be labels.
+        names: What "episode", "step", "reward", "terminated" and "truncated" are called in
+            messages.
+        metadata: What the file says besides.
+        notes: Sentences on how it was read.
+    """
+
+    observations: NDArray[Any]
+    actions: NDArray[Any]
+    observation_columns: tuple[str, ...]
+    action_columns: tuple[str, ...]
+    feature_names: tuple[str, ...] | None = None
+    action_names: tuple[str, ...] | None = None
+    episodes: NDArray[Any] | None = None
+    steps: NDArray[Any] | None = None
+    rewards: NDArray[Any] | None = None
+    terminated: NDArray[Any] | None = None
+    truncated: NDArray[Any] | None = None
+    rows: NDArray[np.int64] | None = None
+    guess_labels: bool = True
+    names: Mapping[str, str] = field(default_factory=dict)
+    metadata: Metadata = field(default_factory=Metadata)
+    notes: tuple[str, ...] = ()
+
+
+def to_demonstrations(
+    recording: Recording, description: EnvironmentDescription | None
+) -> Demonstrations:
+    """Complete what a file holds and check it.
+
+    Args:
+        recording: What it holds.
+        description: The environment to take from what the file does not say, or None.
+
+    Returns:
+        The demonstrations.
+
+    Raises:
+        InputError: In one sentence with the column, as the file calls it, and the first row.
+    """
+    metadata = recording.metadata
+    described = description or _described(metadata)
+    if recording.observations.size == 0 or recording.actions.size == 0:
+        raise InputError("there are no steps; give at least two observations with their actions")
+    if described is not None:
+        recording = _fit(recording, described)
+    observations = _owned(recording.observations, np.float32)
+    require_finite(observations, recording.observation_columns, recording.rows)
+    recording = _without_last_observations(
+        _in_episodes(_checked(replace(recording, observations=observations)))
+    )
+    discrete, note = _is_discrete(recording, described)
+    notes = recording.notes if note is None else (*recording.notes, note)
+    features = _features(recording, described)
+    fields: dict[str, Any] = features | {
+        "action_names": _action_names(recording, described),
+        "env_id": metadata.env_id or (described.env_id if described is not None else ""),
+        "agent": metadata.agent, "seed": metadata.seed,
+        "notes": (*metadata.notes, *notes),
+    }
+    actions, space = (_labels if discrete else _values)(recording, described)
+    return Demonstrations(
+        recording.observations, actions, _some(recording.episodes),
+        recording.rewards, terminated=recording.terminated, truncated=recording.truncated,
+        steps=recording.steps, **fields, **space,
+    )
+
+
+def _some(episodes: NDArray[Any] | None) -> NDArray[Any]:
+    assert episodes is not None  # _in_episodes has seen to it
+    return episodes
+
+
+def _described(metadata: Metadata) -> EnvironmentDescription | None:
+    """The environment that a file names, where the file leaves something out."""
+    complete = metadata.features and metadata.action_names and metadata.is_discrete is not None
+    # "module:Id" would import a module that a stranger's file chose.
+    if complete or not metadata.env_id or ":" in metadata.env_id:
+        return None
+    try:
+        return describe_environment(metadata.env_id)
+    except InputError:
+        return None  # the file can be read without it
+
+
+def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
+    """Refuse a file whose width is not the environment's; bring its columns into that order."""
+    d, m = recording.observations.shape[1], len(recording.action_columns)
+    wanted_d, wanted_m = len(described.feature_names), len(described.action_names)
+    if d != wanted_d:
+        raise InputError(
+            f"there are {d} observation columns, but {described.env_id} has {wanted_d} features; "
+            "choose the environment it was recorded in, or map the columns"
+        )
+    if m != wanted_m:
+        raise InputError(
+            f"there are {m} action columns, but {described.env_id} has {wanted_m} action "
+            "dimensions; choose the environment it was recorded in, or map the columns"
+        )
+    metadata = recording.metadata
+    says = metadata.is_discrete
+    if says is not None and says != described.is_discrete:
+        kinds = ("continuous", "discrete")
+        raise InputError(
+            f"its actions are {kinds[says]}, but those of {described.env_id} are "
+            f"{kinds[described.is_discrete]}; choose the environment it was recorded in"
+        )
+    counts = [len(labels) for labels in described.label_names]
+    if says and [len(labels) for labels in metadata.label_names] != counts:
+        raise InputError(
+            f"its actions have other labels than those of {described.env_id}; choose the "
+            "environment it was recorded in"
+        )
+    if metadata.features:
+        return recording
+    notes = list(recording.notes)
+    order = _order(recording.feature_names, described.feature_names)
+    if order is not None:
+        notes.append(f"the observation columns were put into the order of {described.env_id}")
+        recording = replace(
+            recording, observations=recording.observations[:, order],
+            observation_columns=tuple(recording.observation_columns[i] for i in order),
+            feature_names=described.feature_names,
+        )
+    order = _order(recording.action_names, described.action_names)
+    if order is not None:
+        notes.append(f"the action columns were put into the order of {described.env_id}")
+        recording = replace(
+            recording, actions=recording.actions[:, order],
+            action_columns=tuple(recording.action_columns[i] for i in order),
+            action_names=described.action_names,
+        )
+    return replace(recording, notes=tuple(notes))
+
+
+def _order(names: tuple[str, ...] | None, wanted: tuple[str, ...]) -> list[int] | None:
+    """Where each wanted name stands, if the names are the same in another order."""
+    if names is None or names == wanted or sorted(names) != sorted(wanted):
+        return None
+    return [names.index(name) for name in wanted]
+
+
+def _checked(recording: Recording) -> Recording:
+    """Check what there is beside observations and actions, under the file's own names."""
+    n, rows = len(recording.actions), recording.rows
+
+    def called(role: str) -> str:
+        return recording.names.get(role, f"column {role!r}")
+
+    found: dict[str, Any] = {}
+    for attribute, role, check in (
+        ("episodes", "episode", whole_numbers), ("steps", "step", whole_numbers),
+        ("rewards", "reward", column_of_numbers),
+        ("terminated", "terminated", flags), ("truncated", "truncated", flags),
+    ):
+        values = getattr(recording, attribute)
+        found[attribute] = None if values is None else check(values, n, called(role), rows)
+    if found["episodes"] is not None:
+        require_order(
+            found["episodes"], found["steps"], (called("episode"), called("step")), rows
+        )
+    return replace(recording, **found)
+
+
+def _in_episodes(recording: Recording) -> Recording:
+    """Number the episodes where the file does not, and say how."""
+    if recording.episodes is not None:
+        return recording
+    n = len(recording.actions)
+    ends = np.zeros(n, dtype=np.bool_)
+    how = ""
+    if recording.terminated is not None or recording.truncated is not None:
+        for last in (recording.terminated, recording.truncated):
+            if last is not None:
+                ends |= last
+        how = "an episode ends where a step is marked as its last"
+    elif recording.steps is not None:
+        ends[:-1] = recording.steps[1:] == recording.steps[0]
+        how = "an episode begins where the step number begins again"
+    episodes = np.concatenate([[0], np.cumsum(ends)[:-1]]).astype(np.int64)
+    note = (
+        f"there is no episode column, so {how}" if episodes[-1]
+        else "there is no episode column, so every step belongs to one episode"
+    )
+    return replace(recording, episodes=episodes, notes=(*recording.notes, note))
+
+
+def _without_last_observations(recording: Recording) -> Recording:
+    """Drop the observation after the last action of each episode, where it was recorded."""
+    n, rows = len(recording.actions), len(recording.observations)
+    if rows == n:
+        return recording
+    episodes = _some(recording.episodes)
+    last = np.flatnonzero(np.append(episodes[1:] != episodes[:-1], True))
+    if rows != n + len(last):
+        require_length(n, rows, "actions", "observations")
+    # The row after the k-th last action (k from 0) lies k rows further on.
+    surplus = last + 1 + np.arange(len(last))
+    return replace(
+        recording, observations=_owned(np.delete(recording.observations, surplus, axis=0),
+                                       np.float32),
+        notes=(*recording.notes, "the observation after each episode's last action was dropped, "
+               "as nothing was done in it"),
+    )
+
+
+def _is_discrete(
+    recording: Recording, described: EnvironmentDescription | None
+) -> tuple[bool, str | None]:
+    """Whether the actions are labels, and a note if that is a guess."""
+    says = recording.metadata.is_discrete
+    if says is not None:
+        return says, None
+    if described is not None:
+        return described.is_discrete, None
+    actions = recording.actions
+    if actions.dtype.kind != "f":
+        return True, None
+    column = actions.reshape(-1)
+    if not recording.guess_labels or len(recording.action_columns) > 1:
+        return False, None
+    if not np.all((column == np.floor(column)) & (column >= 0)):
+        return False, None
+    if len(np.unique(column)) > _FEW_VALUES:
+        return False, None
+    return True, (
+        "the actions are whole numbers with a decimal point and were taken as labels; name the "
+        "environment if they are continuous"
+    )
+
+
+def _features(
+    recording: Recording, described: EnvironmentDescription | None
+) -> dict[str, tuple[str, ...] | None]:
+    metadata, names = recording.metadata, recording.feature_names
+    if metadata.features:
+        return {"feature_names": tuple(feature.name for feature in metadata.features),
+                "feature_units": tuple(feature.unit for feature in metadata.features)}
+    if described is not None and (names is None or only_counted(names)):
+        names = described.feature_names
+    if described is not None and names == described.feature_names:
+        return {"feature_names": names, "feature_units": described.feature_units}
+    return {"feature_names": names, "feature_units": None}
+
+
+def _action_names(
+    recording: Recording, described: EnvironmentDescription | None
+) -> tuple[str, ...] | None:
+    names = recording.metadata.action_names or recording.action_names
+    if described is not None and (names is None or only_counted(names)):
+        return described.action_names
+    return names
+
+
+def _labels(
+    recording: Recording, described: EnvironmentDescription | None
+) -> tuple[NDArray[Any], dict[str, Any]]:
+    """Discrete actions and what is known about their space."""
+    actions, metadata = recording.actions, recording.metadata
+    names, first = metadata.label_names, metadata.label_first
+    if described is not None and not names:
+        names, first = described.label_names, described.label_first
+    columns = actions.reshape(len(actions), -1)
+    if columns.dtype.kind == "f":
+        require_finite(columns, recording.action_columns, recording.rows)
+        # Beyond 2**53 a float64 cannot say which whole number is meant.
+        wrong = (columns != np.floor(columns)) | (np.abs(columns) > 2**53)
+        if wrong.any():
+            row, i = (int(index[0]) for index in np.nonzero(wrong))
+            number = row if recording.rows is None else int(recording.rows[row])
+            raise InputError(
+                f"{recording.action_columns[i]} is {columns[row, i]} in row {number + 1}, but its "
+                "actions are labels; write whole numbers"
+            )
+    elif columns.dtype.kind == "u" and columns.size and int(columns.max()) > 2**63 - 1:
+        row, i = (int(index[0]) for index in np.nonzero(columns > 2**63 - 1))
+        raise InputError(
+            f"{recording.action_columns[i]} is {columns[row, i]} in row {row + 1}, which is too "
+            "large for a label; mend that row"
+        )
+    whole = columns.astype(np.int64)
+    m = whole.shape[1]
+    if names:
+        require_length(len(names), m, "lists of label names", "action dimensions")
+        require_length(len(first), m, "first labels", "action dimensions")
+    counts = [len(labels) for labels in names] if names else [MAX_LABELS] * m
+    require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
+    flat = actions.ndim == 1 if described is None else described.action_shape == ()
+    return _owned(whole.reshape(-1) if flat and m == 1 else whole, np.int64), {
+        "label_names": names or None, "label_first": first or None,
+    }
+
+
+def _values(
+    recording: Recording, described: EnvironmentDescription | None
+) -> tuple[NDArray[Any], dict[str, Any]]:
+    """Continuous actions and what is known about their space."""
+    metadata = recording.metadata
+    low: tuple[float, ...] | None = metadata.action_low or None
+    high: tuple[float, ...] | None = metadata.action_high or None
+    source = metadata.bounds_from
+    if described is not None and low is None:
+        low, high, source = described.action_low, described.action_high, "action space"
+    columns = _owned(recording.actions.reshape(len(recording.actions), -1), np.float32)
+    require_finite(columns, recording.action_columns, recording.rows)
+    if low is not None and high is not None and source != "demonstrated values":
+        require_length(len(low), columns.shape[1], "bounds", "action dimensions")
+        require_within(columns, low, high, recording.action_columns, recording.rows)
+    return columns, {"action_low": low, "action_high": high, "bounds_from": source}
+
+
+def _owned(array: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """An array that nobody else can change, so that it need not be copied once more."""
+    with np.errstate(over="ignore"):
+        owned = np.array(array, dtype=dtype, order="C", copy=None)
+    if owned.base is not None:
+        owned = owned.copy()
+    owned.flags.writeable = False
+    return owned

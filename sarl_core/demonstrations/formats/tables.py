@@ -1,0 +1,277 @@
+"""Tables, one row a step: what Parquet and CSV have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.demonstrations.formats.columns import (
+    ColumnMap,
+    action_names,
+    check_map,
+    choose_columns,
+    feature_names,
+    listed,
+    refuse_doubled,
+)
+from sarl_core.demonstrations.formats.metadata import Metadata
+from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.errors import InputError
+
+MAX_COLUMNS = 4096
+_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
+
+
+class Table(Protocol):
+    """A file with named columns, opened and not yet read."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns."""
+
+    @property
+    def named(self) -> bool:
+        """Whether those names stand in the file."""
+
+    @property
+    def metadata(self) -> Metadata:
+        """What the file says besides."""
+
+    def read(self, columns: ColumnMap) -> dict[str, Column]:
+        """Numbers of the columns that a map uses."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Numbers of one column.
+
+    Attributes:
+        values: Shape (N,), bool, integers or floats; NaN or 0 where missing.
+        missing: Shape (N,), where the column is empty, or None if it is nowhere.
+    """
+
+    values: NDArray[Any]
+    missing: NDArray[np.bool_] | None = None
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Refuse a table with too many columns, or two of one name."""
+    if len(names) > MAX_COLUMNS:
+        raise InputError(
+            f"there are {len(names):,} columns, more than the {MAX_COLUMNS:,} that rules a person "
+            "reads could use; keep fewer"
+        )
+    refuse_doubled(names)
+
+
+def recording_from_table(
+    table: Table, columns: ColumnMap | None, description: EnvironmentDescription | None
+) -> Recording:
+    """Read the columns of a table that are needed.
+
+    Args:
+        table: The opened file.
+        columns: Which columns hold what; None to go by their names.
+        description: The environment, if known; it tells a table without names apart.
+
+    Returns:
+        What the table holds.
+
+    Raises:
+        InputError: If roles are unclear, a column is missing, or a value is no number.
+    """
+    notes: tuple[str, ...] = ()
+    metadata = table.metadata
+    chosen: ColumnMap
+    if columns is not None:
+        chosen = columns
+        metadata = _without_names(metadata)
+    elif metadata.features and metadata.action_names:
+        chosen = _own_columns(table.names, metadata)
+    elif not table.named:
+        chosen, notes = _unnamed(table.names, description)
+    else:
+        chosen, notes = choose_columns(table.names)
+    check_map(chosen, table.names)
+    read, kept, dropped = _without_empty_ends(table.read(chosen), chosen)
+    require_filled(read, kept)
+    single = {
+        role: None if (name := getattr(chosen, role)) is None else read[name].values
+        for role in _SINGLES
+    }
+    named = columns is not None or table.named
+    return Recording(
+        observations=observation_block(read, chosen.observations),
+        actions=action_block(read, chosen.actions),
+        observation_columns=tuple(f"column {name!r}" for name in chosen.observations),
+        action_columns=tuple(f"column {name!r}" for name in chosen.actions),
+        feature_names=chosen.feature_names
+        or (feature_names(chosen.observations) if named else None),
+        action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
+        episodes=single["episode"], steps=single["step"], rewards=single["reward"],
+        terminated=single["terminated"], truncated=single["truncated"],
+        rows=kept, guess_labels=not _is_vector(chosen.actions),
+        names={role: f"column {getattr(chosen, role)!r}" for role in _SINGLES},
+        metadata=metadata, notes=(*notes, *dropped),
+    )
+
+
+def require_filled(read: Mapping[str, Column], rows: NDArray[np.int64] | None = None) -> None:
+    """Refuse an empty field.
+
+    Args:
+        read: The columns by name.
+        rows: The rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and its first empty row.
+    """
+    for name, column in read.items():
+        if column.missing is not None and column.missing.any():
+            row = int(np.argmax(column.missing))
+            number = row if rows is None else int(rows[row])
+            raise InputError(
+                f"column {name!r} is empty in row {number + 1}; mend or remove that row"
+            )
+
+
+def observation_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[np.float32]:
+    """Columns side by side, shape (N, d)."""
+    observations = np.empty((len(read[names[0]].values), len(names)), dtype=np.float32)
+    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+        for index, name in enumerate(names):
+            observations[:, index] = read[name].values
+    return observations
+
+
+def action_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[Any]:
+    """Actions of shape (N,), or (N, m) where the columns' names say that they are vectors."""
+    columns = [read[name].values for name in names]
+    for name, values in zip(names, columns, strict=True):
+        if values.dtype.kind == "b":
+            raise InputError(f"column {name!r} holds true and false, which are no actions; write "
+                             "them as whole numbers 1 and 0")
+    return np.stack(columns, axis=1) if _is_vector(names) else columns[0]
+
+
+def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
+    """The columns in which demonstrations are saved, in order."""
+    assert demonstrations.steps is not None
+    columns: dict[str, NDArray[Any]] = {
+        "episode": demonstrations.episodes, "step": demonstrations.steps,
+    }
+    for feature, values in zip(
+        demonstrations.features, demonstrations.observations.T, strict=True
+    ):
+        columns[f"obs_{feature.name}"] = np.ascontiguousarray(values)
+    if demonstrations.actions.ndim == 1:
+        columns["action"] = demonstrations.actions
+    else:
+        for dimension, values in zip(
+            demonstrations.action_dimensions, demonstrations.action_columns.T, strict=True
+        ):
+            columns[f"action_{dimension.name}"] = np.ascontiguousarray(values)
+    singles = {
+        "reward": demonstrations.rewards, "terminated": demonstrations.terminated,
+        "truncated": demonstrations.truncated,
+    }
+    return columns | {name: values for name, values in singles.items() if values is not None}
+
+
+def _without_names(metadata: Metadata) -> Metadata:
+    """Metadata of a file whose columns a person has mapped: what is left are the spaces."""
+    return Metadata(
+        env_id=metadata.env_id, agent=metadata.agent, seed=metadata.seed,
+        label_names=metadata.label_names, label_first=metadata.label_first,
+        action_low=metadata.action_low, action_high=metadata.action_high,
+        bounds_from=metadata.bounds_from, notes=metadata.notes,
+    )
+
+
+def _own_columns(names: tuple[str, ...], metadata: Metadata) -> ColumnMap:
+    """The columns of a file with its own metadata, which names them all."""
+    observations = tuple(f"obs_{feature.name}" for feature in metadata.features)
+    actions = tuple(f"action_{name}" for name in metadata.action_names)
+    if len(actions) == 1 and "action" in names:
+        actions = ("action",)
+    for column in (*observations, *actions):
+        if column not in names:
+            raise InputError(f"the column {column!r} that its metadata names is missing among "
+                             f"{listed(names)}; save the file again")
+    stray = next((name for name in names if name.startswith("obs_") and name not in observations),
+                 None)
+    if stray is not None:
+        raise InputError(f"its metadata does not know the column {stray!r}; save the file again, "
+                         "or without metadata")
+    found = {role: role if role in names else None for role in _SINGLES}
+    return ColumnMap(
+        observations, actions, episode=found["episode"], step=found["step"],
+        reward=found["reward"], terminated=found["terminated"], truncated=found["truncated"],
+    )
+
+
+def _unnamed(
+    names: tuple[str, ...], description: EnvironmentDescription | None
+) -> tuple[ColumnMap, tuple[str, ...]]:
+    """A table without a header: clear only if it is as wide as the environment's spaces."""
+    if description is not None:
+        d, m = len(description.feature_names), len(description.action_names)
+        if len(names) == d + m:
+            return ColumnMap(names[:d], names[d:]), (
+                f"there is no header, so the first {d} columns were taken as observations",
+            )
+    raise InputError(
+        f"there is no header that says what its {len(names)} columns are; add one (obs_0, ..., "
+        "action), or map the columns"
+    )
+
+
+def _is_vector(actions: Sequence[str]) -> bool:
+    """Whether the names say that an action is a vector, if only of one number."""
+    return len(actions) > 1 or bool(actions[0].startswith("action_"))
+
+
+def _without_empty_ends(
+    read: dict[str, Column], chosen: ColumnMap
+) -> tuple[dict[str, Column], NDArray[np.int64] | None, tuple[str, ...]]:
+    """Drop rows without an action at the end of each episode: an observation nobody acted on.
+
+    Returns:
+        The columns, the rows that are left if any was dropped, and a note if so.
+    """
+    empty = [_empty(read[name]) for name in chosen.actions]
+    if any(mask is None for mask in empty):
+        return read, None, ()
+    without = np.logical_and.reduce([mask for mask in empty if mask is not None])
+    ends = np.zeros(len(without), dtype=np.bool_)
+    ends[-1:] = True
+    if chosen.episode is not None:
+        episodes = read[chosen.episode].values
+        ends[:-1] = episodes[1:] != episodes[:-1]
+    if not np.array_equal(without, ends):
+        return read, None, ()
+    kept = np.flatnonzero(~ends)
+    shorter = {
+        name: Column(
+            column.values[kept], None if column.missing is None else column.missing[kept]
+        )
+        for name, column in read.items()
+    }
+    return shorter, kept, (
+        "the last row of each episode has no action and was dropped",
+    )
+
+
+def _empty(column: Column) -> NDArray[np.bool_] | None:
+    """Where a column has no value, None if it has one everywhere."""
+    empty = column.missing
+    if column.values.dtype.kind == "f":
+        nan = np.isnan(column.values)
+        empty = nan if empty is None else empty | nan
+    return empty if empty is not None and empty.any() else None

@@ -1,0 +1,214 @@
+"""The checks that fields of demonstrations and columns of files share, each with its sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError
+
+_EXACT = 2**53  # up to here every whole number is a float64
+
+
+def require_length(got: int, wanted: int, what: str, other: str) -> None:
+    """Refuse a number of things that differs from what it belongs to."""
+    if got != wanted:
+        raise InputError(f"there are {got:,} {what} for {wanted:,} {other}; give one for each")
+
+
+def require_finite(
+    values: NDArray[Any], columns: Sequence[str], rows: NDArray[np.int64] | None = None
+) -> None:
+    """Refuse NaN and infinity.
+
+    Args:
+        values: Shape (N, k).
+        columns: What the k columns are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and the first row.
+    """
+    finite = np.isfinite(values)
+    if finite.all():
+        return
+    row, column = _first(~finite)
+    kind = "not a number (NaN)" if np.isnan(values[row, column]) else "infinite"
+    raise InputError(f"{columns[column]} is {kind} in row {_number(row, rows)}; mend or remove "
+                     "that row")
+
+
+def require_labels(
+    values: NDArray[np.int64], first: Sequence[int], counts: Sequence[int],
+    columns: Sequence[str], rows: NDArray[np.int64] | None = None,
+) -> None:
+    """Refuse discrete actions outside the action space.
+
+    Args:
+        values: Shape (N, m).
+        first: The least action of each dimension.
+        counts: How many actions each dimension has.
+        columns: What the m columns are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and the first row.
+    """
+    low = np.asarray(first, dtype=np.int64)
+    high = low + np.asarray(counts, dtype=np.int64) - 1
+    outside = (values < low) | (values > high)
+    if outside.any():
+        row, i = _first(outside)
+        raise InputError(
+            f"{columns[i]} is {values[row, i]} in row {_number(row, rows)}, outside the action "
+            f"space of whole numbers from {low[i]} to {high[i]}; mend that row"
+        )
+
+
+def require_within(
+    values: NDArray[np.float32], low: Sequence[float], high: Sequence[float],
+    columns: Sequence[str], rows: NDArray[np.int64] | None = None,
+) -> None:
+    """Refuse continuous actions outside the action space.
+
+    Args:
+        values: Shape (N, m).
+        low: Lower bound of each dimension; may be -inf.
+        high: Upper bound of each; may be inf.
+        columns: What the m columns are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and the first row.
+    """
+    # In float32, as the environment compares them.
+    outside = (values < np.asarray(low, np.float32)) | (values > np.asarray(high, np.float32))
+    if outside.any():
+        row, i = _first(outside)
+        raise InputError(
+            f"{columns[i]} is {values[row, i]} in row {_number(row, rows)}, outside the action "
+            f"space [{low[i]:g}, {high[i]:g}]; mend that row"
+        )
+
+
+def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:
+    """Row and column of the first entry that is bad, row by row."""
+    row = int(np.argmax(bad.any(axis=1)))
+    return row, int(np.argmax(bad[row]))
+
+
+def _number(row: int, rows: NDArray[np.int64] | None) -> int:
+    return (row if rows is None else int(rows[row])) + 1
+
+
+def as_numbers(given: Any, what: str) -> NDArray[Any]:
+    """Booleans, integers or floats as an array; anything else is refused."""
+    try:
+        array = np.asarray(given)
+    except ValueError as error:
+        raise InputError(f"{what} must have the same length in every step") from error
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{what} must be numbers, not {array.dtype}")
+    return array
+
+
+def frozen(array: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """The array itself if nobody can change it, else a copy."""
+    untouchable = array.base is None and not array.flags.writeable
+    if untouchable and array.dtype == dtype and array.flags.c_contiguous:
+        return array
+    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+        return np.array(array, dtype=dtype, order="C")
+
+
+def column_of_numbers(
+    given: Any, n: int, column: str, rows: NDArray[np.int64] | None = None
+) -> NDArray[Any]:
+    """One finite number a step.
+
+    Args:
+        given: Anything that NumPy makes an array of.
+        n: How many steps there are.
+        column: What to call it in the message, as "column 'reward'".
+        rows: Shape (n,), the rows they had in the file, from 0; None if they are those.
+
+    Returns:
+        Shape (n,), of its own type.
+
+    Raises:
+        InputError: With the first row.
+    """
+    values = as_numbers(given, column)
+    if values.ndim != 1:
+        raise InputError(f"{column} must hold one number a step")
+    require_length(len(values), n, f"values in {column}", "observations")
+    if values.dtype.kind == "f":
+        require_finite(values[:, None], [column], rows)
+    return values
+
+
+def flags(
+    given: Any, n: int, column: str, rows: NDArray[np.int64] | None = None
+) -> NDArray[np.bool_]:
+    """True or false, or 1 or 0; arguments as of `column_of_numbers`."""
+    values = column_of_numbers(given, n, column, rows)
+    neither = (values != 0) & (values != 1)
+    if neither.any():
+        row = int(np.argmax(neither))
+        raise InputError(f"{column} is {values[row]} in row {_number(row, rows)}; write true or "
+                         "false, or 1 or 0")
+    return frozen(values, np.bool_)
+
+
+def whole_numbers(
+    given: Any, n: int, column: str, rows: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """Whole numbers from 0, as of episodes and steps; arguments as of `column_of_numbers`."""
+    values = column_of_numbers(given, n, column, rows)
+    wrong = (values < 0) | (values > _EXACT)
+    if values.dtype.kind == "f":
+        wrong |= values != np.floor(values)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(f"{column} is {values[row]} in row {_number(row, rows)}; "
+                         "number them 0, 1, 2, ...")
+    return frozen(values, np.int64)
+
+
+def require_order(
+    episodes: NDArray[np.int64], steps: NDArray[np.int64] | None,
+    columns: tuple[str, str] = ("column 'episode'", "column 'step'"),
+    rows: NDArray[np.int64] | None = None,
+) -> None:
+    """Refuse episodes that are scattered and steps that do not rise within an episode.
+
+    Args:
+        episodes: Shape (N,).
+        steps: Shape (N,), or None.
+        columns: What the two are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the first row.
+    """
+    same_episode = episodes[1:] == episodes[:-1]
+    starts = np.concatenate([[0], np.flatnonzero(~same_episode) + 1])
+    _, first_seen = np.unique(episodes[starts], return_index=True)
+    if len(first_seen) < len(starts):
+        row = int(starts[np.setdiff1d(np.arange(len(starts)), first_seen)[0]])
+        raise InputError(
+            f"{columns[0]} comes back to {episodes[row]} in row {_number(row, rows)} after another "
+            "episode; keep the steps of an episode together"
+        )
+    if steps is None:
+        return
+    backwards = (steps[1:] <= steps[:-1]) & same_episode
+    if backwards.any():
+        row = int(np.argmax(backwards)) + 1
+        raise InputError(
+            f"{columns[1]} goes from {steps[row - 1]} to {steps[row]} in row {_number(row, rows)} "
+            f"within episode {episodes[row]}; sort the steps of each episode"
+        )
