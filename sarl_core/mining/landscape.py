@@ -182,19 +182,17 @@ def _sums(
     first, last = first[inside], last[inside]
     width = len(confidences) + 1  # one more column, for rectangles that reach the right edge
     corners = np.concatenate([rows * width + first, rows * width + last])
-    size = len(supports) * width
 
     def total(weights: NDArray[np.int64] | None) -> NDArray[np.int64]:
         one = np.ones(len(node), dtype=np.int64) if weights is None else weights[node]
-        # Sums of whole numbers below 2**53, so exact in bincount's floating point.
-        edges = np.bincount(corners, np.concatenate([one, -one]), minlength=size)
-        plane = edges.reshape(len(supports), width)
+        plane = np.zeros((len(supports), width), dtype=np.int64)
+        np.add.at(plane.reshape(-1), corners, np.concatenate([one, -one]))
         # Along confidence from the left; along support from the largest downwards, because
         # every rectangle begins at support 0. In place: fresh memory is what costs the time.
         np.cumsum(plane, axis=1, out=plane)
         from_top = plane[::-1]
         np.cumsum(from_top, axis=0, out=from_top)
-        return plane[:, :-1].astype(np.int64)
+        return plane[:, :-1]
 
     return _Sums(total(None), total(tree.depth), total(tree.samples), total(tree.correct))
 
@@ -202,14 +200,15 @@ def _sums(
 def _layers(
     supports: Floats, confidences: Floats, sums: _Sums, steps: int, parts: tuple[Landscape, ...]
 ) -> Landscape:
-    some = np.maximum(sums.rules, 1)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore"):
         fidelity = sums.correct / sums.covered
     return Landscape(
         supports=supports,
         confidences=confidences,
         rule_count=sums.rules,
-        mean_length=sums.length / some,
+        mean_length=np.divide(
+            sums.length, sums.rules, out=np.zeros(sums.rules.shape), where=sums.rules > 0
+        ),
         coverage=sums.covered / steps,
         fidelity=fidelity,
         dimensions=parts,

@@ -1,0 +1,83 @@
+"""``python -m benchmarks``: measure everything and print the table."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Iterable
+from importlib import import_module
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.measure import Row
+
+# Where each row is made, in the order of the design.
+ROWS = {
+    "tree-included": "mining.tree_included",
+    "tree-given": "mining.tree_given",
+    "plane": "mining.plane",
+    "decision": "shielding.decision",
+    "batch": "shielding.batch",
+    "episodes": "rollouts.episodes",
+    "gif": "rollouts.gif",
+    "browser": "browser.slider",
+    "import": "startup.imports",
+}
+
+
+def main() -> int:
+    """Print the table.
+
+    Returns:
+        0 if every row could be measured, whether or not its figure is reached; else 1.
+    """
+    options = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    options.add_argument("--only", choices=ROWS, action="append", help="measure this row")
+    options.add_argument("--quick", action="store_true", help="fewer repeats: a rough look")
+    chosen = options.parse_args()
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    console = Console(width=None if sys.stdout.isatty() else 170)
+    rows: list[Row] = []
+    failed = 0
+    for name in chosen.only or ROWS:
+        print(f"measuring {name} ...", file=sys.stderr, flush=True)
+        try:
+            rows.extend(_measure(ROWS[name])(chosen.quick))
+        except Exception as error:
+            failed += 1
+            print(f"error: {name}: {type(error).__name__}: {error}", file=sys.stderr)
+    console.print(_table(rows))
+    return 1 if failed else 0
+
+
+def _measure(home: str) -> Callable[[bool], Iterable[Row]]:
+    module, function = home.split(".")
+    found: Callable[[bool], Iterable[Row]] = getattr(
+        import_module(f"benchmarks.{module}"), function
+    )
+    return found
+
+
+def _table(rows: Iterable[Row]) -> Table:
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("what", "against"):
+        table.add_column(heading)
+    for heading in ("measured", "to reach"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("behind it", style="dim")
+    for row in rows:
+        limit = ">=" if row.kind == "times faster" else "<="
+        table.add_row(
+            row.what, row.against, row.text(row.measured), f"{limit} {row.text(row.reach)}",
+            "[green]reached[/]" if row.passed else "[red]missed[/]", row.details,
+        )
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())
