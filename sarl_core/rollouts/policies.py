@@ -126,8 +126,8 @@ class MlpPolicy:
             expected |= {"observation_mean": d, "observation_variance": d}
             vectors["observation_mean"] = self.normalisation.mean
             vectors["observation_variance"] = self.normalisation.variance
-        needed = () if self.is_discrete else ("action_low", "action_high")
-        needed += ("log_std",) if self.head == "gaussian" else ()
+        needed = [] if self.is_discrete else ["action_low", "action_high"]
+        needed += ["log_std"] if self.head == "gaussian" else []
         for name, length in expected.items():
             vector = vectors[name]
             if vector is None and name not in needed:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,17 @@ from sarl_core.errors import InputError
 from sarl_core.rollouts.policies import Activation, Head, MlpPolicy, Normalisation
 
 Weights = Mapping[str, NDArray[np.float32]]
+Layers = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
+
+_OTHER_NETWORKS = re.compile(r"features_extractor\.|lstm")
+
+
+class _Network(NamedTuple):
+    """Layers of (inputs, outputs) weights and biases, and what they mean."""
+
+    layers: Layers
+    head: Head
+    activation: Activation
 
 
 def policy_from_state(
@@ -45,43 +57,85 @@ def policy_from_state(
         The policy.
 
     Raises:
-        InputError: If the names are of another kind of policy.
+        InputError: If the names are of another kind of policy, or do not fit the actions.
     """
-    if any(name.startswith("q_net.q_net.") for name in state):
-        layers, head, default = _sequence(state, "q_net.q_net"), "greedy", "relu"
-    elif "action_net.weight" in state:
-        hidden = _sequence(state, "mlp_extractor.policy_net")
-        layers = [*hidden, "action_net"]
-        head, default = ("categorical" if discrete else "gaussian"), "tanh"
-    elif "actor.mu.weight" in state and "actor.log_std.weight" in state:
-        layers, head, default = _sequence(state, "actor.latent_pi"), "squashed_gaussian", "relu"
-    else:
-        raise InputError(
-            "the weights are not those of an MlpPolicy of PPO, A2C or DQN; "
-            "give such a .zip, or an .npz policy"
-        )
-    weights = [_array(state, f"{layer}.weight").T for layer in layers]
-    biases = [_array(state, f"{layer}.bias") for layer in layers]
-    if head == "squashed_gaussian":
-        weights.append(np.concatenate(
-            [_array(state, "actor.mu.weight").T, _array(state, "actor.log_std.weight").T], axis=1))
-        biases.append(np.concatenate(
-            [_array(state, "actor.mu.bias"), _array(state, "actor.log_std.bias")]))
+    network = _network(state, discrete=discrete)
     if discrete and not label_counts:
-        label_counts = (int(biases[-1].shape[0]),)
-    chosen: Head = head  # type: ignore[assignment]  # one of the literals above
+        label_counts = (len(network.layers[-1][1]),)
+    layers = _one_output_a_label(network.layers, label_counts) if discrete else network.layers
+    _check_outputs(len(layers[-1][1]), network.head, label_counts, action_low)
+    log_std = _array(state, "log_std") if network.head == "gaussian" else None
+    if log_std is not None and log_std.ndim != 1:
+        raise InputError(
+            "the policy explores by its state (use_sde=True), which is not read; "
+            "train it with use_sde=False"
+        )
     return MlpPolicy(
-        weights=tuple(np.ascontiguousarray(weight) for weight in weights),
-        biases=tuple(biases),
-        activation=activation or default,  # type: ignore[arg-type]  # a literal above
-        head=chosen,
+        weights=tuple(np.ascontiguousarray(weight) for weight, _ in layers),
+        biases=tuple(bias for _, bias in layers),
+        activation=activation or network.activation,
+        head=network.head,
         label_counts=label_counts if discrete else (),
-        log_std=_array(state, "log_std") if head == "gaussian" else None,
-        action_low=action_low,
-        action_high=action_high,
+        log_std=log_std,
+        action_low=None if discrete else action_low,
+        action_high=None if discrete else action_high,
         normalisation=normalisation,
         env_id=env_id,
     )
+
+
+def _network(state: Weights, *, discrete: bool) -> _Network:
+    other = next((name for name in state if _OTHER_NETWORKS.search(name)), None)
+    if other is None and any(name.startswith("q_net.q_net.") for name in state):
+        found = _Network(_layers(state, _sequence(state, "q_net.q_net")), "greedy", "relu")
+    elif other is None and "action_net.weight" in state:
+        names = [*_sequence(state, "mlp_extractor.policy_net"), "action_net"]
+        head: Head = "categorical" if discrete else "gaussian"
+        found = _Network(_layers(state, names), head, "tanh")
+    elif other is None and "actor.mu.weight" in state and "actor.log_std.weight" in state:
+        hidden = _layers(state, _sequence(state, "actor.latent_pi"))
+        ends = _layers(state, ["actor.mu", "actor.log_std"])
+        # Mean and log standard deviation side by side, as one layer.
+        last = (np.concatenate([weight for weight, _ in ends], axis=1),
+                np.concatenate([bias for _, bias in ends]))
+        found = _Network([*hidden, last], "squashed_gaussian", "relu")
+    else:
+        because = "" if other is None else f" (they hold {other!r})"
+        raise InputError(
+            f"the weights are not those of an MlpPolicy of PPO, A2C or DQN{because}; "
+            "give such a .zip, or an .npz policy"
+        )
+    has_labels = found.head == "greedy" or (
+        found.head in ("categorical", "gaussian") and "log_std" not in state)
+    if discrete != has_labels:
+        raise InputError(
+            "the weights are of a policy for "
+            f"{'continuous' if discrete else 'discrete'} actions and the environment takes "
+            f"{'discrete' if discrete else 'continuous'} ones; choose a policy trained on it"
+        )
+    return found
+
+
+def _check_outputs(
+    outputs: int, head: Head, label_counts: tuple[int, ...], low: NDArray[np.float32] | None
+) -> None:
+    dimensions = 0 if low is None else len(low) * (2 if head == "squashed_gaussian" else 1)
+    if outputs != (sum(label_counts) or dimensions):
+        raise InputError(
+            f"the policy's last layer has {outputs} outputs where the environment's actions need "
+            f"{sum(label_counts) or dimensions}; choose a policy trained on it"
+        )
+
+
+def _one_output_a_label(layers: Layers, label_counts: tuple[int, ...]) -> Layers:
+    """Give yes-no outputs (one logit for "yes") a second one, so that all heads look alike."""
+    weight, bias = layers[-1]
+    if set(label_counts) != {2} or len(bias) != len(label_counts):
+        return layers
+    wide_weight = np.zeros((weight.shape[0], 2 * len(bias)), dtype=np.float32)
+    wide_bias = np.zeros(2 * len(bias), dtype=np.float32)
+    wide_weight[:, 1::2], wide_bias[1::2] = weight, bias
+    return [*layers[:-1], (wide_weight, wide_bias)]
 
 
 def _sequence(state: Weights, prefix: str) -> list[str]:
@@ -89,6 +143,10 @@ def _sequence(state: Weights, prefix: str) -> list[str]:
     pattern = re.compile(re.escape(prefix) + r"\.(\d+)\.weight")
     numbers = sorted(int(match[1]) for name in state if (match := pattern.fullmatch(name)))
     return [f"{prefix}.{number}" for number in numbers]
+
+
+def _layers(state: Weights, names: list[str]) -> Layers:
+    return [(_array(state, f"{name}.weight").T, _array(state, f"{name}.bias")) for name in names]
 
 
 def _array(state: Weights, name: str) -> NDArray[np.float32]:

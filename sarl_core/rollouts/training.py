@@ -6,7 +6,6 @@ policy by validation episodes is kept, and the card reports episodes never used 
 
 from __future__ import annotations
 
-import json
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -134,37 +133,33 @@ def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
     from stable_baselines3.common.vec_env import VecNormalize
 
     from sarl_core.rollouts.sb3_weights import policy_from_state
+    from sarl_core.rollouts.spaces import label_counts
 
     state = {name: value.detach().cpu().numpy().copy()
              for name, value in model.policy.state_dict().items()}
     normalisation = None
     env = model.get_env()
     if isinstance(env, VecNormalize) and env.norm_obs:
+        statistics: Any = env.obs_rms  # one object, as an MlpPolicy takes no Dict observation
         normalisation = Normalisation(
-            mean=env.obs_rms.mean.astype(np.float32),
-            variance=env.obs_rms.var.astype(np.float32),
+            mean=statistics.mean.astype(np.float32),
+            variance=statistics.var.astype(np.float32),
             clip=float(env.clip_obs),
         )
     space = model.action_space
     return policy_from_state(
         state,
-        discrete=isinstance(space, (spaces.Discrete, spaces.MultiDiscrete)),
-        label_counts=_label_counts(space),
-        action_low=space.low.astype(np.float32) if isinstance(space, spaces.Box) else None,
-        action_high=space.high.astype(np.float32) if isinstance(space, spaces.Box) else None,
+        discrete=not isinstance(space, spaces.Box),
+        label_counts=label_counts(space),
+        action_low=_bounds(space.low) if isinstance(space, spaces.Box) else None,
+        action_high=_bounds(space.high) if isinstance(space, spaces.Box) else None,
         normalisation=normalisation,
         env_id=env_id,
     )
 
 
-def _label_counts(space: Any) -> tuple[int, ...]:
-    from gymnasium import spaces
-
-    if isinstance(space, spaces.Discrete):
-        return (int(space.n),)
-    if isinstance(space, spaces.MultiDiscrete):
-        return tuple(int(n) for n in space.nvec)
-    return ()
+def _bounds(values: NDArray[Any]) -> NDArray[np.float32]:
+    return values.reshape(-1).astype(np.float32)
 
 
 def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm, VecEnv]:
@@ -284,8 +279,3 @@ def _card(
                      "stable_baselines3": stable_baselines3.__version__},
         "seconds": round(seconds), "made": datetime.now(UTC).date().isoformat(),
     }
-
-
-def write_card(path: Path, value: Mapping[str, Any]) -> None:
-    with whole_file(path) as unfinished:
-        unfinished.write_text(json.dumps(value, indent=2) + "\n", encoding="utf-8")

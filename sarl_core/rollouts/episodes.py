@@ -1,0 +1,214 @@
+"""Running episodes: many environments side by side, one batch policy, one batch shield.
+
+Each episode has its own seed, a fresh environment and its own random numbers, so its outcome
+does not depend on what runs beside it, nor on the number of processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import Agent, make_agent
+from sarl_core.rollouts.player import Outcome, play
+from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.statistics import summarise
+from sarl_core.rollouts.steps import StepTable, concatenate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sarl_core.shielding.shield import Shield
+
+MAX_STEPS = 100_000  # where an environment sets itself no limit; an episode has to end
+
+_BATCH = 32  # more brings nothing: the policy's share of a step is small by then
+_ROUNDS = 4  # of pieces for all processes; progress is told after each
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Episodes:
+    """E finished episodes; arrays are read-only.
+
+    Attributes:
+        env_id: Environment.
+        agent: Name of the agent.
+        seeds: Seed of each episode, (E,) int64.
+        returns: Sum of rewards, (E,) float64.
+        lengths: Steps, (E,) int64.
+        interventions: Steps at which the shield changed the action, (E,) int64.
+        covered: Steps at which some rule applied, (E,) int64.
+        terminated: Whether the environment ended the episode, (E,) bool.
+        truncated: Whether a limit ended it, (E,) bool.
+        steps: Every step, or None where they were not kept.
+    """
+
+    env_id: str
+    agent: str
+    seeds: NDArray[np.int64]
+    returns: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    interventions: NDArray[np.int64]
+    covered: NDArray[np.int64]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    steps: StepTable | None = None
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for column in fields(self):
+            value = getattr(self, column.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Number of episodes E."""
+        return len(self.seeds)
+
+    def __repr__(self) -> str:
+        """As `Episodes(env_id='CartPole-v1', agent='expert', episodes=10, mean_return=500.0)`."""
+        return (
+            f"Episodes(env_id={self.env_id!r}, agent={self.agent!r}, episodes={len(self)}, "
+            f"steps={int(self.lengths.sum())}, mean_return={self.returns.mean():.1f})"
+        )
+
+    def summary(self) -> dict[str, float]:
+        """What the episodes say together (DESIGN 5, ``evaluate --json``).
+
+        Returns:
+            `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all
+            steps `intervention_rate` and `coverage`.
+        """
+        returns = summarise(self.returns)
+        steps = float(self.lengths.sum())
+        return {
+            "mean": returns.mean, "std": returns.std, "iqm": returns.iqm,
+            "iqm_low": returns.low, "iqm_high": returns.high,
+            "intervention_rate": float(self.interventions.sum()) / steps,
+            "coverage": float(self.covered.sum()) / steps,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document that ``evaluate --json`` prints, ready for JSON."""
+        rows = zip(self.seeds.tolist(), self.returns.tolist(), self.lengths.tolist(),
+                   self.interventions.tolist(), self.covered.tolist(), strict=True)
+        names = ("seed", "return", "length", "interventions", "covered")
+        return {
+            "episodes": [dict(zip(names, row, strict=True)) for row in rows],
+            "summary": self.summary(),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an episode: seed, return, length, interventions, covered, how it ended."""
+        import pandas as pd
+
+        return pd.DataFrame({
+            "seed": self.seeds, "return": self.returns, "length": self.lengths,
+            "interventions": self.interventions, "covered": self.covered,
+            "terminated": self.terminated, "truncated": self.truncated,
+        })
+
+
+def rollout(
+    env_id: str,
+    agent: str | Path | Agent,
+    *,
+    shield: Shield | None = None,
+    episodes: int = 10,
+    seed: int = 0,
+    stochastic: bool = False,
+    batch: int = _BATCH,
+    jobs: int = 1,
+    keep_steps: bool = True,
+    progress: Progress | None = None,
+) -> Episodes:
+    """Run episodes to their end.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes. With several processes, an environment that the
+            caller registered must be named ``module:Id``.
+        agent: An agent, or what `make_agent` takes.
+        shield: Checks every action; None for none.
+        episodes: How many.
+        seed: Episode i uses ``env.reset(seed=seed + i)`` and random numbers of that seed.
+        stochastic: Whether a trained policy is sampled.
+        batch: Environments side by side; changes the speed, never the result.
+        jobs: Processes; likewise. Starting one takes about a second.
+        keep_steps: Whether to keep the record of every step (about 60 bytes and 4 d a step).
+        progress: Called with (episodes done, in all); returning False stops.
+
+    Returns:
+        The episodes in the order of their seeds. The same arguments give the same result, bit
+        for bit. Episodes without end are truncated after `MAX_STEPS`.
+
+    Raises:
+        InputError: If a number is out of range, or agent, shield and environment do not fit.
+        CancelledError: If `progress` returned False.
+    """
+    for name, value, least in (("episodes", episodes, 1), ("seed", seed, 0),
+                               ("batch", batch, 1), ("jobs", jobs, 1)):
+        if value < least:
+            raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+    actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
+    seeds = np.arange(seed, seed + episodes, dtype=np.int64)
+    pieces = [seeds] if jobs == 1 else np.array_split(seeds, min(episodes, jobs * _ROUNDS))
+    outcomes: list[Outcome] = []
+    done = 0
+
+    def finished(count: int) -> None:
+        nonlocal done
+        done += count
+        report(progress, done, episodes)
+
+    if jobs == 1:
+        outcomes.append(play(env_id, actor, shield, seeds, batch=batch, max_steps=MAX_STEPS,
+                             keep_steps=keep_steps, finished=lambda: finished(1)))
+    else:
+        for outcome in _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps):
+            outcomes.append(outcome)
+            finished(len(outcome.returns))
+    return _gather(env_id, actor.name, seeds, outcomes)
+
+
+def _in_processes(
+    env_id: str, agent: Agent, shield: Shield | None, pieces: Sequence[NDArray[np.int64]],
+    batch: int, jobs: int, keep_steps: bool,
+) -> Iterator[Outcome]:
+    from joblib import Parallel, delayed
+
+    # In rounds, so that a caller who stops between two leaves no unfinished work behind.
+    with Parallel(n_jobs=jobs) as work:
+        for start in range(0, len(pieces), jobs):
+            yield from work(
+                delayed(play)(env_id, agent, shield, piece, batch=batch, max_steps=MAX_STEPS,
+                              keep_steps=keep_steps)
+                for piece in pieces[start : start + jobs]
+            )
+
+
+def _gather(
+    env_id: str, agent: str, seeds: NDArray[np.int64], outcomes: Sequence[Outcome]
+) -> Episodes:
+    """Episodes from pieces that follow each other."""
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(outcome, name) for outcome in outcomes])
+
+    tables: list[StepTable] = []
+    before = 0
+    for outcome in outcomes:
+        if outcome.steps is not None:
+            tables.append(outcome.steps.numbered_from(before) if before else outcome.steps)
+        before += len(outcome.returns)
+    return Episodes(
+        env_id=env_id, agent=agent, seeds=seeds,
+        returns=column("returns"), lengths=column("lengths"),
+        interventions=column("interventions"), covered=column("covered"),
+        terminated=column("terminated"), truncated=column("truncated"),
+        steps=concatenate(tables) if tables else None,
+    )

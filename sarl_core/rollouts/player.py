@@ -1,0 +1,238 @@
+"""The loop that steps environments side by side; `episodes` and `recording` stand on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.environments import describe_environment, make_environment
+from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.spaces import Actions, SpaceAdapter, adapt
+from sarl_core.rollouts.steps import StepTable
+
+if TYPE_CHECKING:
+    from sarl_core.shielding.shield import Shield
+
+
+class Outcome(NamedTuple):
+    """Arrays of E finished episodes; the names are those of `Episodes`."""
+
+    returns: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    interventions: NDArray[np.int64]
+    covered: NDArray[np.int64]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    steps: StepTable | None
+
+
+class Choice(NamedTuple):
+    """What agent and shield made of B states; actions with one column a dimension."""
+
+    proposed: Actions
+    executed: Actions
+    rules: NDArray[np.int64]
+    intervened: NDArray[np.bool_]
+    margin: NDArray[np.float64]
+
+
+@dataclass
+class _Lane:
+    """One environment on its way through one episode."""
+
+    episode: int
+    env: Any
+    generator: np.random.Generator
+
+
+def play(
+    env_id: str,
+    agent: Agent,
+    shield: Shield | None,
+    seeds: NDArray[np.int64],
+    *,
+    batch: int,
+    max_steps: int,
+    keep_steps: bool,
+    finished: Callable[[], None] | None = None,
+) -> Outcome:
+    """Run one episode for each seed.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: Chooses the actions.
+        shield: Checks them, or None.
+        seeds: Shape (E,).
+        batch: Environments side by side.
+        max_steps: An episode is truncated after as many.
+        keep_steps: Whether to keep the record of every step.
+        finished: Called after every episode; may raise to stop.
+
+    Returns:
+        The episodes in the order of the seeds.
+
+    Raises:
+        InputError: If the environment cannot be used, or the shield is not for it.
+    """
+    run = _Run(env_id, agent, shield, seeds, max_steps, keep_steps)
+    try:
+        for _ in range(min(batch, len(seeds))):
+            run.start()
+        while run.lanes:
+            for _ in range(run.step()):
+                if finished is not None:
+                    finished()
+    finally:
+        for lane in run.lanes:
+            lane.env.close()
+    return run.outcome()
+
+
+class _Run:
+    """The state of `play`: lanes that step together, and what they have brought so far."""
+
+    def __init__(
+        self, env_id: str, agent: Agent, shield: Shield | None, seeds: NDArray[np.int64],
+        max_steps: int, keep_steps: bool,
+    ) -> None:
+        self.env_id, self.agent, self.shield = env_id, agent, shield
+        self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
+        self.adapter = check_environment(env_id, shield)
+        self.lanes: list[_Lane] = []
+        self.states = np.zeros((0, self.adapter.n_features), dtype=np.float32)
+        self.started = 0
+        count = len(seeds)
+        self.returns = np.zeros(count)
+        self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
+        self.terminated, self.truncated = np.zeros((2, count), dtype=np.bool_)
+        self.chunks: list[tuple[NDArray[Any], ...]] = []
+
+    def start(self) -> None:
+        """Open a lane for the next seed, if there is one."""
+        if self.started == len(self.seeds):
+            return
+        # A fresh environment: what an earlier episode left behind cannot matter.
+        lane = _Lane(self.started, make_environment(self.env_id),
+                     np.random.default_rng(int(self.seeds[self.started])))
+        self.lanes.append(lane)
+        self.started += 1
+        observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
+        self.states = np.concatenate([self.states, self.adapter.flat(observation)[None]])
+
+    def step(self) -> int:
+        """Step every lane once, and give the number of episodes that ended."""
+        states, adapter = self.states, self.adapter
+        episodes = np.array([lane.episode for lane in self.lanes])
+        choice = choose(self.agent, self.shield, adapter, states,
+                        [lane.generator for lane in self.lanes])
+        executed = adapter.shaped(choice.executed)
+        actions = (executed.tolist() if adapter.action_shape == () and adapter.is_discrete
+                   else [adapter.native(action) for action in executed])
+        following = np.empty_like(states)
+        rewards = np.empty(len(states))
+        ended: list[tuple[int, bool, bool]] = []
+        for index, lane in enumerate(self.lanes):
+            observation, reward, terminated, truncated, _ = lane.env.step(actions[index])
+            following[index] = observation if adapter.is_vector else adapter.flat(observation)
+            rewards[index] = reward
+            if terminated or truncated:
+                ended.append((index, bool(terminated), bool(truncated)))
+        if self.keep_steps:
+            self.chunks.append((episodes, self.lengths[episodes], states, choice.proposed,
+                                choice.executed, choice.rules, choice.intervened,
+                                choice.margin, rewards))
+        self.returns[episodes] += rewards
+        self.lengths[episodes] += 1
+        if self.shield is not None:
+            self.interventions[episodes] += choice.intervened
+            self.covered[episodes] += (choice.rules >= 0).any(axis=1)
+        self.states = following
+        return self._end(ended, episodes)
+
+    def _end(self, ended: list[tuple[int, bool, bool]], episodes: NDArray[np.int64]) -> int:
+        closed = {index for index, _, _ in ended}
+        too_long = np.flatnonzero(self.lengths[episodes] >= self.max_steps).tolist()
+        ended.extend((index, False, True) for index in too_long if index not in closed)
+        if not ended:
+            return 0
+        for index, terminated, truncated in ended:
+            lane = self.lanes[index]
+            self.terminated[lane.episode] = terminated
+            self.truncated[lane.episode] = truncated
+            lane.env.close()
+        going = np.ones(len(self.lanes), dtype=np.bool_)
+        going[[index for index, _, _ in ended]] = False
+        self.lanes = [lane for lane, goes in zip(self.lanes, going, strict=True) if goes]
+        self.states = self.states[going]
+        for _ in ended:
+            self.start()
+        return len(ended)
+
+    def outcome(self) -> Outcome:
+        """What the episodes brought."""
+        steps = None
+        if self.keep_steps:
+            columns = [np.concatenate(column) for column in zip(*self.chunks, strict=True)]
+            order = np.lexsort((columns[1], columns[0]))
+            steps = StepTable(*(column[order] for column in columns))
+        return Outcome(self.returns, self.lengths, self.interventions, self.covered,
+                       self.terminated, self.truncated, steps)
+
+
+def choose(
+    agent: Agent, shield: Shield | None, adapter: SpaceAdapter, states: NDArray[np.float32],
+    generators: list[np.random.Generator],
+) -> Choice:
+    """Let the agent propose and the shield decide.
+
+    Args:
+        agent: Chooses the actions.
+        shield: Checks them, or None.
+        adapter: Of the environment.
+        states: Shape (B, d), float32.
+        generators: B random generators, one an episode.
+
+    Returns:
+        The choice for each state.
+    """
+    uniforms = None
+    if agent.n_uniforms:
+        uniforms = np.empty((len(states), agent.n_uniforms))
+        for row, generator in zip(uniforms, generators, strict=True):
+            generator.random(out=row)
+    proposed = agent.act(states, uniforms)
+    if shield is None:
+        none = np.full(proposed.shape, -1, dtype=np.int64)
+        return Choice(proposed, proposed, none, np.zeros(len(states), dtype=np.bool_),
+                      np.full(len(states), np.inf))
+    decision = shield.decide_batch(states, adapter.shaped(proposed))
+    return Choice(proposed, adapter.columns(decision.executed), decision.rules,
+                  decision.intervened, decision.margin)
+
+
+def check_environment(env_id: str, shield: Shield | None) -> SpaceAdapter:
+    """Read an environment's spaces, and refuse what cannot be run.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        shield: To be used in it, or None.
+
+    Returns:
+        Its adapter.
+
+    Raises:
+        InputError: If the environment cannot be used, or the shield is not for it.
+    """
+    describe_environment(env_id)
+    env = make_environment(env_id)
+    if shield is not None:
+        from sarl_core.shielding.wrappers import check_fit
+
+        check_fit(env.observation_space, env.action_space, shield)
+    adapter = adapt(env)
+    env.close()
+    return adapter

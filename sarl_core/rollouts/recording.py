@@ -1,0 +1,162 @@
+"""Recording demonstrations: an agent acts, and every step is written down."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import Agent, make_agent
+from sarl_core.rollouts.files import write_card
+from sarl_core.rollouts.player import Outcome, play
+from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.steps import concatenate
+
+SHIPPED = {
+    "CartPole-v1": "cartpole", "LunarLander-v3": "lunar_lander", "Pendulum-v1": "pendulum",
+}
+SHIPPED_STEPS = 15_000  # the paper's amount
+
+_BATCH = 16
+
+
+def record(
+    env_id: str,
+    agent: str | Path | Agent,
+    *,
+    steps: int,
+    seed: int = 0,
+    stochastic: bool = False,
+    progress: Progress | None = None,
+) -> Demonstrations:
+    """Run an agent, episode after episode, and keep what it saw and did.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: An agent, or what `make_agent` takes.
+        steps: How many; the last episode stops there, unfinished.
+        seed: The episodes use seed, seed + 1, ...
+        stochastic: Whether a trained policy is sampled, as the paper's were.
+        progress: Called with (steps done, in all); returning False stops.
+
+    Returns:
+        Exactly `steps` state-action pairs, with the names, units and bounds of the
+        environment. The first N steps do not depend on how many are asked for.
+
+    Raises:
+        InputError: If a number is out of range or the agent does not fit the environment.
+        CancelledError: If `progress` returned False.
+    """
+    if steps < 1 or seed < 0:
+        name, value, least = ("steps", steps, 1) if steps < 1 else ("seed", seed, 0)
+        raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+    actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
+    outcomes: list[Outcome] = []
+    episodes = done = 0
+    report(progress, 0, steps)
+    while done < steps:
+        # Whole episodes side by side, as many as are likely to be needed.
+        count = 1 if not episodes else min(_BATCH, 1 + (steps - done) * episodes // done)
+        seeds = np.arange(seed + episodes, seed + episodes + count, dtype=np.int64)
+        # One step more than is kept, so that this limit never shows in the recording.
+        outcomes.append(play(env_id, actor, None, seeds, batch=count, max_steps=steps + 1,
+                             keep_steps=True))
+        episodes += count
+        done += int(outcomes[-1].lengths.sum())
+        report(progress, min(done, steps), steps)
+    return _demonstrations(env_id, actor.name, seed, outcomes, steps)
+
+
+def _demonstrations(
+    env_id: str, agent: str, seed: int, outcomes: list[Outcome], steps: int
+) -> Demonstrations:
+    description = describe_environment(env_id)
+
+    table = concatenate([outcome.steps for outcome in outcomes if outcome.steps is not None])
+    table = table.take(slice(steps))
+    lengths = np.concatenate([outcome.lengths for outcome in outcomes])
+    ends = np.cumsum(lengths) - 1
+    terminated, truncated = np.zeros((2, int(lengths.sum())), dtype=np.bool_)
+    terminated[ends] = np.concatenate([outcome.terminated for outcome in outcomes])
+    truncated[ends] = np.concatenate([outcome.truncated for outcome in outcomes])
+    return Demonstrations(
+        observations=table.observation,
+        actions=table.executed[:, 0] if description.action_shape == () else table.executed,
+        episodes=np.repeat(np.arange(len(lengths)), lengths)[:steps],
+        rewards=table.reward,
+        terminated=terminated[:steps],
+        truncated=truncated[:steps],
+        steps=table.step,
+        feature_names=description.feature_names,
+        feature_units=description.feature_units,
+        action_names=description.action_names,
+        label_names=description.label_names,
+        label_first=description.label_first,
+        env_id=env_id,
+        agent=agent,
+        seed=seed,
+        **_bounds(env_id),
+    )
+
+
+def _bounds(env_id: str) -> dict[str, Any]:
+    """Bounds of the action space; none where a side is open, so that the data's are taken."""
+    description = describe_environment(env_id)
+    low, high = description.action_low, description.action_high
+    if low is None or high is None or not np.isfinite([*low, *high]).all():
+        return {}
+    return {"action_low": low, "action_high": high, "bounds_from": "action space"}
+
+
+def ship_demonstrations(
+    env_id: str, folder: Path, *, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Record the demonstrations that are shipped for an environment, with their card.
+
+    Args:
+        env_id: One of `SHIPPED`.
+        folder: Where `<name>.parquet` and `<name>.json` go.
+        progress: As in `record`.
+
+    Returns:
+        The card.
+
+    Raises:
+        InputError: If nothing is shipped for the environment.
+    """
+    import gymnasium
+
+    from sarl_core.demonstrations.formats import save_demonstrations
+
+    if env_id not in SHIPPED:
+        raise InputError(
+            f"no demonstrations are shipped for {env_id!r}; choose from {', '.join(SHIPPED)}"
+        )
+    path = folder / f"{SHIPPED[env_id]}.parquet"
+    demos = record(env_id, "expert", steps=SHIPPED_STEPS, seed=0, stochastic=True,
+                   progress=progress)
+    save_demonstrations(demos, path)
+    summary, finished = demos.summary(), demos.episode_finished
+    card = {
+        "what": f"{SHIPPED_STEPS:,} steps of the shipped expert in {env_id}, actions sampled",
+        "from": f"data/experts/{SHIPPED[env_id]}.npz",
+        "command": f"python -m sarl_core record --env {env_id} --agent expert --stochastic "
+                   f"--steps {SHIPPED_STEPS} --seed 0 --out data/demonstrations/{path.name}",
+        "env_id": env_id,
+        "steps": summary.steps,
+        "episodes": summary.episodes,
+        "episodes_finished": 0 if finished is None else int(finished.sum()),
+        "mean_return": None if summary.return_mean is None else round(summary.return_mean, 2),
+        "digest": demos.digest,
+        "versions": {"python": platform.python_version(), "numpy": np.__version__,
+                     "gymnasium": gymnasium.__version__},
+        "made": datetime.now(UTC).date().isoformat(),
+    }
+    write_card(path.with_suffix(".json"), card)
+    return card

@@ -1,0 +1,94 @@
+"""What many episodes say together: mean, interquartile mean, and how sure one can be of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.errors import InputError
+
+_RESAMPLES = 9_999
+_NUMBERS_AT_ONCE = 2_000_000  # 16 MB; a bootstrap of many episodes is done in pieces
+_CUT = 0.25  # the share of the values left out at either end
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Statistics of one number per episode.
+
+    Attributes:
+        mean: Of all values.
+        std: Standard deviation (n - 1); 0 for a single value.
+        iqm: Interquartile mean: of the middle half of the values.
+        low: Lower end of the 95 % bootstrap interval of the interquartile mean.
+        high: Upper end.
+    """
+
+    mean: float
+    std: float
+    iqm: float
+    low: float
+    high: float
+
+
+def interquartile_mean(values: ArrayLike, axis: int = -1) -> NDArray[np.float64]:
+    """Mean of the middle half of the values, more robust than the mean, tighter than the median.
+
+    Args:
+        values: Any shape.
+        axis: Along which to average.
+
+    Returns:
+        The shape of `values` without `axis`.
+    """
+    from scipy.stats import trim_mean
+
+    return np.asarray(trim_mean(np.asarray(values, dtype=np.float64), _CUT, axis=axis))
+
+
+def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
+    """Mean, deviation and interquartile mean with its 95 % percentile bootstrap interval.
+
+    The percentile method, because it is defined for every sample: the corrected ones divide
+    by zero where many episodes have the same return, as at CartPole's limit of 500.
+
+    Args:
+        values: One number an episode, shape (E,).
+        seed: Of the resampling; the same seed gives the same interval.
+
+    Returns:
+        The statistics; with one value, or equal ones, the interval is that value.
+
+    Raises:
+        InputError: If there is no value, or one is NaN or infinite.
+    """
+    array = np.asarray(values, dtype=np.float64).reshape(-1)
+    if len(array) == 0 or not np.isfinite(array).all():
+        raise InputError(
+            "there is nothing to summarise; run at least one episode" if len(array) == 0
+            else "an episode's value is NaN or infinite; check the environment's rewards"
+        )
+    if (array == array[0]).all():
+        value = float(array[0])
+        return Interval(mean=value, std=0.0, iqm=value, low=value, high=value)
+    low, high = _bootstrap(array, seed)
+    return Interval(
+        mean=float(array.mean()),
+        std=float(array.std(ddof=1)),
+        iqm=float(interquartile_mean(array)),
+        low=low,
+        high=high,
+    )
+
+
+def _bootstrap(array: NDArray[np.float64], seed: int) -> tuple[float, float]:
+    from scipy.stats import bootstrap
+
+    found: Any = bootstrap(
+        (array,), interquartile_mean, n_resamples=_RESAMPLES, method="percentile",
+        batch=max(1, _NUMBERS_AT_ONCE // len(array)), rng=np.random.default_rng(seed),
+    )
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)

@@ -1,0 +1,138 @@
+"""The record of every step of several episodes, column by column (DESIGN 3.9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.rollouts.spaces import Actions
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StepTable:
+    """T steps, in the order of episodes and steps; arrays are read-only.
+
+    Attributes:
+        episode: Number of the episode, counted from 0, (T,) int64.
+        step: Index within the episode, (T,) int64.
+        observation: What the agent saw, (T, d) float32.
+        proposed: The agent's actions, (T, m) int64 or float32.
+        executed: The actions the environment got, likewise.
+        rules: Index of the rule in force for each action dimension or -1, (T, m) int64.
+        intervened: Whether the shield changed the action, (T,) bool.
+        margin: Distance to the nearest threshold on the paths walked, inf without one, (T,).
+        reward: What the environment gave, (T,) float64.
+    """
+
+    episode: NDArray[np.int64]
+    step: NDArray[np.int64]
+    observation: NDArray[np.float32]
+    proposed: Actions
+    executed: Actions
+    rules: NDArray[np.int64]
+    intervened: NDArray[np.bool_]
+    margin: NDArray[np.float64]
+    reward: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for column in fields(self):
+            getattr(self, column.name).flags.writeable = False
+
+    def __len__(self) -> int:
+        """Number of steps T."""
+        return len(self.step)
+
+    def __repr__(self) -> str:
+        """Shapes, as `StepTable(episode=int64[100], ...)`."""
+        shown = [
+            f"{column.name}={value.dtype}{list(value.shape)}"
+            for column in fields(self)
+            for value in [getattr(self, column.name)]
+        ]
+        return f"StepTable({', '.join(shown)})"
+
+    @property
+    def covered(self) -> NDArray[np.bool_]:
+        """Whether some rule applied, (T,) bool."""
+        return np.asarray((self.rules >= 0).any(axis=1))
+
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> StepTable:
+        """Some of the steps.
+
+        Args:
+            rows: What NumPy takes as an index of rows.
+
+        Returns:
+            Those steps.
+        """
+        return StepTable(**{c.name: getattr(self, c.name)[rows] for c in fields(self)})
+
+    def of_episode(self, episode: int) -> StepTable:
+        """The steps of one episode.
+
+        Args:
+            episode: Its number, counted from 0.
+
+        Returns:
+            Its steps; none if there is no such episode.
+        """
+        ends = np.searchsorted(self.episode, [episode, episode + 1])
+        return self.take(slice(int(ends[0]), int(ends[1])))
+
+    def numbered_from(self, first: int) -> StepTable:
+        """The same steps, with every episode's number raised.
+
+        Args:
+            first: What to add.
+
+        Returns:
+            A table that shares the other columns.
+        """
+        return replace(self, episode=self.episode + first)
+
+    def to_frame(self, feature_names: Sequence[str] | None = None) -> pd.DataFrame:
+        """One row a step.
+
+        Args:
+            feature_names: d names for the observation's columns.
+
+        Returns:
+            Columns `episode`, `step`, `obs_<name>`..., `proposed_<i>`..., `executed_<i>`...,
+            `rule_<i>`..., `intervened`, `margin`, `reward`; without `_<i>` where there is one.
+        """
+        import pandas as pd
+
+        columns: dict[str, Any] = {"episode": self.episode, "step": self.step}
+        names = feature_names or [str(index) for index in range(self.observation.shape[1])]
+        for index, name in enumerate(names):
+            columns[f"obs_{name}"] = self.observation[:, index]
+        for title, values in (("proposed", self.proposed), ("executed", self.executed),
+                              ("rule", self.rules)):
+            for index in range(values.shape[1]):
+                key = title if values.shape[1] == 1 else f"{title}_{index}"
+                columns[key] = values[:, index]
+        columns |= {"intervened": self.intervened, "margin": self.margin, "reward": self.reward}
+        return pd.DataFrame(columns)
+
+
+def concatenate(tables: Sequence[StepTable]) -> StepTable:
+    """Put tables under each other.
+
+    Args:
+        tables: At least one, of the same environment.
+
+    Returns:
+        All their steps.
+    """
+    return StepTable(
+        **{c.name: np.concatenate([getattr(table, c.name) for table in tables])
+           for c in fields(StepTable)}
+    )

@@ -1,0 +1,113 @@
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.progress import CancelledError
+from sarl_core.rollouts.recording import record
+
+
+def test_records_exactly_as_many_steps_as_asked() -> None:
+    demos = record("LunarLander-v3", "novice", steps=777, seed=3)
+    assert len(demos) == 777
+    assert demos.feature_names is not None
+    assert demos.feature_names[4] == "angle"
+    assert demos.feature_units is not None
+    assert demos.feature_units[4] == "rad"
+    assert demos.label_names == (
+        ("do nothing", "fire left engine", "fire main engine", "fire right engine"),)
+    assert (demos.env_id, demos.agent, demos.seed) == ("LunarLander-v3", "novice", 3)
+
+
+def test_holds_the_episodes_of_rollout_one_after_the_other() -> None:
+    demos = record("LunarLander-v3", "novice", steps=900, seed=3)
+    played = rollout("LunarLander-v3", "novice", episodes=demos.n_episodes, seed=3)
+    assert played.steps is not None
+    assert demos.rewards is not None
+    assert demos.actions.tobytes() == played.steps.executed[:900, 0].tobytes()
+    assert demos.observations.tobytes() == played.steps.observation[:900].tobytes()
+    assert demos.rewards.tobytes() == played.steps.reward[:900].tobytes()
+    assert demos.episodes.tobytes() == played.steps.episode[:900].tobytes()
+    assert demos.steps is not None
+    assert demos.steps.tobytes() == played.steps.step[:900].tobytes()
+
+
+def test_marks_where_episodes_end_and_leaves_the_last_one_open() -> None:
+    demos = record("CartPole-v1", "expert", steps=1_250)
+    assert demos.episode_lengths.tolist() == [500, 500, 250]
+    assert demos.truncated is not None
+    assert demos.terminated is not None
+    assert np.flatnonzero(demos.truncated).tolist() == [499, 999]
+    assert not demos.terminated.any()
+    assert demos.episode_finished is not None
+    assert demos.episode_finished.tolist() == [True, True, False]
+
+
+def test_a_whole_number_of_episodes_is_finished() -> None:
+    demos = record("CartPole-v1", "expert", steps=500)
+    assert demos.episode_finished is not None
+    assert demos.episode_finished.tolist() == [True]
+
+
+def test_the_first_steps_do_not_depend_on_how_many_are_asked_for() -> None:
+    short, long = (record("LunarLander-v3", "expert", steps=steps, stochastic=True)
+                   for steps in (300, 2_000))
+    assert short.observations.tobytes() == long.observations[:300].tobytes()
+    assert short.actions.tobytes() == long.actions[:300].tobytes()
+
+
+def test_same_seed_same_digest() -> None:
+    first, again, other = (record("Pendulum-v1", "expert", steps=450, seed=seed, stochastic=True)
+                           for seed in (1, 1, 2))
+    assert first.digest == again.digest
+    assert first.digest != other.digest
+
+
+def test_a_stochastic_policy_is_sampled() -> None:
+    greedy, sampled = (record("LunarLander-v3", "expert", steps=200, stochastic=stochastic)
+                       for stochastic in (False, True))
+    assert (greedy.actions != sampled.actions).any()
+    policy = make_agent("expert", "LunarLander-v3")
+    assert (policy.act(greedy.observations, None)[:, 0] == greedy.actions).all()
+
+
+def test_every_kind_of_space_is_recorded(toy_id: str) -> None:
+    demos = record(toy_id, "novice", steps=60)
+    assert len(demos) == 60
+    assert demos.is_discrete == (toy_id in (
+        "toy/Offset-v0", "toy/MultiDiscrete-v0", "toy/MultiBinary-v0"))
+    if toy_id == "toy/Offset-v0":
+        assert demos.actions.shape == (60,)
+        assert demos.actions.min() == -1
+    elif toy_id == "toy/Matrix-v0":
+        assert demos.actions.shape == (60, 4)
+        assert demos.bounds_from == "action space"
+    elif toy_id == "toy/Open-v0":
+        assert demos.bounds_from == "demonstrated values"
+
+
+def test_an_endless_environment_is_cut_and_not_marked_as_ended() -> None:
+    demos = record("toy/Endless-v0", "novice", steps=70)
+    assert demos.truncated is not None
+    assert demos.terminated is not None
+    assert len(demos) == 70
+    assert not demos.truncated.any()
+    assert not demos.terminated.any()
+
+
+def test_progress_and_stopping() -> None:
+    calls: list[tuple[int, int]] = []
+    record("CartPole-v1", "novice", steps=300, progress=lambda *call: calls.append(call))
+    assert calls[0] == (0, 300)
+    assert calls[-1] == (300, 300)
+    with pytest.raises(CancelledError):
+        record("CartPole-v1", "novice", steps=300, progress=lambda *_: False)
+
+
+@pytest.mark.parametrize("arguments", [{"steps": 0}, {"steps": 5, "seed": -1}])
+def test_numbers_out_of_range_are_named(arguments: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="must be at least"):
+        record("CartPole-v1", "novice", **arguments)

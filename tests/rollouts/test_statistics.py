@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from sarl_core.errors import InputError
+from sarl_core.rollouts.statistics import interquartile_mean, summarise
+
+
+def test_known_values() -> None:
+    # Eight values: the middle four are 3, 4, 5, 6.
+    found = summarise([100.0, 1, 2, 3, 4, 5, 6, -50])
+    assert found.mean == pytest.approx(71 / 8)
+    assert found.std == pytest.approx(np.std([100, 1, 2, 3, 4, 5, 6, -50], ddof=1))
+    assert found.iqm == pytest.approx((2 + 3 + 4 + 5) / 4)
+
+
+def test_interquartile_mean_along_an_axis() -> None:
+    values = np.arange(16, dtype=float).reshape(2, 8)
+    assert interquartile_mean(values, axis=1).tolist() == [3.5, 11.5]
+    assert interquartile_mean([7.0, 9.0]) == 8.0
+
+
+@pytest.mark.parametrize("values", [[5.0], [500.0] * 100])
+def test_without_spread_the_interval_is_the_value(values: list[float]) -> None:
+    found = summarise(values)
+    assert (found.mean, found.std, found.iqm, found.low, found.high) == (
+        values[0], 0.0, values[0], values[0], values[0])
+
+
+def test_nearly_equal_values_are_no_trouble() -> None:
+    found = summarise([500.0] * 99 + [499.0])
+    assert found.low == found.iqm == found.high == 500.0
+
+
+def test_the_interval_covers_the_truth_about_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(0)
+    hits = 0
+    for _ in range(100):
+        found = summarise(rng.normal(size=40))
+        hits += found.low <= 0 <= found.high
+        assert found.low < found.iqm < found.high
+    assert 88 <= hits <= 99
+
+
+def test_same_seed_same_interval() -> None:
+    values = np.random.default_rng(0).normal(size=30)
+    assert summarise(values, seed=1) == summarise(values, seed=1)
+    assert summarise(values, seed=1) != summarise(values, seed=2)
+
+
+@pytest.mark.parametrize("values", [[], [1.0, np.nan], [np.inf]])
+def test_nothing_to_summarise_is_an_error(values: list[float]) -> None:
+    with pytest.raises(InputError):
+        summarise(values)
