@@ -109,30 +109,41 @@ def print_demonstrations(document: dict[str, Any]) -> None:
     ])
     terminal.print_facts(_facts(document))
     terminal.print_table(
-        ("feature", "unit", "least", "median", "largest"),
+        ("feature", "least", "median", "largest"),
         [
-            (entry["name"], entry["unit"], *_numbers(entry))
+            (f"{entry['name']} ({entry['unit']})" if entry["unit"] else entry["name"],
+             *_numbers(entry))
             for entry in document["features"]
         ],
     )
-    for action in document["actions"]:
+    _print_actions(document["actions"])
+    sentences = [f"note: {note}" for note in document["notes"]]
+    sentences += [f"warning: {warning}" for warning in document["warnings"]]
+    terminal.print_lines(sentences or ["No warnings."])
+
+
+def _print_actions(actions: list[dict[str, Any]]) -> None:
+    from sarl_core.explaining.language import share_text
+
+    for action in actions:
         if action["kind"] == "discrete":
             terminal.print_table(
                 (action["name"], "action", "share"),
                 [
-                    (label["name"], str(label["action"]), f"{label['share']:.1%}")
+                    (label["name"], str(label["action"]), share_text(label["share"]))
                     for label in action["labels"]
                 ],
             )
-        else:
-            terminal.print_table(
-                (action["name"], "bounds", "least", "median", "largest"),
-                [("", f"{action['low']:g} to {action['high']:g} ({action['bounds_from']})",
-                  *_numbers(action))],
-            )
-    sentences = [f"note: {note}" for note in document["notes"]]
-    sentences += [f"warning: {warning}" for warning in document["warnings"]]
-    terminal.print_lines(sentences or ["No warnings."])
+    intervals = [action for action in actions if action["kind"] == "interval"]
+    if intervals:
+        terminal.print_table(
+            ("action", "bounds", "bounds from", "least", "median", "largest"),
+            [
+                (action["name"], f"{action['low']:g} to {action['high']:g}",
+                 action["bounds_from"], *_numbers(action))
+                for action in intervals
+            ],
+        )
 
 
 def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
@@ -190,16 +201,16 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
         rule_set: The rules.
         path: Their file.
     """
-    from sarl_core.explaining.language import rule_sentence
+    from sarl_core.explaining.language import sentence, share_text
 
     facts = [
         ("rules", f"{rule_set.rule_count:,}"),
         ("mean length", f"{rule_set.mean_length:.2f} conditions"),
-        ("coverage", f"{rule_set.coverage:.1%} of the demonstrated states have a rule"),
+        ("coverage", f"{share_text(rule_set.coverage)} of the demonstrated states have a rule"),
     ]
     if len(rule_set):
         facts.append(
-            ("fidelity", f"{rule_set.fidelity:.1%} of these carry the action that the rule gives")
+            ("fidelity", f"{share_text(rule_set.fidelity)} of these carry the rule's action")
         )
     terminal.print_lines([f"Wrote {path}"])
     terminal.print_facts(facts)
@@ -209,5 +220,5 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
     often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
     terminal.print_lines(["", "The rules that apply most often:"])
     terminal.print_lines(
-        f"  {number}. {rule_sentence(rule, rule_set)}" for number, rule in enumerate(often, 1)
+        f"  {number}. {sentence(rule, rule_set)}" for number, rule in enumerate(often, 1)
     )

@@ -196,7 +196,9 @@ def landscape(
         trees = grow_policy_trees(_load(file, env), divider=divider)
         found = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
-        save_landscape(found, names, out)
+        source = trees[0].source
+        title = f"{source.env_id or file.name}: {source.steps:,} steps"
+        save_landscape(found, names, out, title=title)
     if as_json:
         terminal.print_json(landscape_document(found, names))
         return
@@ -237,6 +239,8 @@ def evaluate(
     if as_json:
         terminal.print_json(document)
         return
+    from sarl_core.explaining.language import share_text
+
     summary = document["summary"]
     shielded = "unshielded" if rules is None else f"shielded by {rules}"
     terminal.print_lines([f"{found.agent} in {env}, {shielded}"])
@@ -252,8 +256,8 @@ def evaluate(
         ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
         ("IQM of the returns", f"{summary['iqm']:.2f} (95 % interval {summary['iqm_low']:.2f} to "
                                f"{summary['iqm_high']:.2f})"),
-        ("interventions", f"{summary['intervention_rate']:.1%} of the steps"),
-        ("coverage", f"{summary['coverage']:.1%} of the steps"),
+        ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
+        ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
     ])
 
 

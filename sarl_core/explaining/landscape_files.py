@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import shutil
 from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
 MAX_VALUES = 10_001  # an axis in steps of 0.0001
 MAX_CELLS = 4_000_000  # as a file, half a gigabyte
 
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 _LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
 
 
@@ -63,13 +60,16 @@ def parse_grid(text: str, name: str) -> NDArray[np.float64]:
     return np.array([float(first + index * step) for index in range(count)])
 
 
-def save_landscape(landscape: Landscape, names: Sequence[str], path: Path) -> None:
+def save_landscape(
+    landscape: Landscape, names: Sequence[str], path: Path, *, title: str = ""
+) -> None:
     """Write a landscape; the file appears whole or not at all.
 
     Args:
         landscape: To write.
         names: Of the action dimensions.
         path: A `.json`, `.csv`, `.html` (opens without a network) or `.png` file.
+        title: Above the figure.
 
     Raises:
         InputError: If the path has another ending, or the grid too many cells for a file.
@@ -89,7 +89,7 @@ def save_landscape(landscape: Landscape, names: Sequence[str], path: Path) -> No
     elif suffix in (".html", ".png"):
         from sarl_core.explaining.threshold_figures import landscape_figure
 
-        figure = landscape_figure(landscape)
+        figure = landscape_figure(landscape, title=title)
         content = figure_to_png(figure) if suffix == ".png" else (
             figure.to_html(include_plotlyjs=True).encode()
         )
@@ -150,13 +150,11 @@ def _csv(landscape: Landscape, names: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def figure_to_png(figure: go.Figure, *, width: int = 1400, height: int = 620) -> bytes:
-    """Draw a Plotly figure as a picture.
+def figure_to_png(figure: go.Figure) -> bytes:
+    """Draw a Plotly figure as a picture, two pixels for one so that text is sharp.
 
     Args:
-        figure: To draw.
-        width: In pixels, before doubling for sharpness.
-        height: Likewise.
+        figure: To draw, at the size its layout says.
 
     Returns:
         A PNG file.
@@ -164,15 +162,12 @@ def figure_to_png(figure: go.Figure, *, width: int = 1400, height: int = 620) ->
     Raises:
         WorkError: If there is no Chromium or Chrome to draw it with.
     """
-    browser = next(filter(None, map(shutil.which, _BROWSERS)), None)
-    if browser is not None:
-        os.environ.setdefault("BROWSER_PATH", browser)
     try:
-        picture: bytes = figure.to_image(format="png", width=width, height=height, scale=2)
+        picture: bytes = figure.to_image(format="png", scale=2)
     except Exception as error:  # whatever Kaleido or the browser has to complain about
-        reason = str(error).strip().splitlines()
+        reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
         raise WorkError(
-            "the picture could not be drawn, which takes Chromium or Chrome "
-            f"({reason[0] if reason else type(error).__name__}); install it, or write .html"
+            f"the picture could not be drawn, which takes an installed Chromium or Chrome "
+            f"({reason}); install one, or write .html"
         ) from error
     return picture
