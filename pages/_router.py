@@ -16,7 +16,7 @@ import _state as state  # noqa: E402  # found by the line above
 
 st.set_page_config(
     page_title="SARL Explorer",
-    page_icon=":material/account_tree:",
+    page_icon=str(Path(__file__).parent / "icon.png"),  # a named icon would come from the network
     layout="wide",
     initial_sidebar_state="auto",
 )
@@ -40,5 +40,5 @@ PAGES = [
     ),
 ]
 page = st.navigation(PAGES)
-state.sidebar()
+state.sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
-from sarl_core.mining.landscape import Changes, Landscape, next_changes, threshold_landscape
+from sarl_core.explaining.tables import top_rules
+from sarl_core.mining.landscape import Landscape, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds, mine_rules
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
@@ -31,6 +32,8 @@ SHIPPED = {
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"
 MIN_DIVIDER, MAX_DIVIDER = 2, 10
+MAX_LIFT = 20.0
+MAX_DEPTH = 64  # 0 is no limit
 DATA_FOLDER = Path(__file__).parents[1] / "data" / "demonstrations"
 
 
@@ -142,7 +145,7 @@ def require_demonstrations() -> Demonstrations:
 
 
 def _number(name: str, default: float, low: float, high: float) -> float:
-    """A number that a widget may hold, on whatever page; else the URL's; else the default."""
+    """A number that a widget of some page holds; else the URL's; else the default."""
     value = st.session_state.get(name)
     if value is None:
         value = st.query_params.get(name, default)
@@ -152,26 +155,38 @@ def _number(name: str, default: float, low: float, high: float) -> float:
         number = default
     if not (math.isfinite(number) and low <= number <= high):
         number = default
-    st.session_state[name] = number
     return number
 
 
 def chosen_thresholds() -> Thresholds:
     """The thresholds in force (URL: support, confidence, lift, depth; depth 0 is no limit)."""
-    depth = int(_number("depth", 0, 0, 64))
     return Thresholds(
         support=_number("support", FILTERED.support, 0.0, 1.0),
         confidence=_number("confidence", FILTERED.confidence, 0.0, 1.0),
-        lift=_number("lift", 0.0, 0.0, 1000.0),
-        max_depth=depth or None,
+        lift=_number("lift", 0.0, 0.0, MAX_LIFT),
+        max_depth=int(_number("depth", 0, 0, MAX_DEPTH)) or None,
     )
+
+
+def choose_thresholds(thresholds: Thresholds) -> None:
+    """Put thresholds in force; for callbacks, and before the sliders are drawn."""
+    for name, value in (
+        ("support", thresholds.support), ("confidence", thresholds.confidence),
+        ("lift", thresholds.lift), ("depth", thresholds.max_depth or 0),
+    ):
+        if st.session_state.get(name) != value:
+            st.session_state[name] = value
 
 
 def chosen_divider() -> int:
     """Number of intervals of continuous actions (URL: divider)."""
-    value = int(_number("divider", MIN_DIVIDER, MIN_DIVIDER, MAX_DIVIDER))
-    st.session_state["divider"] = value
-    return value
+    return int(_number("divider", MIN_DIVIDER, MIN_DIVIDER, MAX_DIVIDER))
+
+
+def choose_divider(divider: int) -> None:
+    """Choose a divider; for callbacks, and before its slider is drawn."""
+    if st.session_state.get("divider") != divider:
+        st.session_state["divider"] = divider
 
 
 # --- what follows, cached ----------------------------------------------------------------------
@@ -281,19 +296,18 @@ def pareto(
     return _pareto(_key(grown), lift, depth, grown)
 
 
-@st.cache_data(max_entries=200, show_spinner=False)
-def _changes(
-    key: tuple[str, int], thresholds: Thresholds, _trees: tuple[PolicyTree, ...]
-) -> Changes:
-    return next_changes(
-        _trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
-        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
-    )
+@st.cache_resource(max_entries=64, show_spinner=False)
+def _top_rules(
+    key: tuple[str, int], thresholds: Thresholds, most: int, _trees: tuple[PolicyTree, ...]
+) -> RuleSet:
+    return top_rules(_trees, thresholds, most)
 
 
-def changes(grown: tuple[PolicyTree, ...], thresholds: Thresholds) -> Changes:
-    """The nearest thresholds at which anything changes."""
-    return _changes(_key(grown), thresholds, grown)
+def largest_rules(
+    grown: tuple[PolicyTree, ...], thresholds: Thresholds, most: int
+) -> RuleSet:
+    """The rules with the most support, without making the rest of a large set."""
+    return _top_rules(_key(grown), thresholds, most, grown)
 
 
 # --- how it looks ------------------------------------------------------------------------------
@@ -304,10 +318,18 @@ def is_dark() -> bool:
     return str(st.context.theme.get("type", "light")) == "dark"
 
 
-def sidebar() -> None:
-    """The choice of data and the thresholds in force, the same on every page."""
+def sidebar(*, thresholds_shown: bool = True) -> None:
+    """The choice of data and the thresholds in force.
+
+    Args:
+        thresholds_shown: Whether to say which thresholds are in force; a page with their sliders
+            says so itself.
+    """
     name = chosen_dataset()
     thresholds, divider = chosen_thresholds(), chosen_divider()
+    # A page without sliders keeps what a link says, for the page that has them.
+    choose_thresholds(thresholds)
+    choose_divider(divider)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
     st.session_state["_data_choice"] = name
     with st.sidebar:
@@ -319,8 +341,11 @@ def sidebar() -> None:
         if demonstrations is None:
             st.caption("Nothing uploaded yet: see the Demonstrations page.")
             return
-        lines = [
-            f"{len(demonstrations):,} steps in {demonstrations.n_episodes:,} episodes",
+        lines = [f"{len(demonstrations):,} steps in {demonstrations.n_episodes:,} episodes"]
+        if not thresholds_shown:
+            st.caption(lines[0])
+            return
+        lines += [
             f"Support at least **{thresholds.support:g}**",
             f"Confidence at least **{thresholds.confidence:g}**",
         ]

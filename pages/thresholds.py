@@ -1,5 +1,344 @@
-"""Page under construction."""
+"""Thresholds: how many rules, how long and how good, at every pair of thresholds at once.
 
+A moved slider runs the fragments "controls" and "details" and nothing else. The maps are not part
+of them: they hold every pair of thresholds already, and only the mark that lies over them moves.
+"""
+
+from __future__ import annotations
+
+import _state as state
 import streamlit as st
+from _rule_table import column_config, frame, table_height
+
+from sarl_core.explaining import threshold_figures as figures
+from sarl_core.explaining.colours import MARKER_COLOUR
+from sarl_core.explaining.language import share_text, threshold_text
+from sarl_core.explaining.steps import (
+    CONFIDENCE_STEPS,
+    FINE_CONFIDENCES,
+    FINE_SUPPORTS,
+    SUPPORT_STEPS,
+    neat_jumps,
+    with_step,
+)
+from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
+from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+
+SIZE, QUALITY = "Rules and length", "Coverage and fidelity"
+LAYERS: dict[str, tuple[figures.Layer, figures.Layer]] = {
+    SIZE: ("rule_count", "mean_length"), QUALITY: ("coverage", "fidelity"),
+}
+MAPS, SURFACES = "Maps", "3-D"
+FINE, PAPER = "Fine grid", "Paper's grid"
+WHOLE = "All actions"
+LARGEST, TRADE_OFFS = "Largest rules", "Best trade-offs"
+TABLE_ROWS = 50
+BARE = {"displayModeBar": False, "scrollZoom": False}
+MARK_RADIUS = 9
+
+demonstrations = state.require_demonstrations()
+grown = state.trees(demonstrations, state.chosen_divider())
+
+
+# --- what widgets do ---------------------------------------------------------------------------
+
+
+def follow() -> None:
+    """Show what the thresholds of the moment give; for callbacks, and the last thing they do."""
+    if st.session_state.get("view") == SURFACES:
+        st.rerun()  # the chosen point is part of the surface
+    st.rerun(["controls", "details"])
+
+
+def jump(name: str, value: float) -> None:
+    """Move one threshold."""
+    st.session_state[name] = value
+    follow()
+
+
+def use(setting: Thresholds) -> None:
+    """Put a named setting in force."""
+    state.choose_thresholds(setting)
+    st.rerun()  # lift and depth, which it resets, are part of the maps
+
+
+def take_click(key: str) -> None:
+    """Set both thresholds to those of the clicked cell or point.
+
+    A second click on one cell takes its selection back, and means the cell all the same.
+    """
+    points = st.session_state[key].selection.points
+    if points and "customdata" in points[0]:
+        data = points[0]["customdata"]
+        st.session_state["_clicked"] = (float(data["0"]), float(data["1"]))
+    if "_clicked" in st.session_state:
+        st.session_state["support"], st.session_state["confidence"] = st.session_state["_clicked"]
+    follow()
+
+
+# --- parts of the page -------------------------------------------------------------------------
+
+
+def jump_buttons(name: str, below: float | None, above: float | None) -> None:
+    """Two buttons that go to the next value at which the rule set changes."""
+    with st.container(horizontal=True, horizontal_alignment="distribute", gap="small"):
+        for side, value in (("below", below), ("above", above)):
+            st.button(
+                "no change" if value is None else threshold_text(value),
+                key=f"{name}_{side}", on_click=jump, args=(name, value), type="tertiary",
+                icon=f":material/{'arrow_back' if side == 'below' else 'arrow_forward'}:",
+                icon_position="left" if side == "below" else "right",
+                disabled=value is None,
+                help=f"Next value {side} at which the rules change",
+            )
+
+
+@st.fragment(key="controls")
+def controls(dimension: int | None, grid: Landscape) -> None:
+    """Sliders, named settings and jumps; the numbers of the rule set; the mark in the maps."""
+    thresholds = state.chosen_thresholds()
+    jumps = neat_jumps(grown, thresholds)
+    left, middle, right = st.columns([4, 4, 3])
+    with left:
+        st.select_slider(
+            "Minimum support", with_step(SUPPORT_STEPS, thresholds.support), key="support",
+            value=FILTERED.support, format_func=threshold_text, bind="query-params",
+            on_change=follow,
+            help="Share of all demonstrated states to which a rule must apply.",
+        )
+        jump_buttons("support", jumps.support_below, jumps.support_above)
+    with middle:
+        st.select_slider(
+            "Minimum confidence", with_step(CONFIDENCE_STEPS, thresholds.confidence),
+            key="confidence", value=FILTERED.confidence, format_func=threshold_text,
+            bind="query-params", on_change=follow,
+            help="Share of those states in which the expert did what the rule says.",
+        )
+        jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
+    with right, st.container(horizontal=True, gap="small", horizontal_alignment="right"):
+        for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
+            st.button(
+                name, key=name.lower(), on_click=use, args=(setting,),
+                type="primary" if thresholds == setting else "secondary",
+                help=f"The paper's setting: support {setting.support:g}, "
+                     f"confidence {setting.confidence:g}",
+            )
+    metrics(here(thresholds, dimension))
+    across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
+    st.html(f"<style>:root {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+
+
+def here(thresholds: Thresholds, dimension: int | None) -> Landscape:
+    """The landscape of the one point that is in force."""
+    point = state.landscape(
+        grown, [thresholds.support], [thresholds.confidence], lift=thresholds.lift,
+        depth=thresholds.max_depth,
+    )
+    return point if dimension is None else point.dimensions[dimension]
+
+
+def metrics(point: Landscape) -> None:
+    """The four numbers of the rule set in force."""
+    rules = int(point.rule_count[0, 0])
+    with st.container(horizontal=True, key="metrics"):
+        st.metric("Rules", f"{rules:,}")
+        st.metric("Mean length", f"{point.mean_length[0, 0]:.1f}" if rules else "–",
+                  help="Conditions a rule, on average")
+        st.metric("Coverage", share_text(float(point.coverage[0, 0])),
+                  help="Share of the demonstrated states in which some rule applies")
+        st.metric("Fidelity", share_text(float(point.fidelity[0, 0])),
+                  help="Share of those in which the expert did what the rule says")
+
+
+def more() -> None:
+    """What changes the whole plane, and is rarely needed."""
+    with st.popover("More", icon=":material/tune:"):
+        st.slider(
+            "Minimum lift", 0.0, state.MAX_LIFT, value=0.0, step=0.1, key="lift",
+            bind="query-params",
+            help="How many times more often than over all states the expert must have done what "
+                 "the rule says. 0: no limit.",
+        )
+        st.slider(
+            "Maximum depth", 0, state.MAX_DEPTH, value=0, key="depth", bind="query-params",
+            help="Most conditions of a rule. 0: no limit.",
+        )
+
+
+def divider() -> None:
+    """The divider, where there is something to divide."""
+    if not demonstrations.is_discrete:
+        st.slider(
+            "Divider", state.MIN_DIVIDER, state.MAX_DIVIDER, key="divider",
+            value=state.MIN_DIVIDER, bind="query-params", width=260,
+            help="Number of equal intervals each continuous action is divided into.",
+        )
+
+
+def chosen_dimension() -> int | None:
+    """Which action dimension is looked at; None for all together."""
+    if len(grown) == 1:
+        return None
+    names = [tree.dimension.name for tree in grown]
+    name = st.segmented_control(
+        "Action", [WHOLE, *names], default=WHOLE, key="dimension", bind="query-params",
+        required=True, label_visibility="collapsed",
+    )
+    return names.index(name) if name in names else None
+
+
+def switch(label: str, key: str, options: list[str], hint: str) -> str:
+    """A choice between two ways to look."""
+    return st.segmented_control(
+        label, options, default=options[0], key=key, bind="query-params", required=True,
+        label_visibility="collapsed", help=hint,
+    ) or options[0]
+
+
+def show_maps(landscape: Landscape, layers: tuple[figures.Layer, figures.Layer]) -> None:
+    """Two maps side by side, with the mark that `controls` moves."""
+    margin = figures.MARGIN
+    st.html(
+        "<style>"
+        ".st-key-maps [class*='st-key-box_'] { position: relative; }"
+        ".st-key-maps [class*='st-key-box_']::after { content: ''; position: absolute; z-index: 2;"
+        f" pointer-events: none; width: {2 * MARK_RADIUS}px; height: {2 * MARK_RADIUS}px;"
+        f" left: calc({margin['l'] - MARK_RADIUS}px"
+        f" + (100% - {margin['l'] + margin['r']}px) * var(--mark-x));"
+        f" top: calc({margin['t'] - MARK_RADIUS}px"
+        f" + {figures.HEIGHT - margin['t'] - margin['b']}px * var(--mark-y));"
+        f" box-sizing: border-box; border: 3px solid {MARKER_COLOUR}; border-radius: 50%;"
+        " box-shadow: 0 0 0 1.5px #ffffff; }"
+        "</style>"
+    )
+    with st.container(key="maps"):
+        for column, layer in zip(st.columns(2), layers, strict=True):
+            with column:
+                st.markdown(f"**{figures.LAYERS[layer].title}**")
+                with st.container(key=f"box_{layer}"):
+                    st.plotly_chart(
+                        figures.heatmap(landscape, layer, dark=state.is_dark()),
+                        key=f"map_{layer}", config=BARE, selection_mode="points",
+                        on_select=lambda key=f"map_{layer}": take_click(key),
+                        alt=f"{figures.LAYERS[layer].title}, for every minimum support and "
+                            "minimum confidence",
+                    )
+    st.caption("Click a cell to set both thresholds to it. The ring marks the present ones.")
+
+
+def show_surfaces(
+    landscape: Landscape, layers: tuple[figures.Layer, figures.Layer], dimension: int | None
+) -> None:
+    """The same two layers as the paper draws them."""
+    thresholds = state.chosen_thresholds()
+    point = here(thresholds, dimension)
+    for column, layer in zip(st.columns(2), layers, strict=True):
+        with column:
+            st.markdown(f"**{figures.LAYERS[layer].title}**")
+            figure = figures.surface(
+                landscape, layer, dark=state.is_dark(),
+                chosen=(thresholds.support, thresholds.confidence,
+                        float(getattr(point, layer)[0, 0])),
+            )
+            st.plotly_chart(figure, key=f"surface_{layer}", config={"displaylogo": False},
+                            alt=f"{figures.LAYERS[layer].title} as a surface")
+    st.caption("Drag to turn. The dot marks the present thresholds.")
+
+
+@st.fragment(key="details")
+def details(dimension: int | None) -> None:
+    """The rules in force, and the rule sets that no other one beats."""
+    largest, trade_offs = st.tabs(
+        [LARGEST, TRADE_OFFS], key="details", on_change="rerun", bind="query-params"
+    )
+    thresholds = state.chosen_thresholds()
+    point = here(thresholds, dimension)
+    if trade_offs.open:
+        with trade_offs:
+            show_trade_offs(thresholds, point, dimension)
+    else:
+        with largest:
+            show_largest(thresholds, point, dimension)
+
+
+def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
+    """The rules with the most support."""
+    rules = int(point.rule_count[0, 0])
+    if not rules:
+        st.info(
+            "No part of the tree is as frequent and as certain as these thresholds ask. Lower "
+            "the minimum support or the minimum confidence: the maps show where there are rules.",
+            icon=":material/filter_alt_off:",
+        )
+        return
+    some = state.largest_rules(grown, thresholds, TABLE_ROWS)
+    shown = [rule for rule in some.rules if dimension in (None, rule.dimension)][:TABLE_ROWS]
+    st.dataframe(
+        frame(shown, some), hide_index=True, column_config=column_config(),
+        height=table_height(len(shown), 10), key="largest_table",
+        alt="The rules with the most support",
+    )
+    if rules > len(shown):
+        st.caption(f"The {len(shown)} rules with the most support, of {rules:,}.")
+    st.page_link("rules.py", label="All rules, with the evidence behind each",
+                 icon=":material/arrow_forward:")
+
+
+def show_trade_offs(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
+    """The Pareto front."""
+    trees = grown if dimension is None else (grown[dimension],)
+    with st.spinner("Looking for the best trade-offs …"):
+        front = state.pareto(trees, lift=thresholds.lift, depth=thresholds.max_depth)
+    if not front:
+        st.info("There is no rule at any thresholds; lower the minimum lift under More.",
+                icon=":material/filter_alt_off:")
+        return
+    st.caption(
+        "No other thresholds give fewer rules, more coverage and more fidelity than these. "
+        "Click a point to use its thresholds."
+    )
+    points = figures.thin_front(front)
+    figure = figures.pareto(
+        points, dark=state.is_dark(),
+        chosen=(int(point.rule_count[0, 0]), float(point.coverage[0, 0]),
+                float(point.fidelity[0, 0])),
+    )
+    st.plotly_chart(
+        figure, key="pareto", config=BARE, selection_mode="points",
+        on_select=lambda: take_click("pareto"),
+        alt="Number of rules against coverage, coloured by fidelity",
+    )
+    if len(points) < len(front):
+        st.caption(f"{len(points):,} of {len(front):,} such rule sets are drawn.")
+
+
+# --- the page ----------------------------------------------------------------------------------
 
 st.title("Thresholds")
+st.caption(
+    "A rule must apply to at least a certain share of the states (support), and the expert must "
+    "have done the same in at least a certain share of those (confidence)."
+)
+top = st.container()
+with st.container(horizontal=True, gap="medium", vertical_alignment="bottom", key="ways"):
+    divider()
+    shown = switch("Show", "layer", [SIZE, QUALITY], "What the two figures show")
+    view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
+    axes = switch("Grid", "grid", [FINE, PAPER],
+                  "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.")
+    more()
+    dimension = chosen_dimension()
+in_force = state.chosen_thresholds()
+whole = state.landscape(
+    grown,
+    *((PAPER_SUPPORTS, PAPER_CONFIDENCES) if axes == PAPER else (FINE_SUPPORTS, FINE_CONFIDENCES)),
+    lift=in_force.lift, depth=in_force.max_depth,
+)
+landscape = whole if dimension is None else whole.dimensions[dimension]
+with top:
+    controls(dimension, landscape)
+if view == SURFACES:
+    show_surfaces(landscape, LAYERS[shown], dimension)
+else:
+    show_maps(landscape, LAYERS[shown])
+details(dimension)

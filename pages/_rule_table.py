@@ -1,0 +1,52 @@
+"""The table of rules, as two pages show it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.explaining.tables import rule_columns
+from sarl_core.mining.rules import Rule, RuleSet
+
+ROW_HEIGHT = 35
+
+
+def column_config() -> dict[str, Any]:
+    """What the columns look like; all have help that says what they mean."""
+    column = st.column_config
+    return {
+        "If": column.TextColumn(width="large", help="When the rule applies"),
+        "Then": column.TextColumn(width="medium", help="What the expert does there"),
+        "Support": column.NumberColumn(
+            format="%.4f", help="Share of all states to which the rule applies"
+        ),
+        "Confidence": column.ProgressColumn(
+            min_value=0.0, max_value=1.0, format="%.3f", color="auto",
+            help="Share of those in which the expert did what the rule says",
+        ),
+        "Lift": column.NumberColumn(
+            format="%.2f", help="Confidence over the action's share of all states"
+        ),
+        "Joint support": column.NumberColumn(
+            format="%.4f",
+            help="Share of all states to which the rule applies and in which it is right",
+        ),
+        "States": column.NumberColumn(
+            format="localized", help="Demonstrated states to which the rule applies"
+        ),
+        "Length": column.NumberColumn(help="Number of queries on the way to the rule"),
+    }
+
+
+def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
+    """Rules as a data frame, its index their place in the order given."""
+    import pandas as pd
+
+    return pd.DataFrame(rule_columns(rules, rule_set))
+
+
+def table_height(rows: int, most: int) -> int:
+    """Pixels for a table of so many rows, the header and no blank rows included."""
+    return (min(rows, most) + 1) * ROW_HEIGHT + 3

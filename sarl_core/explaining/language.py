@@ -1,0 +1,245 @@
+"""Rules in plain language: names, units, merged intervals; numbers rounded for display only."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
+
+_DIGITS = 3
+_FLAG_WORDS = ("contact",)
+
+
+def number_text(value: float, *, apart_from: float | None = None) -> str:
+    """A number for people: three significant digits, more where two would look the same.
+
+    Args:
+        value: Any finite number.
+        apart_from: Another number shown beside it.
+
+    Returns:
+        As "0.0213" or "-12".
+    """
+    for digits in range(_DIGITS, 18):
+        text = _rounded(value, digits)
+        if apart_from is None or value == apart_from or text != _rounded(apart_from, digits):
+            return text
+    return repr(value)
+
+
+def _rounded(value: float, digits: int) -> str:
+    if value == 0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits}g}"
+    decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    text = f"{value:.{decimals}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return "0" if text in ("-0", "") else text
+
+
+def threshold_text(value: float) -> str:
+    """A threshold with every digit it has, and without an exponent.
+
+    Args:
+        value: 0 to 1, or any other number.
+
+    Returns:
+        As "0.00005"; reads back as the same number.
+    """
+    return np.format_float_positional(value, trim="-")
+
+
+def share_text(share: float) -> str:
+    """A share as a percentage that never rounds up to all or down to none.
+
+    Args:
+        share: 0 to 1, or NaN where there is nothing to share.
+
+    Returns:
+        As "97 %", "99.96 %", "< 0.01 %"; "–" for NaN.
+    """
+    if math.isnan(share):
+        return "–"
+    if share in (0.0, 1.0):
+        return f"{share:.0%}".replace("%", " %")
+    for decimals in (0, 1, 2):
+        text = f"{100 * share:.{decimals}f}"
+        exact_enough = decimals == 2 or share >= 0.1 or (decimals == 1 and share >= 0.01)
+        if exact_enough and float(text) not in (0.0, 100.0):
+            return f"{text} %"
+    return "< 0.01 %" if share < 0.5 else "> 99.99 %"
+
+
+def is_flag(feature: Feature, bounds: Bounds) -> bool:
+    """Whether bounds on a feature say no more than yes or no, as those on a contact do.
+
+    Args:
+        feature: Its name tells.
+        bounds: What is asked of it.
+
+    Returns:
+        True for one bound between 0 and 1 on a feature such as "left leg contact".
+    """
+    one = math.isinf(bounds.low) != math.isinf(bounds.high)
+    threshold = bounds.high if math.isinf(bounds.low) else bounds.low
+    named = any(word in feature.name.lower().split() for word in _FLAG_WORDS)
+    return named and one and not feature.unit and 0.0 <= threshold < 1.0
+
+
+def condition_text(bounds: Bounds, feature: Feature) -> str:
+    """What a rule asks of one feature, as part of a sentence.
+
+    Args:
+        bounds: The feature's interval.
+        feature: Its name and unit.
+
+    Returns:
+        As "the pole angle is above 0.02 rad".
+    """
+    if is_flag(feature, bounds):
+        return f"there is {'no ' if math.isinf(bounds.low) else ''}{feature.name}"
+    unit = f" {feature.unit}" if feature.unit else ""
+    if math.isinf(bounds.low):
+        return f"the {feature.name} is at most {number_text(bounds.high)}{unit}"
+    if math.isinf(bounds.high):
+        return f"the {feature.name} is above {number_text(bounds.low)}{unit}"
+    low = number_text(bounds.low, apart_from=bounds.high)
+    high = number_text(bounds.high, apart_from=bounds.low)
+    return f"the {feature.name} is between {low} and {high}{unit}"
+
+
+def short_condition(bounds: Bounds, feature: Feature) -> str:
+    """The same in signs, for tables.
+
+    Args:
+        bounds: The feature's interval.
+        feature: Its name and unit.
+
+    Returns:
+        As "pole angle > 0.02 rad".
+    """
+    if is_flag(feature, bounds):
+        return f"{'no ' if math.isinf(bounds.low) else ''}{feature.name}"
+    unit = f" {feature.unit}" if feature.unit else ""
+    if math.isinf(bounds.low):
+        return f"{feature.name} ≤ {number_text(bounds.high)}{unit}"
+    if math.isinf(bounds.high):
+        return f"{feature.name} > {number_text(bounds.low)}{unit}"
+    low = number_text(bounds.low, apart_from=bounds.high)
+    high = number_text(bounds.high, apart_from=bounds.low)
+    return f"{low} < {feature.name} ≤ {high}{unit}"
+
+
+def query_text(condition: Condition, features: tuple[Feature, ...]) -> str:
+    """One query on a path, in signs.
+
+    Args:
+        condition: The query.
+        features: All features.
+
+    Returns:
+        As "pole angle > 0.02 rad".
+    """
+    infinite = math.inf
+    bounds = (
+        Bounds(condition.feature, -infinite, condition.threshold) if condition.op == "<="
+        else Bounds(condition.feature, condition.threshold, infinite)
+    )
+    return short_condition(bounds, features[condition.feature])
+
+
+def exact_condition(condition: Condition, features: tuple[Feature, ...]) -> str:
+    """One query with its threshold at full precision.
+
+    Args:
+        condition: The query.
+        features: All features.
+
+    Returns:
+        As "pole angle > 0.020938472".
+    """
+    return f"{features[condition.feature].name} {condition.op} {condition.threshold!r}"
+
+
+def action_text(label: int, dimension: LabelledDimension) -> str:
+    """What a rule says to do.
+
+    Args:
+        label: The label.
+        dimension: Whose label it is.
+
+    Returns:
+        As "push right", "action 2", or "torque from -2 to 0".
+    """
+    if dimension.is_interval:
+        low, high = dimension.edges[label], dimension.edges[label + 1]
+        return (
+            f"{dimension.name} from {number_text(low, apart_from=high)} "
+            f"to {number_text(high, apart_from=low)}"
+        )
+    name = dimension.label_names[label]
+    bare = name.lstrip("+-").replace(".", "", 1).isdigit()
+    return f"{dimension.name} {name}" if bare else name
+
+
+def label_text(label: int, dimension: LabelledDimension) -> str:
+    """A label where its dimension is known: in tables and legends.
+
+    Args:
+        label: The label.
+        dimension: Whose label it is.
+
+    Returns:
+        As "push right" or "-2 to 0".
+    """
+    if dimension.is_interval:
+        low, high = dimension.edges[label], dimension.edges[label + 1]
+        return f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}"
+    return dimension.label_names[label]
+
+
+def conditions_text(rule: Rule, rule_set: RuleSet) -> str:
+    """All conditions of a rule in signs, for tables.
+
+    Args:
+        rule: One of the rule set.
+        rule_set: Knows the names.
+
+    Returns:
+        As "pole angle > 0.02 rad and cart velocity ≤ 0.3 m/s"; "always" without conditions.
+    """
+    features = rule_set.source.features
+    parts = [short_condition(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    return " and ".join(parts) if parts else "always"
+
+
+def sentence(rule: Rule, rule_set: RuleSet, *, evidence: bool = True) -> str:
+    """A rule as a sentence that needs no knowledge of trees.
+
+    Args:
+        rule: One of the rule set.
+        rule_set: Knows the names.
+        evidence: Whether to add how often the expert did so.
+
+    Returns:
+        As "If the pole angle is above 0.02 rad, then push right: so did the expert in 97 % of
+        412 states."
+    """
+    features = rule_set.source.features
+    action = action_text(rule.action, rule_set.actions[rule.dimension])
+    parts = [condition_text(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    if not parts:
+        text = f"Always {action}"
+    elif len(parts) == 1:
+        text = f"If {parts[0]}, then {action}"
+    else:
+        text = f"If {', '.join(parts[:-1])} and {parts[-1]}, then {action}"
+    if not evidence or rule.origin != "mined":
+        return f"{text}."
+    states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
+    return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."

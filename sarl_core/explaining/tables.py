@@ -1,0 +1,62 @@
+"""Rules as columns of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sarl_core.explaining.language import action_text, conditions_text
+from sarl_core.mining.rules import Rule, RuleSet, Thresholds, cut_nodes, rules_at
+from sarl_core.mining.tree import PolicyTree
+
+
+def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) -> RuleSet:
+    """The rules with the most support, without making the rest.
+
+    Args:
+        trees: One an action dimension.
+        thresholds: In force.
+        most: Number of rules to keep of each action dimension.
+
+    Returns:
+        A part of what `mine_rules` gives, the most support first.
+    """
+    rules: list[Rule] = []
+    for tree in trees:
+        nodes = cut_nodes(
+            tree, supp_min=thresholds.support, conf_min=thresholds.confidence,
+            lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+        )
+        first = np.argsort(-tree.samples[nodes], kind="stable")[:most]
+        rules += rules_at(tree, nodes[first])
+    rules.sort(key=lambda rule: -rule.samples)
+    return RuleSet(
+        rules=tuple(rules),
+        actions=tuple(tree.dimension for tree in trees),
+        source=trees[0].source,
+        thresholds=thresholds,
+        divider=trees[0].divider,
+    )
+
+
+def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[object]]:
+    """Rules as columns, for a table that people read.
+
+    Args:
+        rules: Some rules of the set.
+        rule_set: Knows the names.
+
+    Returns:
+        Column name to one value a rule. Shares are from 0 to 1.
+    """
+    return {
+        "If": [conditions_text(rule, rule_set) for rule in rules],
+        "Then": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Support": [rule.support for rule in rules],
+        "Confidence": [rule.confidence for rule in rules],
+        "Lift": [rule.lift for rule in rules],
+        "Joint support": [rule.joint_support for rule in rules],
+        "States": [rule.samples for rule in rules],
+        "Length": [rule.length for rule in rules],
+    }
