@@ -27,9 +27,14 @@ class PlainTree:
         # Shares of the labels, which make whole numbers of pairs again.
         counts = np.rint(tree.value[:, 0, :] * tree.n_node_samples[:, None])
         self.confidence: list[float] = (counts.max(axis=1) / tree.n_node_samples).tolist()
+        self.samples: list[int] = tree.n_node_samples.tolist()
+        self.correct: list[int] = counts.max(axis=1).astype(int).tolist()
 
 
-def walk(tree: PlainTree, supp_min: float, conf_min: float) -> tuple[int, int]:
+Sums = tuple[int, int, int, int]
+
+
+def walk(tree: PlainTree, supp_min: float, conf_min: float) -> Sums:
     """Algorithm 1, directly: down from the root, cutting at the first node that qualifies.
 
     Args:
@@ -38,20 +43,23 @@ def walk(tree: PlainTree, supp_min: float, conf_min: float) -> tuple[int, int]:
         conf_min: Minimum confidence.
 
     Returns:
-        Number of rules, and of their queries together.
+        Number of rules; and summed over them: queries, pairs covered, pairs correct.
     """
     left, right, support, confidence = tree.left, tree.right, tree.support, tree.confidence
-    rules = length = 0
+    samples, correct = tree.samples, tree.correct
+    rules = length = covered = right_ones = 0
     waiting = [(0, 0)]
     while waiting:
         node, depth = waiting.pop()
         if support[node] >= supp_min and confidence[node] >= conf_min:
             rules += 1
             length += depth
+            covered += samples[node]
+            right_ones += correct[node]
         elif left[node] >= 0:
             waiting.append((left[node], depth + 1))
             waiting.append((right[node], depth + 1))
-    return rules, length
+    return rules, length, covered, right_ones
 
 
 def fit() -> DecisionTreeClassifier:
@@ -90,7 +98,7 @@ def tree_included(quick: bool) -> Iterable[Row]:
 def tree_given(quick: bool) -> Iterable[Row]:
     """The landscape of a tree that is there, against walking it for each cell."""
     trees, plain = data.trees(), PlainTree(fit())
-    found: list[tuple[int, int]] = []
+    found: list[Sums] = []
 
     def theirs() -> None:
         found[:] = [walk(plain, support, confidence) for support, confidence in CELLS]
@@ -122,15 +130,19 @@ def plane(quick: bool) -> Iterable[Row]:
 
 
 def _check_equal(
-    landscape: Landscape, cells: Sequence[tuple[float, float]], found: Sequence[tuple[int, int]]
+    landscape: Landscape, cells: Sequence[tuple[float, float]], found: Sequence[Sums]
 ) -> None:
     """Both must have done the same work."""
-    for (support, confidence), (rules, length) in zip(cells, found, strict=True):
+    steps = len(data.demonstrations())
+    for (support, confidence), (rules, length, covered, right) in zip(cells, found, strict=True):
         place = (
             int(np.searchsorted(PAPER_SUPPORTS, support)),
             int(np.searchsorted(PAPER_CONFIDENCES, confidence)),
         )
-        ours = int(landscape.rule_count[place])
-        mean = length / rules if rules else 0.0
-        if ours != rules or abs(float(landscape.mean_length[place]) - mean) > 1e-9:
-            raise AssertionError(f"{ours} rules at {support}, {confidence}; the walk: {rules}")
+        ours = [float(layer[place]) for layer in (
+            landscape.rule_count, landscape.mean_length, landscape.coverage, landscape.fidelity
+        )]
+        walked = [rules, length / max(rules, 1), covered / steps,
+                  right / covered if covered else np.nan]
+        if not np.allclose(ours, walked, rtol=1e-12, atol=0, equal_nan=True):
+            raise AssertionError(f"at {support}, {confidence}: {ours}, and by walking {walked}")

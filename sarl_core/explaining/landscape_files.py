@@ -165,7 +165,7 @@ def figure_to_png(figure: go.Figure) -> bytes:
     try:
         picture: bytes = figure.to_image(format="png", scale=2)
     except Exception as error:  # whatever Kaleido or the browser has to complain about
-        reason = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
+        reason = " ".join(str(error).split()).split(". ")[0][:200] or type(error).__name__
         raise WorkError(
             f"the picture could not be drawn, which takes an installed Chromium or Chrome "
             f"({reason}); install one, or write .html"

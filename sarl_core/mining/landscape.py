@@ -8,15 +8,14 @@ summed over rules is, over a grid of thresholds, a sum of rectangles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import PolicyTree, highest_above
 
 Floats = NDArray[np.float64]
 
@@ -98,16 +97,9 @@ def confidence_above(tree: PolicyTree, *, lift_min: float = 0.0) -> Floats:
     Returns:
         Shape (n,); -inf where there is no such ancestor.
     """
-    counting = np.where(tree.lift >= lift_min, tree.confidence, -np.inf)
-    above = np.full(tree.n_nodes, -np.inf)
-    # By depth, so that a parent is final before its children ask.
-    by_depth = np.argsort(tree.depth, kind="stable")
-    ends = np.cumsum(np.bincount(tree.depth))
-    for start, end in pairwise(ends.tolist()):
-        level = by_depth[start:end]
-        parent = tree.parent[level]
-        above[level] = np.maximum(above[parent], counting[parent])
-    return above
+    if lift_min <= 0.0:
+        return tree.confidence_above
+    return highest_above(tree, np.where(tree.lift >= lift_min, tree.confidence, -np.inf))
 
 
 def threshold_landscape(
@@ -141,16 +133,14 @@ def threshold_landscape(
     confidences = _axis(confidences, "confidences")
     sums = [_sums(tree, supports, confidences, lift_min, max_depth) for tree in trees]
     parts = tuple(
-        _layers(supports, confidences, one, tree.source.steps, ())
+        _layers(supports, confidences, one, tree.source.steps)
         for one, tree in zip(sums, trees, strict=True)
     )
     if len(parts) == 1:
-        whole = _layers(supports, confidences, sums[0], trees[0].source.steps, parts)
-    else:
-        total = _Sums(*(np.sum(layer, axis=0) for layer in zip(*sums, strict=True)))
-        steps = sum(tree.source.steps for tree in trees)
-        whole = _layers(supports, confidences, total, steps, parts)
-    return whole
+        return replace(parts[0], dimensions=parts)
+    total = _Sums(*(np.sum(layer, axis=0) for layer in zip(*sums, strict=True)))
+    steps = sum(tree.source.steps for tree in trees)
+    return replace(_layers(supports, confidences, total, steps), dimensions=parts)
 
 
 class _Sums(NamedTuple):
@@ -181,24 +171,23 @@ def _sums(
     node, rows = rectangles.node[inside], rows[inside] - 1
     first, last = first[inside], last[inside]
     width = len(confidences) + 1  # one more column, for rectangles that reach the right edge
-    corners = np.concatenate([rows * width + first, rows * width + last])
-
-    def total(weights: NDArray[np.int64] | None) -> NDArray[np.int64]:
-        one = np.ones(len(node), dtype=np.int64) if weights is None else weights[node]
-        plane = np.zeros((len(supports), width), dtype=np.int64)
-        np.add.at(plane.reshape(-1), corners, np.concatenate([one, -one]))
-        # Along confidence from the left; along support from the largest downwards, because
-        # every rectangle begins at support 0. In place: fresh memory is what costs the time.
-        np.cumsum(plane, axis=1, out=plane)
-        from_top = plane[::-1]
-        np.cumsum(from_top, axis=0, out=from_top)
-        return plane[:, :-1]
-
-    return _Sums(total(None), total(tree.depth), total(tree.samples), total(tree.correct))
+    enters, leaves = rows * width + first, rows * width + last
+    planes = np.zeros((4, len(supports), width), dtype=np.int64)
+    each = np.ones(len(node), dtype=np.int64)
+    weights = (each, tree.depth[node], tree.samples[node], tree.correct[node])
+    for plane, weight in zip(planes.reshape(4, -1), weights, strict=True):
+        np.add.at(plane, enters, weight)
+        np.subtract.at(plane, leaves, weight)
+    # Along confidence from the left; along support from the largest downwards, because every
+    # rectangle begins at support 0. In place: fresh memory is what would cost the time.
+    np.cumsum(planes, axis=2, out=planes)
+    from_top = planes[:, ::-1]
+    np.cumsum(from_top, axis=1, out=from_top)
+    return _Sums(*planes[:, :, :-1])
 
 
 def _layers(
-    supports: Floats, confidences: Floats, sums: _Sums, steps: int, parts: tuple[Landscape, ...]
+    supports: Floats, confidences: Floats, sums: _Sums, steps: int
 ) -> Landscape:
     with np.errstate(invalid="ignore"):
         fidelity = sums.correct / sums.covered
@@ -211,7 +200,6 @@ def _layers(
         ),
         coverage=sums.covered / steps,
         fidelity=fidelity,
-        dimensions=parts,
     )
 
 

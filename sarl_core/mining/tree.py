@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +125,11 @@ class PolicyTree:
         shares = self.counts[0] / self.samples[0]
         return np.asarray(self.confidence / shares[self.label])
 
+    @cached_property
+    def confidence_above(self) -> NDArray[np.float64]:
+        """Highest confidence among the ancestors of each node, -inf at the root, (n,)."""
+        return highest_above(self, self.confidence)
+
     def path(self, node: int) -> tuple[int, ...]:
         """Node numbers from the root to a node, both included.
 
@@ -162,6 +168,27 @@ class PolicyTree:
         return walk(
             observations, self.feature, self.threshold, self.children_left, self.children_right
         )
+
+
+def highest_above(tree: PolicyTree, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The highest value among the ancestors of each node.
+
+    Args:
+        tree: With n nodes.
+        values: One a node, (n,).
+
+    Returns:
+        Shape (n,); -inf at the root.
+    """
+    above = np.full(tree.n_nodes, -np.inf)
+    # By depth, so that a parent is final before its children ask.
+    by_depth = np.argsort(tree.depth, kind="stable")
+    ends = np.cumsum(np.bincount(tree.depth))
+    for start, end in pairwise(ends.tolist()):
+        level = by_depth[start:end]
+        parent = tree.parent[level]
+        above[level] = np.maximum(above[parent], values[parent])
+    return above
 
 
 def walk(
