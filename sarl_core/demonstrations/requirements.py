@@ -84,8 +84,10 @@ def require_within(
     Raises:
         InputError: With the column and the first row.
     """
-    # In float32, as the environment compares them.
-    outside = (values < np.asarray(low, np.float32)) | (values > np.asarray(high, np.float32))
+    with np.errstate(over="ignore"):  # a bound beyond float32 bounds nothing
+        # In float32, as the environment compares them.
+        least, most = np.asarray(low, dtype=np.float32), np.asarray(high, dtype=np.float32)
+    outside = (values < least) | (values > most)
     if outside.any():
         row, i = _first(outside)
         raise InputError(
@@ -174,7 +176,7 @@ def whole_numbers(
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(f"{column} is {values[row]} in row {_number(row, rows)}; "
-                         "number them 0, 1, 2, ...")
+                         "use whole numbers from 0")
     return frozen(values, np.int64)
 
 

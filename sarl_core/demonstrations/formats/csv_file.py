@@ -210,8 +210,11 @@ def _as_text(data: memoryview) -> memoryview:
             raise InputError(f"it is text in {encoding}; save it as UTF-8")
     if bytes(data[:3]) == codecs.BOM_UTF8:
         data = data[3:]
-    if re.search(rb"\0", data):
+    codes = np.frombuffer(data, dtype=np.uint8)
+    if codes.size and codes.min() == 0:
         raise InputError("it is no text; give a CSV file in UTF-8")
+    if codes.size == 0 or codes.max() < 128:  # ASCII, which is UTF-8; decoding would take longer
+        return data
     try:
         codecs.utf_8_decode(data, "strict", True)
     except UnicodeDecodeError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.errors import InputError
 
-MAX_UNPACKED = 4 * 2**30  # bytes; a million steps of a hundred float64 features take 0.8 * 10**9
+MAX_UNPACKED = 2**30  # bytes; a million steps of a hundred float64 features take 0.8 * 10**9
 
 
 def too_large(size: int) -> InputError:

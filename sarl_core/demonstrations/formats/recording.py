@@ -95,7 +95,7 @@ def to_demonstrations(
     observations = _owned(recording.observations, np.float32)
     require_finite(observations, recording.observation_columns, recording.rows)
     recording = _without_last_observations(
-        _in_episodes(_checked(replace(recording, observations=observations)))
+        _checked(replace(recording, observations=observations))
     )
     discrete, note = _is_discrete(recording, described)
     notes = recording.notes if note is None else (*recording.notes, note)
@@ -115,7 +115,7 @@ def to_demonstrations(
 
 
 def _some(episodes: NDArray[Any] | None) -> NDArray[Any]:
-    assert episodes is not None  # _in_episodes has seen to it
+    assert episodes is not None  # _in_episodes has numbered them
     return episodes
 
 
@@ -189,12 +189,8 @@ def _order(names: tuple[str, ...] | None, wanted: tuple[str, ...]) -> list[int] 
 
 
 def _checked(recording: Recording) -> Recording:
-    """Check what there is beside observations and actions, under the file's own names."""
-    n, rows = len(recording.actions), recording.rows
-
-    def called(role: str) -> str:
-        return recording.names.get(role, f"column {role!r}")
-
+    """Number the episodes and check what else there is, under the file's own names."""
+    n = len(recording.actions)
     found: dict[str, Any] = {}
     for attribute, role, check in (
         ("episodes", "episode", whole_numbers), ("steps", "step", whole_numbers),
@@ -202,12 +198,18 @@ def _checked(recording: Recording) -> Recording:
         ("terminated", "terminated", flags), ("truncated", "truncated", flags),
     ):
         values = getattr(recording, attribute)
-        found[attribute] = None if values is None else check(values, n, called(role), rows)
-    if found["episodes"] is not None:
-        require_order(
-            found["episodes"], found["steps"], (called("episode"), called("step")), rows
-        )
-    return replace(recording, **found)
+        if values is not None:
+            found[attribute] = check(values, n, _called(recording, role), recording.rows)
+    recording = _in_episodes(replace(recording, **found))
+    require_order(
+        _some(recording.episodes), recording.steps,
+        (_called(recording, "episode"), _called(recording, "step")), recording.rows,
+    )
+    return recording
+
+
+def _called(recording: Recording, role: str) -> str:
+    return recording.names.get(role, f"column {role!r}")
 
 
 def _in_episodes(recording: Recording) -> Recording:

@@ -1,0 +1,357 @@
+"""Files that must be refused with one sentence; the command line, pages and readers test them.
+
+`BAD_INPUTS` maps a name to the file's name, its content, and fragments of the sentence.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+import struct
+import zipfile
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+HEADER = "episode,step,obs_x,obs_y,action"
+ROWS = ("0,0,0.5,1.5,0", "0,1,0.25,1.25,1", "0,2,0.125,1.0,0", "1,0,0.75,0.5,1", "1,1,0.0,0.25,1")
+
+
+def csv_bytes(*rows: str, header: str | None = HEADER) -> bytes:
+    lines = rows if header is None else (header, *rows)
+    return ("\n".join(lines) + "\n").encode()
+
+
+def changed(row: int, text: str) -> bytes:
+    """The good CSV with one data row (from 1) replaced."""
+    rows = list(ROWS)
+    rows[row - 1] = text
+    return csv_bytes(*rows)
+
+
+def good_columns() -> dict[str, Any]:
+    return {
+        "episode": [0, 0, 0, 1, 1], "step": [0, 1, 2, 0, 1],
+        "obs_x": [0.5, 0.25, 0.125, 0.75, 0.0], "obs_y": [1.5, 1.25, 1.0, 0.5, 0.25],
+        "action": [0, 1, 0, 1, 1],
+    }
+
+
+def parquet_bytes(columns: dict[str, Any] | pa.Table | None = None, metadata: str = "") -> bytes:
+    table = columns if isinstance(columns, pa.Table) else pa.table(columns or good_columns())
+    if metadata:
+        table = table.replace_schema_metadata({"sarl": metadata})
+    out = io.BytesIO()
+    pq.write_table(table, out)
+    return out.getvalue()
+
+
+def npz_bytes(**arrays: Any) -> bytes:
+    out = io.BytesIO()
+    np.savez(out, **arrays)
+    return out.getvalue()
+
+
+def good_arrays() -> dict[str, Any]:
+    columns = good_columns()
+    return {
+        "observations": np.array([columns["obs_x"], columns["obs_y"]], np.float32).T,
+        "actions": np.array(columns["action"]), "episodes": np.array(columns["episode"]),
+    }
+
+
+def with_value(name: str, row: int, value: Any) -> dict[str, Any]:
+    """The good columns with one value (row from 1) replaced."""
+    columns = good_columns()
+    columns[name] = [*columns[name][: row - 1], value, *columns[name][row:]]
+    return columns
+
+
+class Payload:
+    """Pickled, it creates a file when it is unpickled."""
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, str]]:
+        return open, (self.path, "w")
+
+
+def malicious_npz(path: str) -> bytes:
+    """NPZ whose actions are a pickle that creates the file `path`."""
+    arrays = good_arrays()
+    arrays["actions"] = np.array([Payload(path)] * 5, dtype=object)
+    return npz_bytes(**arrays)
+
+
+def zip_bomb(*, says: int) -> bytes:
+    """A few kilobytes that unpack to 16 MiB of zeros, whatever their directory says."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("actions.npy", npy(np.zeros(5, np.int64)))
+        archive.writestr("observations.npy", npy_header((2**20, 2)) + bytes(2**24))
+    content = bytearray(out.getvalue())
+    directory = content.rindex(b"PK\x01\x02")
+    # The unpacked size that readers go by stands 24 bytes into the entry of the directory.
+    content[directory + 24 : directory + 28] = struct.pack("<I", says)
+    return bytes(content)
+
+
+def npy_header(shape: tuple[int, ...]) -> bytes:
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f8", "fortran_order": False, "shape": shape}
+    )
+    return header.getvalue()
+
+
+def zipped(**contents: bytes) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in contents.items():
+            archive.writestr(f"{name}.npy", content)
+    return out.getvalue()
+
+
+def npy(array: Any) -> bytes:
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
+def _wide(count: int) -> bytes:
+    header = ",".join([*(f"obs_{i}" for i in range(count - 1)), "action"])
+    return csv_bytes(*[",".join(["0"] * count)] * 2, header=header)
+
+
+_GOOD_METADATA = (
+    '{"features": [{"name": "x", "unit": "m"}, {"name": "y"}], "action_names": ["push"], '
+    '"label_names": [["left", "right"]], "label_first": [0]}'
+)
+
+BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
+    # Nothing in it
+    "empty csv": ("demo.csv", b"", ("empty",)),
+    "empty parquet": ("demo.parquet", b"", ("empty",)),
+    "empty npz": ("demo.npz", b"", ("empty",)),
+    "white space csv": ("demo.csv", b" \n\n  \n", ("white space",)),
+    "header only csv": ("demo.csv", csv_bytes(), ("no steps", "header")),
+    "no rows parquet": (
+        "demo.parquet", parquet_bytes(pa.table(good_columns()).slice(0, 0)), ("no steps",)
+    ),
+    "no rows npz": (
+        "demo.npz", npz_bytes(observations=np.zeros((0, 2)), actions=np.zeros(0, int)),
+        ("no steps",),
+    ),
+    "one row csv": ("demo.csv", csv_bytes(ROWS[0]), ("one observation only",)),
+    "one row parquet": (
+        "demo.parquet", parquet_bytes(pa.table(good_columns()).slice(0, 1)),
+        ("one observation only",),
+    ),
+    "one row npz": (
+        "demo.npz", npz_bytes(observations=np.zeros((1, 2)), actions=np.zeros(1, int)),
+        ("one observation only",),
+    ),
+    # Columns
+    "no action column csv": (
+        "demo.csv", csv_bytes("1,2", "3,4", header="obs_x,obs_y"), ("no action", "'obs_x'")
+    ),
+    "no action column parquet": (
+        "demo.parquet", parquet_bytes({"obs_x": [1.0, 2.0]}), ("no action", "'obs_x'")
+    ),
+    "no actions npz": ("demo.npz", npz_bytes(obs=np.zeros((5, 2))), ("no actions", "'obs'")),
+    "no observation column csv": (
+        "demo.csv", csv_bytes("0,1", "0,0", header="episode,action"), ("no observation",)
+    ),
+    "missing numbered column csv": (
+        "demo.csv", csv_bytes("0,1,0", "0,1,1", header="obs_0,obs_2,action"), ("'obs_1'", "missing")
+    ),
+    "missing column of the metadata parquet": (
+        "demo.parquet",
+        parquet_bytes({k: v for k, v in good_columns().items() if k != "obs_y"}, _GOOD_METADATA),
+        ("'obs_y'", "missing"),
+    ),
+    "doubled column csv": (
+        "demo.csv", csv_bytes("0,1,0", "0,1,1", header="obs_x,obs_x,action"), ("'obs_x'", "twice")
+    ),
+    "doubled column parquet": (
+        "demo.parquet",
+        parquet_bytes(pa.Table.from_arrays(
+            [pa.array([1.0, 2.0])] * 2 + [pa.array([0, 1])], names=["obs_x", "obs_x", "action"]
+        )),
+        ("'obs_x'", "twice"),
+    ),
+    "unclear columns csv": (
+        "demo.csv", csv_bytes("0,1,1,0", "1,2,1,1", header="x,seed,y,action"), ("unclear", "'x'")
+    ),
+    "no header csv": ("demo.csv", csv_bytes(*ROWS, header=None), ("no header", "5 columns")),
+    "ten thousand columns csv": ("demo.csv", _wide(10_000), ("10,000 columns",)),
+    "ten thousand columns parquet": (
+        "demo.parquet",
+        parquet_bytes({**{f"obs_{i}": [0.0, 1.0] for i in range(9_999)}, "action": [0, 1]}),
+        ("10,000 columns",),
+    ),
+    "ten thousand columns npz": (
+        "demo.npz", npz_bytes(observations=np.zeros((2, 10_000)), actions=np.zeros(2, int)),
+        ("10,000 features",),
+    ),
+    # Rows
+    "short row csv": ("demo.csv", changed(3, "0,2,0.1,1.0"), ("row 3", "line 4", "4 fields")),
+    "long row csv": ("demo.csv", changed(5, "1,1,0,0,1,9"), ("row 5", "line 6", "6 fields")),
+    "text in a number csv": (
+        "demo.csv", changed(2, "0,1,0.25,abc,1"), ("'obs_y'", "'abc'", "row 2", "line 3")
+    ),
+    "text in an action csv": (
+        "demo.csv", changed(4, "1,0,1,1,left"), ("'action'", "'left'", "row 4")
+    ),
+    "date in a number csv": (
+        "demo.csv", csv_bytes("2020-01-01,0", "2020-01-02,1", header="obs_x,action"),
+        ("'obs_x'", "'2020-01-01'", "row 1"),
+    ),
+    "text in a number parquet": (
+        "demo.parquet", parquet_bytes(good_columns() | {"obs_y": ["a", "b", "c", "d", "e"]}),
+        ("'obs_y'", "'a'", "row 1"),
+    ),
+    "text in a number npz": (
+        "demo.npz", npz_bytes(**good_arrays() | {"observations": np.array([["a", "b"]] * 5)}),
+        ("'observations'", "no numbers"),
+    ),
+    "empty field csv": ("demo.csv", changed(3, "0,2,,1.0,0"), ("'obs_x'", "empty", "row 3")),
+    "empty field parquet": (
+        "demo.parquet", parquet_bytes(with_value("obs_x", 3, None)), ("'obs_x'", "empty", "row 3")
+    ),
+    "empty quoted field csv": ("demo.csv", changed(3, '0,2,"",1.0,0'), ("'obs_x'", "row 3")),
+    "empty action csv": ("demo.csv", changed(2, "0,1,1,1,"), ("'action'", "empty", "row 2")),
+    "NaN csv": ("demo.csv", changed(4, "1,0,nan,1,0"), ("'obs_x'", "not a number", "row 4")),
+    "NaN parquet": (
+        "demo.parquet", parquet_bytes(with_value("obs_x", 4, float("nan"))),
+        ("'obs_x'", "not a number", "row 4"),
+    ),
+    "NaN npz": (
+        "demo.npz",
+        npz_bytes(**good_arrays() | {"observations": np.diag([1, 2, np.nan, 4, 5])}),
+        ("column 2 of 'observations'", "not a number", "row 3"),
+    ),
+    "infinity csv": ("demo.csv", changed(1, "0,0,1,-inf,0"), ("'obs_y'", "infinite", "row 1")),
+    "infinity parquet": (
+        "demo.parquet", parquet_bytes(with_value("obs_y", 5, float("inf"))),
+        ("'obs_y'", "infinite", "row 5"),
+    ),
+    "beyond float32 csv": (
+        "demo.csv", changed(2, "0,1,1e39,1,0"), ("'obs_x'", "infinite", "row 2")
+    ),
+    "NaN reward csv": (
+        "demo.csv", csv_bytes("0,1,0", "0,nan,1", header="obs_x,reward,action"),
+        ("'reward'", "not a number", "row 2"),
+    ),
+    "different lengths npz": (
+        "demo.npz", npz_bytes(observations=np.zeros((9, 2)), actions=np.zeros(5, int)),
+        ("5 actions", "9 observations"),
+    ),
+    # Actions
+    "negative action csv": ("demo.csv", changed(3, "0,2,1,1,-1"), ("'action'", "-1", "row 3")),
+    "negative action parquet": (
+        "demo.parquet", parquet_bytes(with_value("action", 3, -1)), ("'action'", "-1", "row 3")
+    ),
+    "huge action csv": (
+        "demo.csv", changed(3, "0,2,1,1,9223372036854775807"), ("'action'", "row 3")
+    ),
+    "action beyond its labels parquet": (
+        "demo.parquet", parquet_bytes(with_value("action", 4, 2), _GOOD_METADATA),
+        ("'action'", "is 2", "row 4", "0 to 1"),
+    ),
+    "true and false actions csv": (
+        "demo.csv", csv_bytes("1,true", "2,false", header="obs_x,action"), ("'action'", "true")
+    ),
+    "true and false actions parquet": (
+        "demo.parquet", parquet_bytes({"obs_x": [1.0, 2.0], "action": [True, False]}),
+        ("'action'", "true"),
+    ),
+    "true and false actions npz": (
+        "demo.npz", npz_bytes(**good_arrays() | {"actions": np.ones(5, bool)}),
+        ("'actions'", "true"),
+    ),
+    # Episodes and steps
+    "steps out of order csv": ("demo.csv", changed(3, "0,1,0,1,0"), ("'step'", "row 3", "sort")),
+    "steps out of order parquet": (
+        "demo.parquet", parquet_bytes(with_value("step", 2, 7)), ("'step'", "row 3")
+    ),
+    "episode comes back csv": ("demo.csv", changed(5, "0,3,0,1,0"), ("'episode'", "row 5")),
+    "negative episode csv": ("demo.csv", changed(1, "-1,0,0,1,0"), ("'episode'", "-1", "row 1")),
+    "half an episode csv": ("demo.csv", changed(1, "0.5,0,0,1,0"), ("'episode'", "0.5", "row 1")),
+    "huge episode csv": (
+        "demo.csv", changed(5, "99999999999999999999,1,0,1,0"), ("'episode'", "row 5")
+    ),
+    "done is two csv": (
+        "demo.csv", csv_bytes("1,0,0", "2,2,1", header="obs_x,done,action"), ("'done'", "row 2")
+    ),
+    # Files that are something else
+    "pickle npz": ("demo.npz", pickle.dumps([1, 2]), ("pickle", "never opened")),
+    "object array npz": (
+        "demo.npz", npz_bytes(**good_arrays() | {"actions": np.array([0, None, 1, 1, 1])}),
+        ("'actions'", "pickle", "never opened"),
+    ),
+    "single array npz": ("demo.npz", npy(np.zeros((5, 2))), ("single NumPy array",)),
+    "image npz": (
+        "demo.npz",
+        npz_bytes(observations=np.zeros((5, 8, 8, 3), np.uint8), actions=np.zeros(5, int)),
+        ("8x8x3", "images"),
+    ),
+    "zip bomb npz": ("demo.npz", zip_bomb(says=2**32 - 2), ("unpacks to", "GiB")),
+    "lying zip npz": ("demo.npz", zip_bomb(says=2**10), ("damaged",)),
+    "truncated npz": ("demo.npz", npz_bytes(**good_arrays())[:-40], ("damaged",)),
+    "shape beyond its content npz": (
+        "demo.npz",
+        zipped(observations=npy_header((10**12, 10**5)) + bytes(80), actions=npy(np.zeros(5))),
+        ("'observations'", "cut off"),
+    ),
+    "csv named parquet": ("demo.parquet", csv_bytes(*ROWS), ("not Parquet", ".csv")),
+    "csv named npz": ("demo.npz", csv_bytes(*ROWS), ("not NPZ", ".csv")),
+    "parquet named csv": ("demo.csv", parquet_bytes(), ("Parquet", ".parquet")),
+    "npz named csv": ("demo.csv", npz_bytes(**good_arrays()), ("ZIP", ".npz")),
+    "npz named parquet": ("demo.parquet", npz_bytes(**good_arrays()), ("ZIP", ".npz")),
+    "parquet named npz": ("demo.npz", parquet_bytes(), ("Parquet", ".parquet")),
+    "unknown extension": ("demo.xlsx", csv_bytes(*ROWS), ("'.xlsx'", ".parquet")),
+    "no extension": ("demo", csv_bytes(*ROWS), ("no extension",)),
+    "latin-1 csv": (
+        "demo.csv", csv_bytes(*ROWS, header=HEADER.replace("y", "ü")).replace(b"\xc3\xbc", b"\xfc"),
+        ("not UTF-8", "line 1"),
+    ),
+    "UTF-16 csv": ("demo.csv", csv_bytes(*ROWS).decode().encode("utf-16"), ("UTF-16", "UTF-8")),
+    "binary csv": ("demo.csv", bytes(range(1, 250)) + b"\0" * 9, ("no text",)),
+    "open quotation mark csv": ("demo.csv", changed(2, '0,1,"0.25,1.25,1'), ("row 2",)),
+    "truncated parquet": ("demo.parquet", parquet_bytes()[:-20], ("cut off",)),
+    "damaged parquet": ("demo.parquet", b"PAR1" + b"\7" * 99 + b"PAR1", ("damaged",)),
+    "list column parquet": (
+        "demo.parquet", parquet_bytes({"obs": [[1.0, 2.0], [3.0, 4.0]], "action": [0, 1]}),
+        ("'obs'", "list"),
+    ),
+    "struct column parquet": (
+        "demo.parquet", parquet_bytes({"obs_x": [{"a": 1.0}, {"a": 2.0}], "action": [0, 1]}),
+        ("'obs_x'", "struct"),
+    ),
+    # Metadata
+    "metadata no JSON parquet": (
+        "demo.parquet", parquet_bytes(metadata='{"features": '), ("'sarl'", "not JSON")
+    ),
+    "metadata twice parquet": (
+        "demo.parquet", parquet_bytes(metadata='{"agent": "a", "agent": "b"}'),
+        ("'sarl'", "'agent' twice"),
+    ),
+    "metadata of another form parquet": (
+        "demo.parquet", parquet_bytes(metadata='{"features": {"x": 1}}'), ("'sarl'", "'features'")
+    ),
+    "metadata with infinity parquet": (
+        "demo.parquet", parquet_bytes(metadata='{"action_low": [-Infinity]}'),
+        ("'sarl'", "Infinity"),
+    ),
+    "metadata of a later version parquet": (
+        "demo.parquet", parquet_bytes(metadata='{"version": 9}'), ("'sarl'", "version 9")
+    ),
+    "metadata no text npz": (
+        "demo.npz", npz_bytes(**good_arrays(), sarl=np.zeros(3)), ("'sarl'",)
+    ),
+}
