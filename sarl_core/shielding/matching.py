@@ -17,7 +17,9 @@ from sarl_core.mining.rules import Rule
 
 _NO_RULE = -1
 # States walked together: few enough for the processor's cache, enough to be worth a call.
-_BLOCK = 8192
+_BLOCK = 32_768
+# Levels they walk before those that have reached a leaf are taken out.
+_LEVELS = 4
 
 Numbered = tuple[int, Rule]
 
@@ -44,14 +46,26 @@ class Matcher:
             nodes: The tree of the others, root first.
         """
         self._scanned = list(scanned)
-        # One flat list for single states: nothing is faster in plain Python.
-        self._nodes = list(nodes)
-        self._feature = np.array([node.feature for node in nodes], dtype=np.int64)
-        self._threshold = np.array([node.threshold for node in nodes], dtype=np.float64)
-        self._children = np.array(
-            [(node.left, node.right) for node in nodes], dtype=np.int64
-        ).reshape(-1)
+        # For single states one flat list of bare tuples (a leaf's rule stands where its left
+        # child would): nothing is faster in plain Python.
+        self._nodes = [
+            (node.feature, node.threshold, node.rule if node.feature < 0 else node.left, node.right)
+            for node in nodes
+        ]
+        # For many states arrays. A leaf leads to itself, and asks what changes no margin.
         self._rule = np.array([node.rule for node in nodes], dtype=np.int64)
+        self._ends = np.array([node.feature < 0 for node in nodes])
+        self._feature = np.array([max(node.feature, 0) for node in nodes], dtype=np.int64)
+        self._threshold = np.array(
+            [np.inf if node.feature < 0 else node.threshold for node in nodes], dtype=np.float64
+        )
+        self._children = np.array(
+            [
+                (place, place) if node.feature < 0 else (node.left, node.right)
+                for place, node in enumerate(nodes)
+            ],
+            dtype=np.int64,
+        ).reshape(-1)
 
     @classmethod
     def of(cls, rules: Sequence[Numbered]) -> Matcher:
@@ -92,18 +106,20 @@ class Matcher:
             else:
                 return index, margin
         nodes = self._nodes
-        feature, threshold, left, right, found = nodes[0]
+        # Least distance upwards and downwards, each in the sign it comes with.
+        above, below = margin, -margin
+        feature, threshold, left, right = nodes[0]
         while feature >= 0:
             gap = state[feature] - threshold
             if gap <= 0:
-                if -gap < margin:
-                    margin = -gap
-                feature, threshold, left, right, found = nodes[left]
+                if gap > below:
+                    below = gap
+                feature, threshold, left, right = nodes[left]
             else:
-                if gap < margin:
-                    margin = gap
-                feature, threshold, left, right, found = nodes[right]
-        return (found if found >= 0 else None), margin
+                if gap < above:
+                    above = gap
+                feature, threshold, left, right = nodes[right]
+        return (left if left >= 0 else None), (above if above < -below else -below)
 
     def match_batch(
         self, states: NDArray[np.float32]
@@ -133,7 +149,7 @@ class Matcher:
             holding = left
             for feature, op, threshold in rule.conditions:
                 gap = states[holding, feature] - np.float64(threshold)
-                margins[holding] = np.minimum(margins[holding], np.abs(gap))
+                margins[holding] = np.fmin(margins[holding], np.abs(gap))
                 holding = holding[(gap <= 0) == (op == "<=")]
             rules[holding] = index
             left = left[rules[left] == _NO_RULE]
@@ -144,21 +160,21 @@ class Matcher:
         margins: NDArray[np.float64],
     ) -> None:
         """Walk the tree from its root with some rows; fill in where they end."""
-        flat, width = states.ravel(), states.shape[1]
+        flat, first = states.ravel(), rows * states.shape[1]
         nodes = np.zeros(len(rows), dtype=np.int64)
         near = margins[rows]
         while len(rows):
-            feature = self._feature[nodes]
-            ended = feature < 0
-            if ended.any():
-                rules[rows[ended]] = self._rule[nodes[ended]]
-                margins[rows[ended]] = near[ended]
-                going = ~ended
-                rows, nodes, near = rows[going], nodes[going], near[going]
-                feature = feature[going]
-            gap = flat[rows * width + feature] - self._threshold[nodes]
-            near = np.minimum(near, np.abs(gap))
-            nodes = self._children[2 * nodes + (gap > 0)]
+            for _ in range(_LEVELS):
+                value = flat.take(first + self._feature.take(nodes))
+                gap = value - self._threshold.take(nodes)
+                np.fmin(near, np.abs(gap), out=near)
+                nodes = self._children.take(2 * nodes + ~(gap <= 0))
+            ended = self._ends.take(nodes)
+            done, going = np.flatnonzero(ended), np.flatnonzero(~ended)
+            rules[rows.take(done)] = self._rule.take(nodes.take(done))
+            margins[rows.take(done)] = near.take(done)
+            rows, first = rows.take(going), first.take(going)
+            nodes, near = nodes.take(going), near.take(going)
 
 
 def _tree_of(rules: Sequence[Numbered]) -> list[_Node] | None:
