@@ -42,3 +42,4 @@ PAGES = [
 page = st.navigation(PAGES)
 state.sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()
+state.settle(page.title)

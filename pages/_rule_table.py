@@ -7,18 +7,27 @@ from typing import Any
 
 import streamlit as st
 
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.language import action_text
 from sarl_core.explaining.tables import rule_columns
 from sarl_core.mining.rules import Rule, RuleSet
 
 ROW_HEIGHT = 35
 
 
-def column_config() -> dict[str, Any]:
+def column_config(rule_set: RuleSet) -> dict[str, Any]:
     """What the columns look like; all have help that says what they mean."""
     column = st.column_config
+    colours = {
+        action_text(label, dimension): label_colour(label)
+        for dimension in rule_set.actions for label in range(dimension.n_labels)
+    }
     return {
         "If": column.TextColumn(width="large", help="When the rule applies"),
-        "Then": column.TextColumn(width="medium", help="What the expert does there"),
+        "Then": column.MultiselectColumn(
+            width="medium", help="What the expert does there", options=list(colours),
+            color=list(colours.values()),
+        ),
         "Support": column.NumberColumn(
             format="%.4f", help="Share of all states to which the rule applies"
         ),
@@ -44,7 +53,10 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
     """Rules as a data frame, its index their place in the order given."""
     import pandas as pd
 
-    return pd.DataFrame(rule_columns(rules, rule_set))
+    columns = rule_columns(rules, rule_set)
+    # A list of one, which the table shows in the action's colour.
+    columns["Then"] = [[action] for action in columns["Then"]]
+    return pd.DataFrame(columns)
 
 
 def table_height(rows: int, most: int) -> int:

@@ -7,6 +7,7 @@ a table) go through `url_choice`.
 
 from __future__ import annotations
 
+import gc
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -308,6 +309,21 @@ def largest_rules(
 ) -> RuleSet:
     """The rules with the most support, without making the rest of a large set."""
     return _top_rules(_key(grown), thresholds, most, grown)
+
+
+@st.cache_resource(show_spinner=False)
+def settle(page: str) -> None:
+    """Take what a page's first visit has loaded out of the garbage collector's sight.
+
+    Streamlit collects all garbage after every run, and once more before a run that a callback asks
+    for. Libraries and trees are here to stay; looking through them each time takes longer than
+    everything that follows from a moved slider.
+
+    Args:
+        page: Its title; once for each.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 # --- how it looks ------------------------------------------------------------------------------

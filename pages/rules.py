@@ -1,5 +1,228 @@
-"""Page under construction."""
+"""Rules: every rule in plain language, with the evidence behind it."""
 
+from __future__ import annotations
+
+import _state as state
 import streamlit as st
+from _rule_table import column_config, frame, table_height
+
+from sarl_core.explaining import rule_figures as figures
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
+from sarl_core.explaining.exports import rules_to_csv, rules_to_text
+from sarl_core.explaining.language import action_text, conditions_text, sentence, share_text
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
+
+TABLE_ROWS = 8
+FEATURES_SHOWN = 12
+WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
+
+demonstrations = state.require_demonstrations()
+grown = state.trees(demonstrations, state.chosen_divider())
+thresholds = state.chosen_thresholds()
+
+
+@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+def table_of(key: tuple[str, int, object], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], object]:
+    """All rules, the most support first, and the same as a data frame."""
+    rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
+    return rules, frame(rules, _rule_set)
+
+
+def downloads(rule_set: RuleSet) -> None:
+    """The whole rule set as files, made when asked for."""
+    name = f"rules-{demonstrations.env_id or 'unnamed'}"
+    with st.container(horizontal=True, gap="small"):
+        for kind, mime, make in (
+            ("JSON", "application/json", rules_to_json), ("CSV", "text/csv", rules_to_csv),
+            ("Text", "text/plain", rules_to_text),
+        ):
+            suffix = "txt" if kind == "Text" else kind.lower()
+            st.download_button(
+                kind, data=lambda make=make: make(rule_set).encode(), mime=mime,
+                file_name=f"{name}.{suffix}", on_click="ignore", icon=":material/download:",
+                key=f"download_{suffix}",
+                help=f"All {len(rule_set):,} rules" if len(rule_set) != 1 else "The one rule",
+            )
+
+
+def nothing_in_force() -> None:
+    """What to do where no rule is in force."""
+    st.info(
+        f"No part of the tree has a support of at least {thresholds.support:g} and a confidence "
+        f"of at least {thresholds.confidence:g}, so there is no rule. Lower one of them on the "
+        "Thresholds page, whose maps show where there are rules.",
+        icon=":material/filter_alt_off:",
+    )
+    st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
+
+
+def pick(shown: list[int], rules: tuple[Rule, ...]) -> None:
+    """Choose the rule whose row was selected."""
+    rows = st.session_state["rule_table"].selection.rows
+    if rows and rows[0] < len(shown):
+        state.set_url_choice("rule", rules[shown[rows[0]]].id)
+
+
+def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
+    """Places of the rules that the search and the choice of action let through."""
+    names = list(dict.fromkeys(
+        action_text(label, dimension)
+        for dimension in rule_set.actions for label in range(dimension.n_labels)
+    ))
+    with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
+        words = st.text_input(
+            "Search", key="search", bind="query-params", icon=":material/search:", width=300,
+            placeholder="a feature, an action, a number", label_visibility="collapsed",
+        )
+        action = st.selectbox(
+            "Action", ["every action", *names], key="action", bind="query-params", width=220,
+            label_visibility="collapsed",
+        )
+        downloads(rule_set)
+    wanted = (words or "").lower().split()
+    places = []
+    for place, rule in enumerate(rules):
+        does = action_text(rule.action, rule_set.actions[rule.dimension])
+        if action not in ("every action", does):
+            continue
+        if wanted:
+            text = f"{conditions_text(rule, rule_set)} {does} {rule.id}".lower()
+            if not all(word in text for word in wanted):
+                continue
+        places.append(place)
+    return places
+
+
+def show_table(rule_set: RuleSet) -> Rule | None:
+    """The table of all rules; returns the chosen one."""
+    key = (rule_set.source.digest, rule_set.divider, thresholds)
+    rules, table = table_of(key, rule_set)
+    shown = matching(rules, rule_set)
+    chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
+    if not shown:
+        st.info("No rule matches the search; clear it to see all.", icon=":material/search_off:")
+        return None
+    place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
+    st.dataframe(
+        table.iloc[shown], hide_index=True,  # type: ignore[attr-defined]
+        column_config=column_config(rule_set), height=table_height(len(shown), TABLE_ROWS),
+        key="rule_table", on_select=lambda: pick(shown, rules), selection_mode="single-row",
+        selection_default={"selection": {"rows": [] if place is None else [place]}},
+        alt="All rules in force",
+    )
+    count = f"{len(rules):,} rules" if len(rules) > 1 else "One rule"
+    st.caption(
+        (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
+        + "Click a heading to sort, the box at the left of a row to see the rule below."
+    )
+    return next(rule for rule in rules if rule.id == chosen_id)
+
+
+def show_rule(rule: Rule, rule_set: RuleSet) -> None:
+    """One rule and everything behind it."""
+    tree = grown[rule.dimension]
+    node = node_of(rule)
+    with st.container(border=True, key="sentence"):
+        st.markdown(f"#### {escape_markdown(sentence(rule, rule_set))}")
+        st.caption(
+            f"Rule {rule.id} · support {share_text(rule.support)} · confidence "
+            f"{share_text(rule.confidence)} · lift {rule.lift:.2f} · joint support "
+            f"{share_text(rule.joint_support)} · {rule.length} queries on "
+            f"{rule.merged_length} features"
+        )
+        if not rule.conditions:
+            st.info(
+                "This rule has no conditions: over all states the expert's most frequent action "
+                "is already as frequent as the minimum confidence asks, so the tree is cut at "
+                "its root. Raise the minimum confidence to see what it depends on.",
+                icon=":material/lightbulb:",
+            )
+    left, right = st.columns([6, 7], gap="medium")
+    with left:
+        st.subheader("From the root to the rule")
+        st.html(figures.path_table(path_steps(tree, node), tree.dimension))
+    with right:
+        show_tree(rule)
+    if rule.conditions:
+        show_features(rule)
+    show_examples(rule)
+
+
+def escape_markdown(text: str) -> str:
+    """Text whose signs Markdown leaves alone: names come from files."""
+    return "".join(f"\\{sign}" if sign in "\\`*_{}[]<>#+-!|$~:^" else sign for sign in text)
+
+
+def show_tree(rule: Rule) -> None:
+    """The path lit in the tree."""
+    tree = grown[rule.dimension]
+    st.subheader("Its place in the tree")
+    view = st.segmented_control(
+        "Tree", [WHOLE_TREE, AROUND], default=WHOLE_TREE, key="tree", bind="query-params",
+        required=True, label_visibility="collapsed",
+    )
+    cut = cut_nodes(
+        tree, supp_min=thresholds.support, conf_min=thresholds.confidence,
+        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+    )
+    st.plotly_chart(
+        figures.tree_figure(tree, cut, node_of(rule), around=view == AROUND,
+                            dark=state.is_dark()),
+        key="tree_figure", config={"displaylogo": False, "scrollZoom": True},
+        alt="The decision tree with the path of the rule",
+    )
+    st.caption(
+        f"{tree.n_nodes:,} nodes; each box is as wide as its share of the states. Rules are full "
+        "in colour, what is cut off below them is grey. Drag or scroll to zoom, double-click to "
+        "go back."
+    )
+
+
+def show_features(rule: Rule) -> None:
+    """The interval on each feature against its distribution."""
+    st.subheader("What it asks, feature by feature")
+    st.caption("Grey: all states. In colour: the states of the rule. Shaded: the interval.")
+    colour = label_colour(rule.action)
+    found = feature_evidence(demonstrations, grown[rule.dimension], rule)
+    for start in range(0, min(len(found), FEATURES_SHOWN), 3):
+        for column, one in zip(st.columns(3), found[start : start + 3], strict=False):
+            feature = demonstrations.features[one.feature]
+            with column:
+                st.markdown(f"**{escape_markdown(figures.interval_text(one, feature))}**")
+                st.plotly_chart(
+                    figures.feature_figure(one, feature, colour), key=f"feature_{one.feature}",
+                    config={"displayModeBar": False},
+                    alt=f"{feature.name}: all states and those of the rule",
+                )
+    if len(found) > FEATURES_SHOWN:
+        st.caption(f"The first {FEATURES_SHOWN} of {len(found)} features.")
+
+
+def show_examples(rule: Rule) -> None:
+    """Some states to which the rule applies."""
+    import pandas as pd
+
+    columns = example_columns(demonstrations, grown[rule.dimension], rule)
+    count = len(columns["Step"])
+    st.subheader("Example states" if count > 1 else "The one state it applies to")
+    st.dataframe(
+        pd.DataFrame(columns), hide_index=True, height=table_height(count, 10), key="examples",
+        column_config={
+            name: st.column_config.NumberColumn(format="%.4g")
+            for name in list(columns)[4:]
+        },
+        alt="States to which the rule applies",
+    )
+
 
 st.title("Rules")
+with st.spinner("Mining the rules …"):
+    in_force = state.rule_set(grown, thresholds)
+if not in_force.rules:
+    nothing_in_force()
+else:
+    chosen = show_table(in_force)
+    if chosen is not None:
+        show_rule(chosen, in_force)

@@ -274,14 +274,12 @@ def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None
     some = state.largest_rules(grown, thresholds, TABLE_ROWS)
     shown = [rule for rule in some.rules if dimension in (None, rule.dimension)][:TABLE_ROWS]
     st.dataframe(
-        frame(shown, some), hide_index=True, column_config=column_config(),
+        frame(shown, some), hide_index=True, column_config=column_config(some),
         height=table_height(len(shown), 10), key="largest_table",
         alt="The rules with the most support",
     )
     if rules > len(shown):
         st.caption(f"The {len(shown)} rules with the most support, of {rules:,}.")
-    st.page_link("rules.py", label="All rules, with the evidence behind each",
-                 icon=":material/arrow_forward:")
 
 
 def show_trade_offs(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
@@ -342,3 +340,5 @@ if view == SURFACES:
 else:
     show_maps(landscape, LAYERS[shown])
 details(dimension)
+st.page_link("rules.py", label="All rules, with the evidence behind each",
+             icon=":material/arrow_forward:")
