@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from sarl_core.demonstrations.formats import (
     save_demonstrations,
     table_columns,
 )
-from sarl_core.errors import SarlError
+from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.demonstration_figures import (
     action_figure,
@@ -33,6 +34,7 @@ from sarl_core.explaining.distributions import (
     histogram_by_label,
     interval_histogram,
 )
+from sarl_core.explaining.language import label_text
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 
 ENVIRONMENTS = ("CartPole-v1", "LunarLander-v3", "Pendulum-v1")
@@ -122,9 +124,9 @@ def as_file(demonstrations: Demonstrations, extension: str) -> bytes:
 # --- uploading ---------------------------------------------------------------------------------
 
 
-def uploaded_files() -> dict[str, bytes]:
-    """The files in the uploader, by name."""
-    return {file.name: file.getvalue() for file in st.session_state.get("upload_files") or []}
+def uploaded_files() -> list[tuple[memoryview, str]]:
+    """Content and name of each file in the uploader."""
+    return [(file.getbuffer(), file.name) for file in st.session_state.get("upload_files") or []]
 
 
 def read_upload(columns: ColumnMap | None = None) -> None:
@@ -138,14 +140,19 @@ def read_upload(columns: ColumnMap | None = None) -> None:
     if not files:
         return
     try:
+        if len(files) > 2:
+            raise InputError(f"{len(files)} files were given; give one, or the pair of "
+                             "observations and actions")
+        (content, name), *others = files
         with st.spinner("Reading and checking …"):
             demonstrations = read_demonstrations(
-                files, env_id=environment() or None, columns=columns
+                content, name, env_id=environment() or None, columns=columns,
+                companion=others[0] if others else None,
             )
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
-    state.set_upload(demonstrations, file_name=", ".join(files))
+    state.set_upload(demonstrations, file_name=", ".join(name for _, name in files))
     st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
 
 
@@ -196,34 +203,35 @@ def upload_section(*, expanded: bool) -> None:
         left, right = st.columns([3, 2], gap="medium")
         left.file_uploader(
             "Parquet, CSV or NPZ, or the pair obs.csv and actions.csv",
-            type=["parquet", "csv", "npz"], accept_multiple_files=True, key="upload_files",
-            on_change=read_upload,
+            accept_multiple_files=True, key="upload_files", on_change=read_upload,
             help="One row a step: episode, step, obs_<name> …, action or action_<name> …, and "
                  "if there are any reward, terminated, truncated.",
         )
         right.selectbox(
-            "Environment (optional)", ENVIRONMENTS, index=None, accept_new_options=True,
-            placeholder="none", key="upload_env", on_change=read_upload,
+            "Environment (optional)", state.with_own(ENVIRONMENTS, "upload_env"), index=None,
+            accept_new_options=True,
+            placeholder="none", key="upload_env", on_change=read_upload, bind="query-params",
             help="Names, units and bounds are taken from it where the file has none. Any id "
                  "that Gymnasium knows.",
         )
         error = st.session_state.get("_upload_error")
         if error:
-            st.error(sentence(error), icon=":material/error:")
+            st.error(escaped(error), icon=":material/error:")
             if state.chosen_demonstrations() is not None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()
         if len(files) == 1:
-            name, content = next(iter(files.items()))
-            names = columns_of(name, content)
-            if names and (error or st.toggle("Map the columns myself", key="map_columns")):
+            names = columns_of(*files[0])
+            # An error about a row is not mended by another map; one about columns is.
+            asked = error is not None and "column" in error and "row" not in error
+            if names and (asked or st.toggle("Map the columns myself", key="map_columns")):
                 mapping_form(names)
 
 
-def columns_of(name: str, content: bytes) -> tuple[str, ...]:
+def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
     """Columns of an uploaded table, () where it has none that can be read."""
     try:
-        return table_columns(name, content)
+        return table_columns(content, name)
     except SarlError:
         return ()
 
@@ -239,13 +247,12 @@ def sentence(text: str) -> str:
 
 def legend(dimension: LabelledDimension) -> None:
     """The colours of the labels."""
-    import html
-
     entries = "".join(
         f'<span style="display:inline-block;margin-right:1.1em;white-space:nowrap">'
         f'<span style="display:inline-block;width:.75em;height:.75em;border-radius:2px;'
-        f'background:{label_colour(label)};margin-right:.4em"></span>{html.escape(name)}</span>'
-        for label, name in enumerate(dimension.label_names[:24])
+        f'background:{label_colour(label)};margin-right:.4em"></span>'
+        f"{html.escape(label_text(label, dimension))}</span>"
+        for label in range(min(dimension.n_labels, 24))
     )
     st.html(f'<div style="font-size:.9rem">{html.escape(dimension.name)}: {entries}</div>')
 

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.distributions import EpisodeSeries, Histogram
+from sarl_core.explaining.language import label_text
 from sarl_core.mining.labels import LabelledDimension
 
 FEATURE_HEIGHT = 170
@@ -37,7 +38,8 @@ def feature_figure(
     widths: Any = np.diff(histogram.edges)
     if histogram.values is not None:
         positions, widths = [f"{value:g}" for value in histogram.values], 0.72
-    for label, name in enumerate(dimension.label_names):
+    for label in range(dimension.n_labels):
+        name = label_text(label, dimension)
         figure.add_bar(
             x=positions,
             y=100 * histogram.counts[label] / total,
@@ -85,7 +87,8 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
         figure.update_yaxes(autorange="reversed", fixedrange=True, ticklabelstandoff=6)
         return figure
     texts = _bin_texts(histogram, "")
-    for label, name in enumerate(dimension.label_names):
+    for label in range(dimension.n_labels):
+        name = label_text(label, dimension)
         figure.add_bar(
             x=histogram.centres, y=100 * histogram.counts[label] / total,
             width=np.diff(histogram.edges),

@@ -1,0 +1,222 @@
+"""What a replay depends on, how it is run, and where the latest few are kept.
+
+A module and not part of the page: a page is run anew each time, and would not recognise its own
+requests from the time before.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from typing import TypeVar
+
+import streamlit as st
+from streamlit.delta_generator import DeltaGenerator
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.errors import SarlError
+from sarl_core.explaining.language import sentence
+from sarl_core.explaining.replay import environment_dimensions
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.rendering import Replay as Film
+from sarl_core.rollouts.rendering import render_episode, side_by_side
+from sarl_core.shielding.shield import Projection, Shield
+
+EPISODES = 20
+WITH, WITHOUT = "with the rules", "without"
+KEPT_REPLAYS, KEPT_COMPARISONS = 6, 24
+
+Told = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Everything that a replay depends on; equal requests give equal replays."""
+
+    env_id: str
+    agent: str
+    agent_digest: str
+    rules: str
+    rules_digest: str
+    projection: Projection
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One episode without the rules and, where there are any, one with them."""
+
+    film: Film
+    rule_set: RuleSet | None
+    dimensions: tuple[LabelledDimension, ...]
+    features: tuple[Feature, ...]
+
+    @property
+    def plain(self) -> Episodes:
+        """The episode without the rules."""
+        return self.film.episodes[-1]
+
+    @property
+    def shielded(self) -> Episodes | None:
+        """The episode with the rules."""
+        return self.film.episodes[0] if len(self.film.episodes) > 1 else None
+
+    @property
+    def shown(self) -> Episodes:
+        """The episode that is gone through step by step."""
+        return self.film.episodes[0]
+
+
+class Kept:
+    """The latest few results, shared between sessions, so that memory has a bound."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.lock = most, Lock()
+        self.results: OrderedDict[object, object] = OrderedDict()
+
+    def get(self, key: object) -> object | None:
+        """A result, if it is still kept."""
+        with self.lock:
+            if key in self.results:
+                self.results.move_to_end(key)
+            return self.results.get(key)
+
+    def put(self, key: object, result: object) -> None:
+        """Keep a result, and let go of the one that was not used for longest."""
+        with self.lock:
+            self.results[key] = result
+            self.results.move_to_end(key)
+            while len(self.results) > self.most:
+                self.results.popitem(last=False)
+
+
+@st.cache_resource
+def kept_replays() -> Kept:
+    """Replays by their request."""
+    return Kept(KEPT_REPLAYS)
+
+
+@st.cache_resource
+def kept_comparisons() -> Kept:
+    """Comparisons by their request."""
+    return Kept(KEPT_COMPARISONS)
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A request, and what it takes to fulfil it."""
+
+    request: Request
+    agent: Callable[[], Agent]
+    rule_set: RuleSet | None
+
+    @property
+    def shield(self) -> Shield | None:
+        """The rules in force, or None."""
+        if self.rule_set is None:
+            return None
+        return Shield(self.rule_set, projection=self.request.projection)
+
+
+# --- running -----------------------------------------------------------------------------------
+
+
+def run(order: Order, tell: Told) -> Replay:
+    """Run the episode, without the rules and with them, and draw it.
+
+    Raises:
+        SarlError: If it cannot be run.
+    """
+    request, shield, rule_set = order.request, order.shield, order.rule_set
+    tell(0.0, "Making the agent …")
+    agent = order.agent()
+
+    def playing(done: int, total: int) -> None:
+        tell(0.7 * done / total, "Playing the episode and drawing it …")
+
+    if shield is None or rule_set is None:
+        film = render_episode(request.env_id, agent, seed=request.seed, progress=playing)
+    else:
+        film = side_by_side(
+            request.env_id, agent, shield, seed=request.seed, progress=playing,
+            describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
+        )
+
+    def encoding(done: int, total: int) -> None:
+        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
+
+    film.gif(progress=encoding)
+    description = describe_environment(request.env_id)
+    return Replay(
+        film=film,
+        rule_set=rule_set,
+        dimensions=environment_dimensions(description, rule_set),
+        features=tuple(
+            Feature(name, unit) for name, unit in
+            zip(description.feature_names, description.feature_units, strict=True)
+        ),
+    )
+
+
+def compare(order: Order, tell: Told) -> tuple[tuple[str, Episodes], ...]:
+    """Run several episodes with the rules and without.
+
+    Raises:
+        SarlError: If they cannot be run.
+    """
+    agent, shield = order.agent(), order.shield
+    runs: list[tuple[str, Episodes]] = []
+    for part, (name, guard) in enumerate(((WITH, shield), (WITHOUT, None))):
+        if name == WITH and guard is None:
+            continue
+
+        def told(done: int, total: int, name: str = name, part: int = part) -> None:
+            tell((part + done / total) / 2, f"{done} of {total} episodes {name} …")
+
+        runs.append((name, rollout(
+            order.request.env_id, agent, shield=guard, episodes=EPISODES,
+            seed=order.request.seed, keep_steps=False, progress=told,
+        )))
+    return tuple(runs)
+
+
+def movie(replay: Replay) -> bytes:
+    """The replay as MP4."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "replay.mp4"
+        replay.film.save(path)
+        return path.read_bytes()
+
+
+Result = TypeVar("Result")
+
+
+def with_progress(work: Callable[[Told], Result]) -> Result | None:
+    """Do long work under a progress bar; say what is wrong where it fails."""
+    slot = st.empty()
+    bar = slot.progress(0.0, "Starting …")
+    try:
+        return work(lambda share, text: set_bar(bar, share, text))
+    except SarlError as error:
+        st.error(escaped(str(error)), icon=":material/error:")
+        return None
+    finally:
+        slot.empty()
+
+
+def set_bar(bar: DeltaGenerator, share: float, text: str) -> None:
+    """Move the bar."""
+    bar.progress(min(max(share, 0.0), 1.0), text)
+
+
+def escaped(text: str) -> str:
+    """Text that Markdown leaves alone."""
+    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>#$~|:" else sign for sign in text)

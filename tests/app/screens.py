@@ -1,0 +1,37 @@
+"""Opening a page of the dashboard without a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from streamlit.testing.v1 import AppTest
+
+ROUTER = Path(__file__).parents[2] / "pages" / "_router.py"
+
+
+def open_page(name: str, **query: str) -> AppTest:
+    """Run a page as a visitor with this URL would see it first."""
+    app = AppTest.from_file(ROUTER, default_timeout=120)
+    for key, value in query.items():
+        app.query_params[key] = value
+    app.run()
+    if name != "demonstrations":
+        app.switch_page(f"{name}.py").run()
+    assert not app.exception, app.exception
+    return app
+
+
+def texts(app: AppTest) -> str:
+    """Everything a visitor reads, Markdown's escapes undone."""
+    parts = [*app.title, *app.markdown, *app.caption, *app.info, *app.error, *app.subheader]
+    return "\n".join(str(part.value).replace("\\", "") for part in parts)
+
+
+def errors(app: AppTest) -> list[str]:
+    """The sentences of errors, Markdown's escapes undone."""
+    return [str(error.value).replace("\\", "") for error in app.error]
+
+
+def metrics(app: AppTest) -> dict[str, str]:
+    """Every metric by its label."""
+    return {metric.label: metric.value for metric in app.metric}

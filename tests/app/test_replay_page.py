@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import load_demonstrations, mine_rules
+from sarl_core.mining.rule_files import rules_to_json
+from tests.app.screens import errors, metrics, open_page, texts
+
+DATA = Path(__file__).parents[2] / "data"
+
+
+def run(app: AppTest) -> AppTest:
+    app.button(key="run").click().run()
+    assert not app.exception, app.exception
+    return app
+
+
+def test_before_a_run_the_page_says_what_to_do() -> None:
+    app = open_page("replay")
+    assert "press Run" in texts(app)
+    assert not app.metric
+
+
+@pytest.mark.parametrize(
+    ("data", "agent", "rules"),
+    [("cartpole", "novice", "at the thresholds"), ("cartpole", "expert", "filtered"),
+     ("cartpole", "untrained", "unfiltered"), ("lunar_lander", "novice", "unfiltered"),
+     ("pendulum", "novice", "at the thresholds")],
+)
+def test_an_agent_is_replayed_with_the_rules_and_without(
+    data: str, agent: str, rules: str
+) -> None:
+    app = run(open_page("replay", data=data, agent=agent, rules=rules, seed="3"))
+    assert not errors(app)
+    assert set(metrics(app)) == {
+        "Return with rules", "Return without", "Length with rules", "Length without", "Changed",
+        "Covered",
+    }
+    assert "settings have changed" not in texts(app)
+    assert len(app.get("plotly_chart")) == 2
+
+
+def test_the_rules_keep_a_novice_upright() -> None:
+    app = run(open_page("replay", data="cartpole", rules="unfiltered", seed="3"))
+    shown = metrics(app)
+    assert int(shown["Length with rules"]) > 2 * int(shown["Length without"])
+    assert shown["Changed"] != "0 %"
+
+
+def test_the_same_request_is_not_run_again_and_another_is_noticed() -> None:
+    app = run(open_page("replay", data="cartpole", seed="5"))
+    before = metrics(app)
+    app.number_input(key="seed").set_value(6).run()
+    assert "settings have changed" in texts(app)
+    assert metrics(app) == before
+    run(app)
+    assert "settings have changed" not in texts(app)
+    app.number_input(key="seed").set_value(5).run()
+    assert metrics(run(app)) == before
+
+
+def test_without_rules_there_is_one_run() -> None:
+    app = run(open_page("replay", data="cartpole", rules="none", agent="expert"))
+    assert metrics(app)["Return"] == "500.0"
+    assert "changed" not in [button.label for button in app.button]
+
+
+def test_every_step_can_be_looked_at() -> None:
+    app = run(open_page("replay", data="cartpole", rules="unfiltered", seed="3"))
+    app.button(key="next").click().run()
+    assert not app.exception
+    first = app.slider(key="step").value
+    assert "Changed by the rules" in texts(app)
+    assert "If the" in texts(app)
+    app.button(key="next").click().run()
+    assert app.slider(key="step").value > first
+    app.button(key="previous").click().run()
+    assert app.slider(key="step").value == first
+    last = app.slider(key="step").max
+    app.slider(key="step").set_value(last).run()
+    assert not app.exception
+    assert "pole angle" in app.dataframe[0].value["State"].tolist()
+
+
+def test_a_step_beyond_the_end_is_the_last_one() -> None:
+    app = run(open_page("replay", data="cartpole", step="999", seed="3"))
+    assert app.slider(key="step").value <= app.slider(key="step").max
+    app.number_input(key="seed").set_value(4).run()
+    run(app)
+
+
+@pytest.mark.parametrize("projection", ["centre", "clip", "expert"])
+def test_a_continuous_action_is_replaced_in_three_ways(projection: str) -> None:
+    app = run(open_page("replay", data="pendulum", projection=projection))
+    assert not errors(app)
+    assert metrics(app)["Changed"] != "0 %"
+
+
+def test_twenty_episodes_are_compared() -> None:
+    app = run(open_page("replay", data="cartpole", rules="unfiltered"))
+    app.button(key="compare").click().run()
+    assert not app.exception
+    table = app.dataframe[-1].value
+    assert table["Run"].tolist() == ["With the rules", "Without"]
+    assert len(app.get("plotly_chart")) == 3
+
+
+@pytest.mark.parametrize(
+    ("query", "fragment"),
+    [({"env": "Nowhere-v9"}, "Nowhere-v9"),
+     ({"env": "MountainCar-v0", "agent": "expert", "rules": "none"}, "no shipped expert"),
+     ({"env": "Pendulum-v1"}, "rules"),
+     ({"data": "upload"}, "demonstrations do not say"),
+     ({"data": "upload", "env": "CartPole-v1"}, "no demonstrations to mine"),
+     ({"agent": "own file"}, "no policy has been uploaded"),
+     ({"rules": "own file"}, "no rule file has been uploaded")],
+)
+def test_what_cannot_be_run_is_said_in_a_sentence(query: dict[str, str], fragment: str) -> None:
+    app = run(open_page("replay", **{"data": "cartpole", **query}))
+    (sentence,) = errors(app)
+    assert fragment in sentence
+    assert "\n" not in sentence
+
+
+def test_an_error_leaves_the_replay_that_was_there() -> None:
+    app = run(open_page("replay", data="cartpole"))
+    before = metrics(app)
+    app.selectbox(key="agent").set_value("own file").run()
+    run(app)
+    assert errors(app)
+    assert metrics(app) == before
+
+
+def test_an_uploaded_policy_acts() -> None:
+    app = open_page("replay", data="cartpole", agent="own file", rules="none")
+    content = (DATA / "experts" / "cartpole.npz").read_bytes()
+    app.file_uploader(key="policy_file").set_value(("mine.npz", content, "")).run()
+    run(app)
+    assert not errors(app)
+    assert metrics(app)["Return"] == "500.0"
+    assert "Mine" in texts(app)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("mine.npz", b"no policy"), ("mine.zip", b"PK\x03\x04"), ("mine.txt", b"?"), ("mine", b""),
+     ("lander.npz", (DATA / "experts" / "lunar_lander.npz").read_bytes())],
+)
+def test_a_bad_policy_is_refused_by_its_own_name(name: str, content: bytes) -> None:
+    app = open_page("replay", data="cartpole", agent="own file")
+    app.file_uploader(key="policy_file").set_value((name, content, "")).run()
+    run(app)
+    (sentence,) = errors(app)
+    assert name in sentence
+    assert "/tmp" not in sentence
+
+
+def test_an_uploaded_rule_file_is_in_force() -> None:
+    rules = mine_rules(
+        load_demonstrations(DATA / "demonstrations" / "cartpole.parquet"), supp_min=0.0,
+        conf_min=1.0,
+    )
+    app = open_page("replay", data="lunar_lander", env="CartPole-v1", rules="own file")
+    content = rules_to_json(rules).encode()
+    app.file_uploader(key="rule_file").set_value(("rules.json", content, "")).run()
+    run(app)
+    assert not errors(app)
+    assert f"{len(rules):,} rules" in texts(app)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"format": "other"}', b"\xff\xfe"])
+def test_a_bad_rule_file_is_refused(content: bytes) -> None:
+    app = open_page("replay", data="cartpole", rules="own file")
+    app.file_uploader(key="rule_file").set_value(("rules.json", content, "")).run()
+    run(app)
+    (sentence,) = errors(app)
+    assert "rules.json" in sentence
