@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.mining.rules import RuleSet
+    from sarl_core.rollouts.rendering import Replay
 
 _RULES_SHOWN = 5
 
@@ -221,4 +223,44 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
     terminal.print_lines(["", "The rules that apply most often:"])
     terminal.print_lines(
         f"  {number}. {sentence(rule, rule_set)}" for number, rule in enumerate(often, 1)
+    )
+
+
+def describe_replay(replay: Replay, path: Path, shielded: Sequence[bool]) -> dict[str, Any]:
+    """What was rendered.
+
+    Args:
+        replay: One episode, or two side by side.
+        path: The picture.
+        shielded: Whether each panel has a shield.
+
+    Returns:
+        A document for JSON.
+    """
+    return {
+        "file": str(path),
+        "seconds": replay.seconds,
+        "pictures": len(replay),
+        "episodes": [
+            {"agent": episode.agent, "shielded": has_shield, **episode.to_dict()["episodes"][0]}
+            for episode, has_shield in zip(replay.episodes, shielded, strict=False)
+        ],
+    }
+
+
+def print_replay(document: dict[str, Any]) -> None:
+    """Print what `describe_replay` found.
+
+    Args:
+        document: What it gave.
+    """
+    terminal.print_lines([f"Wrote {document['file']}: {document['seconds']:.1f} s"])
+    terminal.print_table(
+        ("agent", "seed", "return", "length", "interventions", "covered"),
+        [
+            (f"{entry['agent']}{', shielded' if entry['shielded'] else ''}", str(entry["seed"]),
+             f"{entry['return']:.2f}", f"{entry['length']:,}", f"{entry['interventions']:,}",
+             f"{entry['covered']:,}")
+            for entry in document["episodes"]
+        ],
     )

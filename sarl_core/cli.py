@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from sarl_core import terminal
+from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
@@ -259,6 +260,53 @@ def evaluate(
         ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
         ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
     ])
+
+
+@app.command()
+def render(
+    env: Env,
+    agent: AgentName,
+    out: Annotated[Path, typer.Option(
+        "--out", metavar="FILE", show_default=False, help="A .gif or .mp4 file.",
+    )],
+    rules: Rules = None,
+    seed: Seed = 0,
+    both: Annotated[bool, typer.Option(
+        "--side-by-side", help="With the shield and without it, on the same seed.",
+    )] = False,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    as_json: Json = False,
+) -> None:
+    """Play one episode and save it as a moving picture, in real time.
+
+    Example: `python -m sarl_core render --env LunarLander-v3 --agent novice --rules rules.json
+    --seed 1 --side-by-side --out replay.gif`
+    """
+    terminal.check_output(out, (".gif", ".mp4"))
+    shield = _shield(rules, projection)
+    if both and shield is None:
+        raise InputError("--side-by-side compares with a shield; give --rules, or leave it out")
+    with terminal.working("Playing") as advance:
+        from sarl_core.rollouts.rendering import render_episode, side_by_side
+
+        if both and shield is not None:
+            replay = side_by_side(
+                env, agent, shield, seed=seed, stochastic=stochastic, progress=advance
+            )
+        else:
+            replay = render_episode(
+                env, agent, shield=shield, seed=seed, stochastic=stochastic, progress=advance
+            )
+    with terminal.working("Writing") as advance:
+        replay.save(out, progress=advance)
+    from sarl_core.answers import describe_replay, print_replay
+
+    document = describe_replay(replay, out, [shield is not None, False])
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_replay(document)
 
 
 @app.command("train-expert")

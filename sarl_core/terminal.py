@@ -36,9 +36,7 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
     Returns:
         The exit code: 0; 2 if the input was wrong; 1 if the work failed; 130 after Ctrl-C.
     """
-    # pygame greets on standard output, and draws without a display only where it is told to.
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
     debug = "--debug" in arguments
     try:
         with warnings.catch_warnings():
