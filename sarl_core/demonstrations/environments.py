@@ -7,6 +7,7 @@ environment itself.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -123,7 +124,10 @@ def make_environment(env_id: str, **parameters: Any) -> Any:
     import gymnasium
 
     try:
-        return gymnasium.make(env_id, disable_env_checker=True, **parameters)
+        with warnings.catch_warnings():
+            # Of versions out of date, say; if it cannot be made, the error says so in one line.
+            warnings.simplefilter("ignore")
+            return gymnasium.make(env_id, disable_env_checker=True, **parameters)
     except Exception as error:  # other people's code, which may raise anything
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise InputError(

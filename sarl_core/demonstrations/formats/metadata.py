@@ -90,7 +90,7 @@ def decode_metadata(text: str | bytes) -> Metadata:
         label_names=tuple(
             _strings(entry, "label_names") for entry in _list(raw, "label_names")
         ),
-        label_first=tuple(_integer(entry, "label_first") for entry in _list(raw, "label_first")),
+        label_first=tuple(_label(entry) for entry in _list(raw, "label_first")),
         action_low=tuple(_number(entry, "action_low") for entry in _list(raw, "action_low")),
         action_high=tuple(_number(entry, "action_high") for entry in _list(raw, "action_high")),
         bounds_from=_bounds_from(raw),
@@ -145,6 +145,13 @@ def _integer(value: Any, key: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool):
         raise _malformed(f"has something other than a whole number under {key!r}")
     return value
+
+
+def _label(value: Any) -> int:
+    label = _integer(value, "label_first")
+    if abs(label) > 2**31:
+        raise _malformed("has a number too large for a label under 'label_first'")
+    return label
 
 
 def _number(value: Any, key: str) -> float:

@@ -9,6 +9,8 @@ Stable-Baselines (``obs, actions, rewards, episode_returns, episode_starts``) an
 from __future__ import annotations
 
 import io
+import lzma
+import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -203,9 +205,10 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
                 left = MAX_UNPACKED - sum(array.nbytes for array in read.values())
                 read[what] = _array(archive, entries[key], key, left)
             return read, wanted
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError,
-            RuntimeError) as error:
-        # RuntimeError is what zipfile raises for an encrypted entry.
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError,
+            ValueError, struct.error, OverflowError, lzma.LZMAError) as error:
+        # All of these come from zipfile: RuntimeError for an encrypted entry, ValueError for
+        # offsets that lie outside the file.
         raise InputError(
             "it is damaged, cut off or encrypted; save or download it again"
         ) from error

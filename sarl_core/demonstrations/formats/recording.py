@@ -332,7 +332,7 @@ def _labels(
     m = whole.shape[1]
     if names:
         require_length(len(names), m, "lists of label names", "action dimensions")
-        require_length(len(first), m, "first labels", "action dimensions")
+        require_length(len(first or names), m, "first labels", "action dimensions")
     counts = [len(labels) for labels in names] if names else [MAX_LABELS] * m
     require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
     flat = actions.ndim == 1 if described is None else described.action_shape == ()
