@@ -1,0 +1,343 @@
+"""Every command, end to end, on the shipped data."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from sarl_core import RuleSet, load_demonstrations
+from sarl_core.cli import main
+from sarl_core.rollouts.policies import MlpPolicy
+
+ROOT = Path(__file__).resolve().parents[1]
+LANDER = str(ROOT / "data" / "demonstrations" / "lunar_lander.parquet")
+CART = str(ROOT / "data" / "demonstrations" / "cartpole.parquet")
+PENDULUM = str(ROOT / "data" / "demonstrations" / "pendulum.parquet")
+COMMANDS = ("record", "check", "mine", "landscape", "evaluate", "render", "train-expert")
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command line that is to succeed, and give what it printed."""
+
+    def call(*arguments):
+        code = main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        assert code == 0, printed.err
+        return printed.out
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def cart_rules(tmp_path_factory):
+    """Rules that cover nearly every state of CartPole."""
+    path = tmp_path_factory.mktemp("rules") / "rules.json"
+    assert main(["mine", CART, "--support", "0", "--confidence", "0.9", "--out", str(path)]) == 0
+    return path
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_has_an_example_and_tells_its_options(command, run):
+    text = run(command, "--help")
+    assert f"python -m sarl_core {command}" in text.split("Example:")[1]
+    assert "--json" in text
+
+
+def test_without_a_command_the_commands_are_listed(run):
+    text = run()
+    assert all(command in text for command in COMMANDS)
+
+
+def test_check_says_what_is_in_the_file(run):
+    text = run("check", LANDER)
+    assert "15,000 steps of LunarLander-v3, by expert" in text
+    for words in ("horizontal position", "angle (rad)", "fire main engine", "digest", "returns"):
+        assert words in text
+
+
+def test_check_as_json_agrees_with_the_data(run):
+    document = json.loads(run("check", LANDER, "--json"))
+    demonstrations = load_demonstrations(LANDER)
+    assert document["digest"] == demonstrations.digest
+    assert document["steps"] == 15_000
+    assert document["episodes"] == demonstrations.n_episodes
+    assert sum(label["share"] for label in document["actions"][0]["labels"]) == pytest.approx(1)
+    lowest = demonstrations.observations.min(axis=0)
+    assert [feature["min"] for feature in document["features"]] == lowest.tolist()
+
+
+def test_check_of_continuous_actions_gives_their_bounds(run):
+    action = json.loads(run("check", PENDULUM, "--json"))["actions"][0]
+    assert (action["name"], action["low"], action["high"]) == ("torque", -2.0, 2.0)
+    assert action["bounds_from"] == "action space"
+    assert "-2 to 2" in run("check", PENDULUM)
+
+
+def test_check_prints_warnings(run, tmp_path):
+    path = tmp_path / "one.csv"
+    path.write_text("episode,step,obs_x,obs_y,action\n0,0,1.0,2.0,0\n0,1,1.0,3.0,1\n")
+    assert "warning: " in run("check", path)
+    assert json.loads(run("check", path, "--json"))["warnings"]
+
+
+def test_record_writes_what_check_reads(run, tmp_path):
+    for name in ("cart.parquet", "cart.csv", "cart.npz"):
+        path = tmp_path / name
+        document = json.loads(run(
+            "record", "--env", "CartPole-v1", "--agent", "novice", "--steps", 120, "--seed", 3,
+            "--out", path, "--json",
+        ))
+        assert document["steps"] == 120
+        assert json.loads(run("check", path, "--env", "CartPole-v1", "--json"))["steps"] == 120
+
+
+def test_record_is_the_same_for_one_seed_and_differs_when_sampled(run, tmp_path):
+    def record(name, *more):
+        return json.loads(run(
+            "record", "--env", "Pendulum-v1", "--agent", "expert", "--steps", 50,
+            "--out", tmp_path / name, "--json", *more,
+        ))["digest"]
+
+    assert record("a.parquet") == record("b.parquet")
+    assert record("a.parquet") != record("c.parquet", "--stochastic")
+    assert record("a.parquet") != record("d.parquet", "--seed", 1)
+
+
+def test_mine_writes_the_rules_and_says_them_in_words(run, tmp_path):
+    path = tmp_path / "rules.json"
+    text = run("mine", LANDER, "--support", 0.005, "--confidence", 0.95, "--out", path)
+    rules = RuleSet.load(path)
+    assert len(rules) > 0
+    assert (rules.thresholds.support, rules.thresholds.confidence) == (0.005, 0.95)
+    assert f"{len(rules):,}" in text
+    assert "1. If the " in text
+
+
+def test_mine_as_json_agrees_with_the_rule_file(run, tmp_path):
+    path = tmp_path / "rules.json"
+    document = json.loads(run(
+        "mine", PENDULUM, "--support", 0.01, "--confidence", 0.8, "--divider", 4, "--max-depth", 6,
+        "--lift", 1.1, "--out", path, "--json",
+    ))
+    rules = RuleSet.load(path)
+    assert document["rules"] == len(rules) == sum(document["rules_per_dimension"].values())
+    assert document["coverage"] == rules.coverage
+    assert rules.divider == 4
+    assert all(rule.length <= 6 and rule.lift >= 1.1 for rule in rules.rules)
+    assert document["thresholds"] == {
+        "support": 0.01, "confidence": 0.8, "lift": 1.1, "max_depth": 6,
+    }
+
+
+def test_mine_says_so_when_no_rule_is_left(run, tmp_path):
+    out = tmp_path / "rules.json"
+    arguments = ("mine", LANDER, "--support", 0.9, "--confidence", 1, "--out", out)
+    assert "No rule reaches these thresholds" in run(*arguments)
+    document = json.loads(run(*arguments, "--json"))
+    assert (document["rules"], document["fidelity"]) == (0, None)
+
+
+def test_a_written_file_can_be_read_by_others(run, tmp_path):
+    run("landscape", CART, "--out", tmp_path / "landscape.json")
+    (tmp_path / "ordinary").touch()
+    written, ordinary = tmp_path / "landscape.json", tmp_path / "ordinary"
+    assert written.stat().st_mode == ordinary.stat().st_mode
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["landscape.json", "ordinary"]
+
+
+def test_landscape_json_has_the_papers_grid_and_null_for_no_fidelity(run, tmp_path):
+    path = tmp_path / "landscape.json"
+    printed = run("landscape", LANDER, "--out", path, "--json")
+    document = json.loads(path.read_text())
+    assert json.loads(printed) == document
+    assert document["supports"] == [i / 20 for i in range(11)]
+    assert document["confidences"] == [i / 20 for i in range(21)]
+    for layer in ("rule_count", "mean_length", "coverage", "fidelity"):
+        assert np.array(document[layer], dtype=float).shape == (11, 21)
+        assert document["dimensions"][0][layer] == document[layer]
+    counts = np.array(document["rule_count"])
+    assert (counts == 0).any()
+    assert all(
+        (fidelity is None) == (count == 0)
+        for row, others in zip(document["fidelity"], document["rule_count"], strict=True)
+        for fidelity, count in zip(row, others, strict=True)
+    )
+
+
+def test_landscape_agrees_with_mining_at_a_cell_of_the_grid(run, tmp_path):
+    path = tmp_path / "landscape.json"
+    run("landscape", PENDULUM, "--divider", 3, "--supports", "0.01:0.03:0.01",
+        "--confidences", "0.7:0.9:0.1", "--out", path)
+    document = json.loads(path.read_text())
+    assert document["supports"] == [0.01, 0.02, 0.03]
+    mined = json.loads(run("mine", PENDULUM, "--divider", 3, "--support", 0.02,
+                           "--confidence", 0.9, "--out", tmp_path / "rules.json", "--json"))
+    for layer, name in (("rule_count", "rules"), ("mean_length", "mean_length"),
+                        ("coverage", "coverage"), ("fidelity", "fidelity")):
+        assert document[layer][1][2] == pytest.approx(mined[name], abs=1e-12)
+
+
+def test_landscape_csv_has_one_row_a_cell(run, tmp_path):
+    path = tmp_path / "landscape.csv"
+    run("landscape", LANDER, "--out", path)
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 231
+    assert {row["dimension"] for row in rows} == {"all"}
+    empty = [row for row in rows if row["rule_count"] == "0"]
+    assert empty
+    assert all(row["fidelity"] == "" for row in empty)
+
+
+def test_landscape_csv_tells_action_dimensions_apart(run, tmp_path):
+    demonstrations = tmp_path / "two.csv"
+    rows = [f"0,{i},{i % 7},{i % 3},{i % 2},{int(i % 7 > 3)}" for i in range(60)]
+    demonstrations.write_text(
+        "\n".join(["episode,step,obs_x,obs_y,action_up,action_down", *rows]) + "\n"
+    )
+    path = tmp_path / "landscape.csv"
+    run("landscape", demonstrations, "--supports", "0:0.1:0.1", "--confidences", "0.5:1:0.5",
+        "--out", path)
+    with path.open(newline="") as file:
+        found = [row["dimension"] for row in csv.DictReader(file)]
+    assert found == ["all"] * 4 + ["up"] * 4 + ["down"] * 4
+
+
+def test_landscape_html_opens_without_a_network(run, tmp_path):
+    path = tmp_path / "landscape.html"
+    run("landscape", CART, "--out", path)
+    text = path.read_text(encoding="utf-8")
+    assert "<html>" in text
+    assert '<script src="http' not in text
+    assert "Coverage" in text
+
+
+def test_landscape_png_is_a_picture_with_something_on_it(run, tmp_path):
+    path = tmp_path / "landscape.png"
+    run("landscape", CART, "--out", path)
+    with Image.open(path) as picture:
+        assert picture.width > 1000
+        assert len(set(picture.convert("RGB").resize((80, 60)).get_flattened_data())) > 50
+
+
+def test_evaluate_as_json_is_the_contract(run, cart_rules):
+    arguments = ("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules,
+                 "--episodes", 4, "--seed", 7, "--json")
+    document = json.loads(run(*arguments))
+    assert [episode["seed"] for episode in document["episodes"]] == [7, 8, 9, 10]
+    for episode in document["episodes"]:
+        assert set(episode) == {"seed", "return", "length", "interventions", "covered"}
+        assert 0 <= episode["interventions"] <= episode["covered"] <= episode["length"]
+    summary = document["summary"]
+    assert set(summary) == {
+        "mean", "std", "iqm", "iqm_low", "iqm_high", "intervention_rate", "coverage",
+    }
+    assert summary["mean"] == np.mean([episode["return"] for episode in document["episodes"]])
+    assert summary["intervention_rate"] > 0
+    assert json.loads(run(*arguments)) == document
+
+
+def test_evaluate_prints_a_row_an_episode_and_a_shield_helps_a_novice(run, cart_rules):
+    def mean(*more):
+        arguments = ("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--episodes", 5)
+        text = run(*arguments, *more)
+        assert "interventions" in text
+        assert sum(line.split()[:1] == [str(seed)] for seed in range(5)
+                   for line in text.splitlines()) == 5
+        return json.loads(run(*arguments, *more, "--json"))["summary"]["mean"]
+
+    assert mean("--rules", cart_rules) > 5 * mean()
+
+
+def test_evaluate_projects_as_told(run, tmp_path):
+    rules = tmp_path / "rules.json"
+    run("mine", PENDULUM, "--support", 0, "--confidence", 0.9, "--divider", 5, "--out", rules)
+    means = {
+        json.loads(run("evaluate", "--env", "Pendulum-v1", "--agent", "novice", "--rules", rules,
+                       "--episodes", 2, "--projection", projection, "--json"))["summary"]["mean"]
+        for projection in ("centre", "clip", "expert")
+    }
+    assert len(means) == 3
+
+
+def test_evaluate_samples_a_trained_agent_only_when_told(run):
+    def evaluate(*more):
+        return run("evaluate", "--env", "Pendulum-v1", "--agent", "expert", "--episodes", 1,
+                   "--json", *more)
+
+    assert evaluate() == evaluate()
+    assert evaluate() != evaluate("--stochastic")
+
+
+def test_render_side_by_side_as_gif(run, cart_rules, tmp_path):
+    path = tmp_path / "replay.gif"
+    arguments = ("render", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules,
+                 "--seed", 1, "--out", path)
+    alone = json.loads(run(*arguments, "--json"))
+    with Image.open(path) as picture:
+        width = picture.width
+    both = json.loads(run(*arguments, "--side-by-side", "--json"))
+    assert [episode["shielded"] for episode in both["episodes"]] == [True, False]
+    assert both["episodes"][0] == alone["episodes"][0]
+    with Image.open(path) as picture:
+        assert picture.is_animated
+        assert picture.width > 1.8 * width
+        milliseconds = 0
+        for frame in range(picture.n_frames):
+            picture.seek(frame)
+            milliseconds += picture.info["duration"]
+    assert milliseconds == pytest.approx(1000 * both["seconds"], abs=30)
+
+
+def test_render_agrees_with_evaluate(run, cart_rules, tmp_path):
+    arguments = ("--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules, "--seed", 5)
+    rendered = json.loads(run("render", *arguments, "--out", tmp_path / "r.gif", "--json"))
+    evaluated = json.loads(run("evaluate", *arguments, "--episodes", 1, "--json"))["episodes"][0]
+    assert {name: rendered["episodes"][0][name] for name in evaluated} == evaluated
+
+
+def test_render_as_mp4(run, tmp_path):
+    path = tmp_path / "replay.mp4"
+    text = run("render", "--env", "CartPole-v1", "--agent", "novice", "--out", path)
+    assert path.read_bytes()[4:8] == b"ftyp"
+    assert "novice" in text
+
+
+def test_train_expert_writes_a_policy_that_evaluate_takes(run, tmp_path):
+    path = tmp_path / "expert.npz"
+    text = run("train-expert", "--env", "CartPole-v1", "--steps", 1024, "--out", path)
+    assert "mean return" in text
+    assert MlpPolicy.load(path).env_id == "CartPole-v1"
+    assert json.loads(path.with_suffix(".json").read_text())["steps"] == 1024
+    run("evaluate", "--env", "CartPole-v1", "--agent", path, "--episodes", 1)
+
+
+def test_json_is_all_there_is_on_standard_output(tmp_path):
+    """Also when an environment prints what it likes, in a process of its own."""
+    (tmp_path / "chatty.py").write_text(
+        "import gymnasium\n"
+        "from gymnasium.envs.classic_control import CartPoleEnv\n"
+        "print('hello from the module')\n"
+        "class Chatty(CartPoleEnv):\n"
+        "    def reset(self, **parameters):\n"
+        "        print('hello from reset')\n"
+        "        return super().reset(**parameters)\n"
+        "gymnasium.register('Chatty-v0', entry_point=Chatty, max_episode_steps=5)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "sarl_core", "evaluate", "--env", "chatty:Chatty-v0", "--agent",
+         "novice", "--episodes", "2", "--json"],
+        cwd=ROOT, env={"PYTHONPATH": str(tmp_path), "PATH": ""}, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True, check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(json.loads(done.stdout)["episodes"]) == 2
+    assert "hello from reset" in done.stderr
