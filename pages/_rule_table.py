@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import streamlit as st
 
@@ -12,7 +12,7 @@ from sarl_core.explaining.language import action_text
 from sarl_core.explaining.tables import rule_columns
 from sarl_core.mining.rules import Rule, RuleSet
 
-ROW_HEIGHT = 35
+ROW_HEIGHT = 33  # pixels, at the theme's font size
 
 
 def column_config(rule_set: RuleSet) -> dict[str, Any]:
@@ -32,7 +32,7 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             format="%.4f", help="Share of all states to which the rule applies"
         ),
         "Confidence": column.ProgressColumn(
-            min_value=0.0, max_value=1.0, format="%.3f", color="auto",
+            min_value=0.0, max_value=1.0, format="%.3f", color="gray",
             help="Share of those in which the expert did what the rule says",
         ),
         "Lift": column.NumberColumn(
@@ -59,6 +59,6 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
     return pd.DataFrame(columns)
 
 
-def table_height(rows: int, most: int) -> int:
-    """Pixels for a table of so many rows, the header and no blank rows included."""
-    return (min(rows, most) + 1) * ROW_HEIGHT + 3
+def table_height(rows: int, most: int) -> int | Literal["content"]:
+    """As high as its rows, or as so many of them."""
+    return "content" if rows <= most else (most + 1) * ROW_HEIGHT + ROW_HEIGHT // 2

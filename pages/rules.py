@@ -32,19 +32,18 @@ def table_of(key: tuple[str, int, object], _rule_set: RuleSet) -> tuple[tuple[Ru
 
 def downloads(rule_set: RuleSet) -> None:
     """The whole rule set as files, made when asked for."""
-    name = f"rules-{demonstrations.env_id or 'unnamed'}"
-    with st.container(horizontal=True, gap="small"):
-        for kind, mime, make in (
-            ("JSON", "application/json", rules_to_json), ("CSV", "text/csv", rules_to_csv),
-            ("Text", "text/plain", rules_to_text),
-        ):
-            suffix = "txt" if kind == "Text" else kind.lower()
-            st.download_button(
-                kind, data=lambda make=make: make(rule_set).encode(), mime=mime,
-                file_name=f"{name}.{suffix}", on_click="ignore", icon=":material/download:",
-                key=f"download_{suffix}",
-                help=f"All {len(rule_set):,} rules" if len(rule_set) != 1 else "The one rule",
-            )
+    name = f"rules-{demonstrations.env_id.replace('/', '-') or 'unnamed'}"
+    for kind, mime, make in (
+        ("JSON", "application/json", rules_to_json), ("CSV", "text/csv", rules_to_csv),
+        ("Text", "text/plain", rules_to_text),
+    ):
+        suffix = "txt" if kind == "Text" else kind.lower()
+        st.download_button(
+            kind, data=lambda make=make: make(rule_set).encode(), mime=mime,
+            file_name=f"{name}.{suffix}", on_click="ignore", icon=":material/download:",
+            key=f"download_{suffix}",
+            help=f"All {len(rule_set):,} rules" if len(rule_set) != 1 else "The one rule",
+        )
 
 
 def nothing_in_force() -> None:
@@ -71,7 +70,7 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
         action_text(label, dimension)
         for dimension in rule_set.actions for label in range(dimension.n_labels)
     ))
-    with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
+    with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
         words = st.text_input(
             "Search", key="search", bind="query-params", icon=":material/search:", width=300,
             placeholder="a feature, an action, a number", label_visibility="collapsed",
@@ -210,8 +209,10 @@ def show_examples(rule: Rule) -> None:
     st.dataframe(
         pd.DataFrame(columns), hide_index=True, height=table_height(count, 10), key="examples",
         column_config={
-            name: st.column_config.NumberColumn(format="%.4g")
-            for name in list(columns)[4:]
+            name: st.column_config.NumberColumn(
+                format="%d" if name in ("Episode", "Step") else "%.4g"
+            )
+            for name in ("Episode", "Step", *list(columns)[4:])
         },
         alt="States to which the rule applies",
     )

@@ -115,7 +115,22 @@ def controls(dimension: int | None, grid: Landscape) -> None:
             help="Share of those states in which the expert did what the rule says.",
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
-    with right, st.container(horizontal=True, gap="small", horizontal_alignment="right"):
+    with right:
+        if not demonstrations.is_discrete:
+            st.slider(
+                "Divider", state.MIN_DIVIDER, state.MAX_DIVIDER, key="divider",
+                value=state.MIN_DIVIDER, bind="query-params", on_change=st.rerun,
+                help="Number of equal intervals each continuous action is divided into.",
+            )
+        named_settings(thresholds)
+    metrics(here(thresholds, dimension))
+    across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
+    st.html(f"<style>:root {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+
+
+def named_settings(thresholds: Thresholds) -> None:
+    """The paper's two settings, a click each."""
+    with st.container(horizontal=True, gap="small", horizontal_alignment="right"):
         for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
             st.button(
                 name, key=name.lower(), on_click=use, args=(setting,),
@@ -123,9 +138,6 @@ def controls(dimension: int | None, grid: Landscape) -> None:
                 help=f"The paper's setting: support {setting.support:g}, "
                      f"confidence {setting.confidence:g}",
             )
-    metrics(here(thresholds, dimension))
-    across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
-    st.html(f"<style>:root {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
 
 
 def here(thresholds: Thresholds, dimension: int | None) -> Landscape:
@@ -144,9 +156,9 @@ def metrics(point: Landscape) -> None:
         st.metric("Rules", f"{rules:,}")
         st.metric("Mean length", f"{point.mean_length[0, 0]:.1f}" if rules else "–",
                   help="Conditions a rule, on average")
-        st.metric("Coverage", share_text(float(point.coverage[0, 0])),
+        st.metric("Coverage", share_text(float(point.coverage[0, 0]), decimals=1),
                   help="Share of the demonstrated states in which some rule applies")
-        st.metric("Fidelity", share_text(float(point.fidelity[0, 0])),
+        st.metric("Fidelity", share_text(float(point.fidelity[0, 0]), decimals=1),
                   help="Share of those in which the expert did what the rule says")
 
 
@@ -162,16 +174,6 @@ def more() -> None:
         st.slider(
             "Maximum depth", 0, state.MAX_DEPTH, value=0, key="depth", bind="query-params",
             help="Most conditions of a rule. 0: no limit.",
-        )
-
-
-def divider() -> None:
-    """The divider, where there is something to divide."""
-    if not demonstrations.is_discrete:
-        st.slider(
-            "Divider", state.MIN_DIVIDER, state.MAX_DIVIDER, key="divider",
-            value=state.MIN_DIVIDER, bind="query-params", width=260,
-            help="Number of equal intervals each continuous action is divided into.",
         )
 
 
@@ -318,8 +320,7 @@ st.caption(
     "have done the same in at least a certain share of those (confidence)."
 )
 top = st.container()
-with st.container(horizontal=True, gap="medium", vertical_alignment="bottom", key="ways"):
-    divider()
+with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
     shown = switch("Show", "layer", [SIZE, QUALITY], "What the two figures show")
     view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
     axes = switch("Grid", "grid", [FINE, PAPER],

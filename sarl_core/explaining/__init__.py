@@ -1,0 +1,1 @@
+"""For people: rules in words, figures, exports."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -153,6 +154,12 @@ def example_rows(tree: PolicyTree, node: int, count: int = 10) -> NDArray[np.int
     return rows[places]
 
 
+def _decimals(values: NDArray[np.float64]) -> int:
+    """So many decimals that the largest of some values has four significant digits."""
+    largest = float(np.abs(values).max(initial=0.0))
+    return min(max(3 - math.floor(math.log10(largest)), 0), 12) if largest > 0 else 0
+
+
 def example_columns(
     demonstrations: Demonstrations, tree: PolicyTree, rule: Rule, count: int = 10
 ) -> dict[str, list[object]]:
@@ -166,7 +173,7 @@ def example_columns(
 
     Returns:
         Episode, step, what the expert did, whether that is what the rule says, and every
-        feature, those of the rule first.
+        feature, rounded for display, those of the rule first.
     """
     rows = example_rows(tree, node_of(rule), count)
     dimension = tree.dimension
@@ -188,5 +195,6 @@ def example_columns(
     for index in (*asked, *others):
         feature = demonstrations.features[index]
         name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
-        columns[name] = demonstrations.observations[rows, index].astype(np.float64).tolist()
+        values = demonstrations.observations[rows, index].astype(np.float64)
+        columns[name] = np.round(values, _decimals(values)).tolist()
     return columns

@@ -54,11 +54,12 @@ def threshold_text(value: float) -> str:
     return np.format_float_positional(value, trim="-")
 
 
-def share_text(share: float) -> str:
+def share_text(share: float, *, decimals: int | None = None) -> str:
     """A share as a percentage that never rounds up to all or down to none.
 
     Args:
         share: 0 to 1, or NaN where there is nothing to share.
+        decimals: At least so many; where not given, as many as tell something.
 
     Returns:
         As "97 %", "99.96 %", "< 0.01 %"; "–" for NaN.
@@ -66,11 +67,13 @@ def share_text(share: float) -> str:
     if math.isnan(share):
         return "–"
     if share in (0.0, 1.0):
-        return f"{share:.0%}".replace("%", " %")
-    for decimals in (0, 1, 2):
-        text = f"{100 * share:.{decimals}f}"
-        exact_enough = decimals == 2 or share >= 0.1 or (decimals == 1 and share >= 0.01)
-        if exact_enough and float(text) not in (0.0, 100.0):
+        return "100 %" if share else "0 %"
+    fewest = decimals if decimals is not None else 0 if 0.1 <= share < 0.9 else 1
+    for digits in range(fewest, 3):
+        text = f"{100 * share:.{digits}f}"
+        if float(text) not in (0.0, 100.0):
+            if decimals is None and "." in text:
+                text = text.rstrip("0").rstrip(".")
             return f"{text} %"
     return "< 0.01 %" if share < 0.5 else "> 99.99 %"
 

@@ -13,8 +13,15 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.evidence import FeatureEvidence, PathStep
-from sarl_core.explaining.language import label_text, number_text, share_text, short_condition
+from sarl_core.explaining.language import (
+    label_text,
+    number_text,
+    query_text,
+    share_text,
+    short_condition,
+)
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
 
 MAX_BOXES = 9000
@@ -29,7 +36,7 @@ def tree_figure(
     *,
     around: bool = False,
     dark: bool = False,
-    height: int = 460,
+    height: int = 420,
 ) -> go.Figure:
     """The tree from above: a box a node, as wide as its share of the states.
 
@@ -66,7 +73,7 @@ def tree_figure(
     _add_boxes(figure, tree, shown[below[shown]], faded(MUTED_COLOUR, 0.22 if dark else 0.16),
                "cut off below a rule")
     _add_hover(figure, tree, shown, window)
-    _add_path(figure, tree, path)
+    _add_path(figure, tree, path, dark=dark)
     if around:
         _add_queries(figure, tree, path, window, dark=dark)
     left, right, top, bottom = window
@@ -180,6 +187,7 @@ _STYLE = """<style>
 .sarl-path tr.cut td { font-weight: 600; }
 .sarl-path tr.cut td:first-child { box-shadow: inset 3px 0 0 MARKER; padding-left: 0.5rem; }
 .sarl-path .bar { width: 26%; min-width: 64px; }
+@media (max-width: 640px) { .sarl-path .s { display: none; } }
 .sarl-mix { display: flex; height: 12px; border-radius: 3px; overflow: hidden; width: 100%; }
 .sarl-mix span { display: block; height: 100%; }
 .sarl-key { display: flex; flex-wrap: wrap; gap: 0.2rem 0.9rem; font-size: 0.82rem;
@@ -222,13 +230,13 @@ def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
         note = " – cut here: this is the rule" if step.is_cut else ""
         rows.append(
             f'<tr class="{"cut" if step.is_cut else ""}"><td>{query}{note}</td>'
-            f'<td class="n">{step.samples:,}</td><td class="n">{share_text(step.support)}</td>'
+            f'<td class="n">{step.samples:,}</td><td class="n s">{share_text(step.support)}</td>'
             f'<td class="n">{share_text(step.confidence)}</td>'
             f'<td class="bar">{label_mix(step.shares, dimension)}</td></tr>'
         )
     head = "".join(
         f"<th{css}>{name}</th>" for name, css in (
-            ("Query", ""), ("States", ' class="n"'), ("Support", ' class="n"'),
+            ("Query", ""), ("States", ' class="n"'), ("Support", ' class="n s"'),
             ("Confidence", ' class="n"'), ("What the expert did", ""),
         )
     )
@@ -324,19 +332,22 @@ def _add_hover(
     )
 
 
-def _add_path(figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64]) -> None:
+def _add_path(
+    figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64], *, dark: bool
+) -> None:
+    halo = "#12181d" if dark else "#ffffff"
     total = float(tree.samples[0])
     middle = (tree.sample_start[path] + tree.samples[path] / 2) / total
     depth = tree.depth[path] + 0.46
     figure.add_scatter(
-        x=middle, y=depth, mode="lines", line={"color": "#ffffff", "width": 6},
+        x=middle, y=depth, mode="lines", line={"color": halo, "width": 7},
         hoverinfo="skip", opacity=0.85,
     )
     sizes = [7] * (len(path) - 1) + [15]
     figure.add_scatter(
         x=middle, y=depth, mode="lines+markers", hoverinfo="skip", name="path",
         line={"color": MARKER_COLOUR, "width": 3},
-        marker={"color": MARKER_COLOUR, "size": sizes, "line": {"color": "#ffffff", "width": 1.5}},
+        marker={"color": MARKER_COLOUR, "size": sizes, "line": {"color": halo, "width": 1.5}},
     )
 
 
@@ -352,12 +363,14 @@ def _add_queries(
         if not top <= tree.depth[here] < bottom:
             continue
         middle = (tree.sample_start[here] + tree.samples[here] / 2) / total
-        op = "≤" if int(tree.children_left[above]) == here else ">"
-        name = tree.source.features[int(tree.feature[above])].name
+        query = Condition(
+            int(tree.feature[above]), "<=" if int(tree.children_left[above]) == here else ">",
+            float(tree.threshold[above]),
+        )
         rightwards = middle * total < (left + right) / 2
         note: dict[str, Any] = {
             "x": middle, "y": float(tree.depth[here]) + 0.46, "showarrow": False,
-            "text": f"{escape(name)} {op} {number_text(float(tree.threshold[above]))}",
+            "text": escape(query_text(query, tree.source.features)),
             "xanchor": "left" if rightwards else "right", "xshift": 12 if rightwards else -12,
             "font": {"size": 11, "color": ink},
             "bgcolor": "rgba(18,24,29,0.6)" if dark else "rgba(255,255,255,0.7)",

@@ -187,13 +187,15 @@ def surface(
              "zeroline": False}
     across = _axis("Minimum support", landscape.supports, most=5)
     along = _axis("Minimum confidence", landscape.confidences, most=5)
-    keep = ("title", "tickmode", "tickvals", "ticktext", "range")
+    keep = ("tickmode", "tickvals", "ticktext", "range")
     figure.update_layout(
         height=420, margin={"l": 0, "r": 0, "t": 8, "b": 0},
         paper_bgcolor="rgba(0,0,0,0)",
         scene={
-            "xaxis": {key: across[key] for key in keep} | plain,
-            "yaxis": {key: along[key] for key in keep} | plain,
+            "xaxis": {key: across[key] for key in keep} | plain | {
+                "title": {"text": "Minimum support"}},
+            "yaxis": {key: along[key] for key in keep} | plain | {
+                "title": {"text": "Minimum confidence"}},
             "zaxis": {"title": {"text": style.unit or layer.capitalize()}, "rangemode": "tozero",
                       **plain, **({"tickformat": ".0%"} if style.share else {})},
             "camera": {"eye": {"x": 1.5, "y": -1.6, "z": 0.9}, "center": {"z": -0.15}},
