@@ -16,7 +16,7 @@ FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
 
 app: $(VENV)/runtime.stamp  ## start the dashboard
 	@echo "The dashboard is at http://localhost:$(PORT) (Ctrl-C ends it)."
-	$(PYTHON) -m streamlit run app.py --server.port $(PORT) --server.headless true
+	$(PYTHON) -m streamlit run app.py --server.port $(PORT)
 
 test: $(VENV)/development.stamp $(BROWSER)  ## run every test
 	$(PYTHON) -m pytest --numprocesses 2 --dist loadfile

@@ -73,8 +73,12 @@ def _table(rows: Iterable[Row]) -> Table:
     for row in rows:
         limit = ">=" if row.kind == "times faster" else "<="
         table.add_row(
-            row.what, row.against, row.text(row.measured), f"{limit} {row.text(row.reach)}",
-            "[green]reached[/]" if row.passed else "[red]missed[/]", row.details,
+            row.what,
+            row.against,
+            row.text(row.measured),
+            f"{limit} {row.text(row.reach)}",
+            "[green]reached[/]" if row.passed else "[red]missed[/]",
+            row.details,
         )
     return table
 

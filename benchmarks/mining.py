@@ -89,8 +89,11 @@ def tree_included(quick: bool) -> Iterable[Row]:
     _check_equal(landscape, cells, found)
     ours_took, theirs_took = statistics.median(mine), statistics.median(theirs) * len(CELLS)
     yield Row(
-        "landscape of 231 cells, tree included", "a fit and a walk for each cell",
-        "times faster", theirs_took / ours_took, 200,
+        "landscape of 231 cells, tree included",
+        "a fit and a walk for each cell",
+        "times faster",
+        theirs_took / ours_took,
+        200,
         f"{duration(ours_took)} against {duration(theirs_took)}",
     )
 
@@ -105,13 +108,17 @@ def tree_given(quick: bool) -> Iterable[Row]:
 
     ours_took, theirs_took = side_by_side(
         lambda: threshold_landscape(trees, PAPER_SUPPORTS, PAPER_CONFIDENCES),
-        theirs, repeats=3 if quick else 15, ours_calls=20,
+        theirs,
+        repeats=3 if quick else 15,
+        ours_calls=20,
     )
     _check_equal(threshold_landscape(trees, PAPER_SUPPORTS, PAPER_CONFIDENCES), CELLS, found)
     yield Row(
         f"landscape of 231 cells, tree of {trees[0].n_nodes:,} nodes given",
         "walking the tree for each cell",
-        "times faster", theirs_took / ours_took, 100,
+        "times faster",
+        theirs_took / ours_took,
+        100,
         f"{duration(ours_took)} against {duration(theirs_took)}",
     )
 
@@ -123,8 +130,11 @@ def plane(quick: bool) -> Iterable[Row]:
         seconds(lambda: threshold_landscape(trees, axis, axis)) for _ in range(4 if quick else 16)
     ][1:]
     yield Row(
-        f"landscape of 1000 x 1000 cells, {trees[0].n_nodes:,} nodes", "-",
-        "seconds", statistics.median(times), 0.1,
+        f"landscape of 1000 x 1000 cells, {trees[0].n_nodes:,} nodes",
+        "-",
+        "seconds",
+        statistics.median(times),
+        0.1,
         f"slowest of {len(times)}: {duration(max(times))}",
     )
 
@@ -139,10 +149,20 @@ def _check_equal(
             int(np.searchsorted(PAPER_SUPPORTS, support)),
             int(np.searchsorted(PAPER_CONFIDENCES, confidence)),
         )
-        ours = [float(layer[place]) for layer in (
-            landscape.rule_count, landscape.mean_length, landscape.coverage, landscape.fidelity
-        )]
-        walked = [rules, length / max(rules, 1), covered / steps,
-                  right / covered if covered else np.nan]
+        ours = [
+            float(layer[place])
+            for layer in (
+                landscape.rule_count,
+                landscape.mean_length,
+                landscape.coverage,
+                landscape.fidelity,
+            )
+        ]
+        walked = [
+            rules,
+            length / max(rules, 1),
+            covered / steps,
+            right / covered if covered else np.nan,
+        ]
         if not np.allclose(ours, walked, rtol=1e-12, atol=0, equal_nan=True):
             raise AssertionError(f"at {support}, {confidence}: {ours}, and by walking {walked}")

@@ -38,8 +38,11 @@ def episodes(quick: bool) -> Iterable[Row]:
 
     ours_took, theirs_took = side_by_side(ours, theirs, repeats=1 if quick else 3)
     yield Row(
-        f"{count} LunarLander episodes, expert", "Stable-Baselines3's evaluate_policy",
-        "times faster", theirs_took / ours_took, 5,
+        f"{count} LunarLander episodes, expert",
+        "Stable-Baselines3's evaluate_policy",
+        "times faster",
+        theirs_took / ours_took,
+        5,
         f"{duration(ours_took)} against {duration(theirs_took)}; mean return {mean:.0f} and "
         f"{statistics.mean(returns):.0f}",
     )
@@ -48,6 +51,7 @@ def episodes(quick: bool) -> Iterable[Row]:
 def gif(quick: bool) -> Iterable[Row]:
     """A GIF of 200 frames, against imageio's default."""
     import imageio
+
     from sarl_core.rollouts.rendering import encode_gif
 
     frames = _frames(50 if quick else 200)
@@ -60,8 +64,11 @@ def gif(quick: bool) -> Iterable[Row]:
         )
         sizes = ours_file.stat().st_size, theirs_file.stat().st_size
     yield Row(
-        f"GIF of {len(frames)} frames, 600 x 400, encoding", "imageio.mimsave with defaults",
-        "times faster", theirs / ours, 8,
+        f"GIF of {len(frames)} frames, 600 x 400, encoding",
+        "imageio.mimsave with defaults",
+        "times faster",
+        theirs / ours,
+        8,
         f"{duration(ours)} against {duration(theirs)}; {sizes[0] / 1e6:.2f} MB against "
         f"{sizes[1] / 1e6:.2f} MB",
         holds=sizes[0] <= sizes[1],
@@ -72,8 +79,9 @@ def _frames(count: int) -> list[np.ndarray]:
     """What the expert's episodes look like."""
     from sarl_core.rollouts.agents import make_agent
 
-    agent, env = make_agent("expert", data.ENV_ID), gymnasium.make(
-        data.ENV_ID, render_mode="rgb_array"
+    agent, env = (
+        make_agent("expert", data.ENV_ID),
+        gymnasium.make(data.ENV_ID, render_mode="rgb_array"),
     )
     frames: list[np.ndarray] = []
     observation, _ = env.reset(seed=1)

@@ -60,8 +60,11 @@ def decision(quick: bool) -> Iterable[Row]:
     bare_took, _ = side_by_side(without, predict, repeats=1)
     one, other = (shielded_took - bare_took) / len(states), predict_took / len(states)
     yield Row(
-        "one shield decision, with its record", "one Stable-Baselines3 predict",
-        "share", one / other, 0.03,
+        "one shield decision, with its record",
+        "one Stable-Baselines3 predict",
+        "share",
+        one / other,
+        0.03,
         f"{duration(one)} against {duration(other)}; {len(data.rules()):,} rules",
     )
 
@@ -83,7 +86,10 @@ def batch(quick: bool) -> Iterable[Row]:
         lambda: shield.decide_batch(states, actions), one_by_one, repeats=3 if quick else 7
     )
     yield Row(
-        f"shield, {count:,} states in a batch", "the same, one by one",
-        "times faster", theirs / ours, 10,
+        f"shield, {count:,} states in a batch",
+        "the same, one by one",
+        "times faster",
+        theirs / ours,
+        10,
         f"{duration(ours)} against {duration(theirs)}",
     )

@@ -24,6 +24,10 @@ def imports(quick: bool) -> Iterable[Row]:
     pairs = [(fresh("sarl_core"), fresh("sklearn.tree")) for _ in range(3 if quick else 9)]
     ours, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
     yield Row(
-        "import sarl_core", "import sklearn.tree", "share", ours / theirs, 1.1,
+        "import sarl_core",
+        "import sklearn.tree",
+        "share",
+        ours / theirs,
+        1.1,
         f"{duration(ours)} against {duration(theirs)}, interpreter included",
     )

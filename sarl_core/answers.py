@@ -106,15 +106,20 @@ def print_demonstrations(document: dict[str, Any]) -> None:
     """
     origin = document["env_id"] or "an environment that the file does not name"
     by = f", by {document['agent']}" if document["agent"] else ""
-    terminal.print_lines([
-        f"{document['file']}: {document['steps']:,} steps of {origin}{by}", "",
-    ])
+    terminal.print_lines(
+        [
+            f"{document['file']}: {document['steps']:,} steps of {origin}{by}",
+            "",
+        ]
+    )
     terminal.print_facts(_facts(document))
     terminal.print_table(
         ("feature", "least", "median", "largest"),
         [
-            (f"{entry['name']} ({entry['unit']})" if entry["unit"] else entry["name"],
-             *_numbers(entry))
+            (
+                f"{entry['name']} ({entry['unit']})" if entry["unit"] else entry["name"],
+                *_numbers(entry),
+            )
             for entry in document["features"]
         ],
     )
@@ -141,8 +146,12 @@ def _print_actions(actions: list[dict[str, Any]]) -> None:
         terminal.print_table(
             ("action", "bounds", "bounds from", "least", "median", "largest"),
             [
-                (action["name"], f"{action['low']:g} to {action['high']:g}",
-                 action["bounds_from"], *_numbers(action))
+                (
+                    action["name"],
+                    f"{action['low']:g} to {action['high']:g}",
+                    action["bounds_from"],
+                    *_numbers(action),
+                )
                 for action in intervals
             ],
         )
@@ -155,8 +164,13 @@ def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
     for name in ("lengths", "returns"):
         spread = document[name]
         if spread is not None:
-            facts.append((name, f"mean {spread['mean']:,.1f}, from {spread['min']:,.1f} to "
-                                f"{spread['max']:,.1f}"))
+            facts.append(
+                (
+                    name,
+                    f"mean {spread['mean']:,.1f}, from {spread['min']:,.1f} to "
+                    f"{spread['max']:,.1f}",
+                )
+            )
     return [*facts, ("digest", document["digest"])]
 
 
@@ -181,8 +195,10 @@ def describe_rules(rule_set: RuleSet, path: Path) -> dict[str, Any]:
         "env_id": rule_set.source.env_id,
         "steps": rule_set.source.steps,
         "thresholds": {
-            "support": thresholds.support, "confidence": thresholds.confidence,
-            "lift": thresholds.lift, "max_depth": thresholds.max_depth,
+            "support": thresholds.support,
+            "confidence": thresholds.confidence,
+            "lift": thresholds.lift,
+            "max_depth": thresholds.max_depth,
         },
         "divider": rule_set.divider,
         "rules": rule_set.rule_count,
@@ -258,9 +274,14 @@ def print_replay(document: dict[str, Any]) -> None:
     terminal.print_table(
         ("agent", "seed", "return", "length", "interventions", "covered"),
         [
-            (f"{entry['agent']}{', shielded' if entry['shielded'] else ''}", str(entry["seed"]),
-             f"{entry['return']:.2f}", f"{entry['length']:,}", f"{entry['interventions']:,}",
-             f"{entry['covered']:,}")
+            (
+                f"{entry['agent']}{', shielded' if entry['shielded'] else ''}",
+                str(entry["seed"]),
+                f"{entry['return']:.2f}",
+                f"{entry['length']:,}",
+                f"{entry['interventions']:,}",
+                f"{entry['covered']:,}",
+            )
             for entry in document["episodes"]
         ],
     )

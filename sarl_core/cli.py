@@ -27,33 +27,67 @@ app = typer.Typer(
 )
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
-EnvOfFile = Annotated[str | None, typer.Option(
-    "--env", metavar="ENV", show_default=False,
-    help="Take spaces, names and bounds from this environment where the file has none.",
-)]
-Env = Annotated[str, typer.Option(
-    "--env", metavar="ENV", show_default=False,
-    help="What gymnasium.make takes, module:Id included.",
-)]
-AgentName = Annotated[str, typer.Option(
-    "--agent", metavar="AGENT", show_default=False,
-    help="novice (uniform random actions), untrained (fresh PPO weights, sampled), expert (the "
-         "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
-)]
+EnvOfFile = Annotated[
+    str | None,
+    typer.Option(
+        "--env",
+        metavar="ENV",
+        show_default=False,
+        help="Take spaces, names and bounds from this environment where the file has none.",
+    ),
+]
+Env = Annotated[
+    str,
+    typer.Option(
+        "--env",
+        metavar="ENV",
+        show_default=False,
+        help="What gymnasium.make takes, module:Id included.",
+    ),
+]
+AgentName = Annotated[
+    str,
+    typer.Option(
+        "--agent",
+        metavar="AGENT",
+        show_default=False,
+        help="novice (uniform random actions), untrained (fresh PPO weights, sampled), expert (the "
+        "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same result.")]
-Stochastic = Annotated[bool, typer.Option(
-    "--stochastic", help="Sample a trained agent's actions instead of taking the likeliest.",
-)]
-Rules = Annotated[Path | None, typer.Option(
-    "--rules", metavar="RULES.json", show_default=False, help="Shield the agent with these rules.",
-)]
-ProjectionName = Annotated[Literal["centre", "clip", "expert"], typer.Option(
-    "--projection", help="What a continuous action that breaks a rule becomes: the centre of the "
-                         "rule's interval, the nearest value in it, or the expert's median.",
-)]
-Divider = Annotated[int, typer.Option(
-    "--divider", min=2, help="Intervals of each continuous action dimension.",
-)]
+Stochastic = Annotated[
+    bool,
+    typer.Option(
+        "--stochastic",
+        help="Sample a trained agent's actions instead of taking the likeliest.",
+    ),
+]
+Rules = Annotated[
+    Path | None,
+    typer.Option(
+        "--rules",
+        metavar="RULES.json",
+        show_default=False,
+        help="Shield the agent with these rules.",
+    ),
+]
+ProjectionName = Annotated[
+    Literal["centre", "clip", "expert"],
+    typer.Option(
+        "--projection",
+        help="What a continuous action that breaks a rule becomes: the centre of the "
+        "rule's interval, the nearest value in it, or the expert's median.",
+    ),
+]
+Divider = Annotated[
+    int,
+    typer.Option(
+        "--divider",
+        min=2,
+        help="Intervals of each continuous action dimension.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
@@ -72,9 +106,13 @@ def main(arguments: Sequence[str]) -> int:
 @app.callback(invoke_without_command=True)
 def _start(
     context: typer.Context,
-    debug: Annotated[bool, typer.Option(
-        "--debug", help="After an error, show where it came from. Also after a command.",
-    )] = False,
+    debug: Annotated[
+        bool,
+        typer.Option(
+            "--debug",
+            help="After an error, show where it came from. Also after a command.",
+        ),
+    ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
         terminal.print_lines([context.get_help()])
@@ -84,9 +122,15 @@ def _start(
 def record(
     env: Env,
     agent: AgentName,
-    out: Annotated[Path, typer.Option(
-        "--out", metavar="FILE", show_default=False, help="A .parquet, .csv or .npz file.",
-    )],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .parquet, .csv or .npz file.",
+        ),
+    ],
     steps: Annotated[int, typer.Option("--steps", min=1, help="How many to record.")] = 15_000,
     seed: Seed = 0,
     stochastic: Stochastic = False,
@@ -121,22 +165,43 @@ def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
 @app.command()
 def mine(
     file: File,
-    support: Annotated[float, typer.Option(
-        "--support", show_default=False, help="Minimum share of the states a rule applies to.",
-    )],
-    confidence: Annotated[float, typer.Option(
-        "--confidence", show_default=False,
-        help="Minimum share of those in which the expert did what the rule says.",
-    )],
-    out: Annotated[Path, typer.Option(
-        "--out", metavar="RULES.json", show_default=False, help="The rule file to write.",
-    )],
+    support: Annotated[
+        float,
+        typer.Option(
+            "--support",
+            show_default=False,
+            help="Minimum share of the states a rule applies to.",
+        ),
+    ],
+    confidence: Annotated[
+        float,
+        typer.Option(
+            "--confidence",
+            show_default=False,
+            help="Minimum share of those in which the expert did what the rule says.",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="RULES.json",
+            show_default=False,
+            help="The rule file to write.",
+        ),
+    ],
     env: EnvOfFile = None,
     lift: Annotated[float, typer.Option("--lift", help="Minimum lift.")] = 0.0,
     divider: Divider = 2,
-    max_depth: Annotated[int | None, typer.Option(
-        "--max-depth", min=0, help="Most conditions a rule may have.", show_default="no limit",
-    )] = None,
+    max_depth: Annotated[
+        int | None,
+        typer.Option(
+            "--max-depth",
+            min=0,
+            help="Most conditions a rule may have.",
+            show_default="no limit",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Mine a rule set and write it to a rule file.
@@ -150,8 +215,12 @@ def mine(
 
         Thresholds(support, confidence, lift, max_depth)  # refuse them before the file is read
         rule_set = mine_rules(
-            _load(file, env), supp_min=support, conf_min=confidence, lift_min=lift,
-            max_depth=max_depth, divider=divider,
+            _load(file, env),
+            supp_min=support,
+            conf_min=confidence,
+            lift_min=lift,
+            max_depth=max_depth,
+            divider=divider,
         )
         rule_set.save(out)
     from sarl_core.answers import describe_rules, print_rules
@@ -165,17 +234,33 @@ def mine(
 @app.command()
 def landscape(
     file: File,
-    out: Annotated[Path, typer.Option(
-        "--out", metavar="FILE", show_default=False, help="A .json, .csv, .html or .png file.",
-    )],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .json, .csv, .html or .png file.",
+        ),
+    ],
     env: EnvOfFile = None,
     divider: Divider = 2,
-    supports: Annotated[str, typer.Option(
-        "--supports", metavar="A:B:STEP", help="Minimum supports, from A to B.",
-    )] = "0:0.5:0.05",
-    confidences: Annotated[str, typer.Option(
-        "--confidences", metavar="A:B:STEP", help="Minimum confidences, from A to B.",
-    )] = "0:1:0.05",
+    supports: Annotated[
+        str,
+        typer.Option(
+            "--supports",
+            metavar="A:B:STEP",
+            help="Minimum supports, from A to B.",
+        ),
+    ] = "0:0.5:0.05",
+    confidences: Annotated[
+        str,
+        typer.Option(
+            "--confidences",
+            metavar="A:B:STEP",
+            help="Minimum confidences, from A to B.",
+        ),
+    ] = "0:1:0.05",
     as_json: Json = False,
 ) -> None:
     """Rule count, mean length, coverage and fidelity for every pair of thresholds of a grid.
@@ -205,10 +290,12 @@ def landscape(
         return
     cells = f"{found.rule_count.size:,} cells"
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
-    terminal.print_lines([
-        f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} rules, "
-        f"from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
-    ])
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} rules, "
+            f"from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
+        ]
+    )
 
 
 @app.command()
@@ -217,9 +304,14 @@ def evaluate(
     agent: AgentName,
     rules: Rules = None,
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many.")] = 10,
-    seed: Annotated[int, typer.Option(
-        "--seed", min=0, help="Episode i uses this seed + i.",
-    )] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Episode i uses this seed + i.",
+        ),
+    ] = 0,
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     as_json: Json = False,
@@ -233,8 +325,14 @@ def evaluate(
         from sarl_core.rollouts.episodes import rollout
 
         found = rollout(
-            env, agent, shield=_shield(rules, projection), episodes=episodes, seed=seed,
-            stochastic=stochastic, keep_steps=False, progress=advance,
+            env,
+            agent,
+            shield=_shield(rules, projection),
+            episodes=episodes,
+            seed=seed,
+            stochastic=stochastic,
+            keep_steps=False,
+            progress=advance,
         )
         document = found.to_dict()
     if as_json:
@@ -248,32 +346,52 @@ def evaluate(
     terminal.print_table(
         ("seed", "return", "length", "interventions", "covered"),
         [
-            (str(row["seed"]), f"{row['return']:.2f}", f"{row['length']:,}",
-             f"{row['interventions']:,}", f"{row['covered']:,}")
+            (
+                str(row["seed"]),
+                f"{row['return']:.2f}",
+                f"{row['length']:,}",
+                f"{row['interventions']:,}",
+                f"{row['covered']:,}",
+            )
             for row in document["episodes"]
         ],
     )
-    terminal.print_facts([
-        ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
-        ("IQM of the returns", f"{summary['iqm']:.2f} (95 % interval {summary['iqm_low']:.2f} to "
-                               f"{summary['iqm_high']:.2f})"),
-        ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
-        ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
-    ])
+    terminal.print_facts(
+        [
+            ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
+            (
+                "IQM of the returns",
+                f"{summary['iqm']:.2f} (95 % interval {summary['iqm_low']:.2f} to "
+                f"{summary['iqm_high']:.2f})",
+            ),
+            ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
+            ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
+        ]
+    )
 
 
 @app.command()
 def render(
     env: Env,
     agent: AgentName,
-    out: Annotated[Path, typer.Option(
-        "--out", metavar="FILE", show_default=False, help="A .gif or .mp4 file.",
-    )],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .gif or .mp4 file.",
+        ),
+    ],
     rules: Rules = None,
     seed: Seed = 0,
-    both: Annotated[bool, typer.Option(
-        "--side-by-side", help="With the shield and without it, on the same seed.",
-    )] = False,
+    both: Annotated[
+        bool,
+        typer.Option(
+            "--side-by-side",
+            help="With the shield and without it, on the same seed.",
+        ),
+    ] = False,
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     as_json: Json = False,
@@ -312,14 +430,25 @@ def render(
 @app.command("train-expert")
 def train_expert(
     env: Env,
-    out: Annotated[Path, typer.Option(
-        "--out", metavar="FILE.npz", show_default=False,
-        help="The policy to write; its card stands beside it as .json.",
-    )],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE.npz",
+            show_default=False,
+            help="The policy to write; its card stands beside it as .json.",
+        ),
+    ],
     seed: Seed = 0,
-    steps: Annotated[int | None, typer.Option(
-        "--steps", min=1, help="Environment steps.", show_default="the recipe's",
-    )] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Environment steps.",
+            show_default="the recipe's",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Train an expert as the shipped ones were, and write its weights and its card.
@@ -331,17 +460,22 @@ def train_expert(
         from sarl_core.rollouts.training import train_expert as train
 
         card = train(
-            env, out=out, seed=seed, steps=steps,
+            env,
+            out=out,
+            seed=seed,
+            steps=steps,
             progress=lambda done, total, _: advance(done, total),
         )
     if as_json:
         terminal.print_json(card)
         return
     returns = card["returns_deterministic"]
-    terminal.print_lines([
-        f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
-        f"({returns['min']:.1f} to {returns['max']:.1f}), after {card['kept_after_steps']:,} steps."
-    ])
+    terminal.print_lines(
+        [
+            f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
+            f"({returns['min']:.1f} to {returns['max']:.1f}), after {card['kept_after_steps']:,} steps."
+        ]
+    )
 
 
 def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:

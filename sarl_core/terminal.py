@@ -44,7 +44,8 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
                 warnings.simplefilter("ignore")  # libraries warn who calls them, not the user
             code = app(
                 [argument for argument in arguments if argument != "--debug"],
-                prog_name="python -m sarl_core", standalone_mode=False,
+                prog_name="python -m sarl_core",
+                standalone_mode=False,
             )
         return _code(code)
     except (Exception, KeyboardInterrupt) as error:
@@ -91,8 +92,12 @@ def working(description: str) -> Iterator[Advance]:
         if not sys.stderr.isatty():
             yield lambda done, total: None
             return
-        columns = (TextColumn("{task.description}"), BarColumn(),
-                   TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeRemainingColumn(),
+        )
         with Progress(*columns, console=_console(error=True), transient=True) as bar:
             task = bar.add_task(description, total=None)
             yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -91,20 +91,43 @@ def test_check_prints_warnings(run, tmp_path):
 def test_record_writes_what_check_reads(run, tmp_path):
     for name in ("cart.parquet", "cart.csv", "cart.npz"):
         path = tmp_path / name
-        document = json.loads(run(
-            "record", "--env", "CartPole-v1", "--agent", "novice", "--steps", 120, "--seed", 3,
-            "--out", path, "--json",
-        ))
+        document = json.loads(
+            run(
+                "record",
+                "--env",
+                "CartPole-v1",
+                "--agent",
+                "novice",
+                "--steps",
+                120,
+                "--seed",
+                3,
+                "--out",
+                path,
+                "--json",
+            )
+        )
         assert document["steps"] == 120
         assert json.loads(run("check", path, "--env", "CartPole-v1", "--json"))["steps"] == 120
 
 
 def test_record_is_the_same_for_one_seed_and_differs_when_sampled(run, tmp_path):
     def record(name, *more):
-        return json.loads(run(
-            "record", "--env", "Pendulum-v1", "--agent", "expert", "--steps", 50,
-            "--out", tmp_path / name, "--json", *more,
-        ))["digest"]
+        return json.loads(
+            run(
+                "record",
+                "--env",
+                "Pendulum-v1",
+                "--agent",
+                "expert",
+                "--steps",
+                50,
+                "--out",
+                tmp_path / name,
+                "--json",
+                *more,
+            )
+        )["digest"]
 
     assert record("a.parquet") == record("b.parquet")
     assert record("a.parquet") != record("c.parquet", "--stochastic")
@@ -123,17 +146,35 @@ def test_mine_writes_the_rules_and_says_them_in_words(run, tmp_path):
 
 def test_mine_as_json_agrees_with_the_rule_file(run, tmp_path):
     path = tmp_path / "rules.json"
-    document = json.loads(run(
-        "mine", PENDULUM, "--support", 0.01, "--confidence", 0.8, "--divider", 4, "--max-depth", 6,
-        "--lift", 1.1, "--out", path, "--json",
-    ))
+    document = json.loads(
+        run(
+            "mine",
+            PENDULUM,
+            "--support",
+            0.01,
+            "--confidence",
+            0.8,
+            "--divider",
+            4,
+            "--max-depth",
+            6,
+            "--lift",
+            1.1,
+            "--out",
+            path,
+            "--json",
+        )
+    )
     rules = RuleSet.load(path)
     assert document["rules"] == len(rules) == sum(document["rules_per_dimension"].values())
     assert document["coverage"] == rules.coverage
     assert rules.divider == 4
     assert all(rule.length <= 6 and rule.lift >= 1.1 for rule in rules.rules)
     assert document["thresholds"] == {
-        "support": 0.01, "confidence": 0.8, "lift": 1.1, "max_depth": 6,
+        "support": 0.01,
+        "confidence": 0.8,
+        "lift": 1.1,
+        "max_depth": 6,
     }
 
 
@@ -174,14 +215,41 @@ def test_landscape_json_has_the_papers_grid_and_null_for_no_fidelity(run, tmp_pa
 
 def test_landscape_agrees_with_mining_at_a_cell_of_the_grid(run, tmp_path):
     path = tmp_path / "landscape.json"
-    run("landscape", PENDULUM, "--divider", 3, "--supports", "0.01:0.03:0.01",
-        "--confidences", "0.7:0.9:0.1", "--out", path)
+    run(
+        "landscape",
+        PENDULUM,
+        "--divider",
+        3,
+        "--supports",
+        "0.01:0.03:0.01",
+        "--confidences",
+        "0.7:0.9:0.1",
+        "--out",
+        path,
+    )
     document = json.loads(path.read_text())
     assert document["supports"] == [0.01, 0.02, 0.03]
-    mined = json.loads(run("mine", PENDULUM, "--divider", 3, "--support", 0.02,
-                           "--confidence", 0.9, "--out", tmp_path / "rules.json", "--json"))
-    for layer, name in (("rule_count", "rules"), ("mean_length", "mean_length"),
-                        ("coverage", "coverage"), ("fidelity", "fidelity")):
+    mined = json.loads(
+        run(
+            "mine",
+            PENDULUM,
+            "--divider",
+            3,
+            "--support",
+            0.02,
+            "--confidence",
+            0.9,
+            "--out",
+            tmp_path / "rules.json",
+            "--json",
+        )
+    )
+    for layer, name in (
+        ("rule_count", "rules"),
+        ("mean_length", "mean_length"),
+        ("coverage", "coverage"),
+        ("fidelity", "fidelity"),
+    ):
         assert document[layer][1][2] == pytest.approx(mined[name], abs=1e-12)
 
 
@@ -204,8 +272,16 @@ def test_landscape_csv_tells_action_dimensions_apart(run, tmp_path):
         "\n".join(["episode,step,obs_x,obs_y,action_up,action_down", *rows]) + "\n"
     )
     path = tmp_path / "landscape.csv"
-    run("landscape", demonstrations, "--supports", "0:0.1:0.1", "--confidences", "0.5:1:0.5",
-        "--out", path)
+    run(
+        "landscape",
+        demonstrations,
+        "--supports",
+        "0:0.1:0.1",
+        "--confidences",
+        "0.5:1:0.5",
+        "--out",
+        path,
+    )
     with path.open(newline="") as file:
         found = [row["dimension"] for row in csv.DictReader(file)]
     assert found == ["all"] * 4 + ["up"] * 4 + ["down"] * 4
@@ -229,8 +305,20 @@ def test_landscape_png_is_a_picture_with_something_on_it(run, tmp_path):
 
 
 def test_evaluate_as_json_is_the_contract(run, cart_rules):
-    arguments = ("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules,
-                 "--episodes", 4, "--seed", 7, "--json")
+    arguments = (
+        "evaluate",
+        "--env",
+        "CartPole-v1",
+        "--agent",
+        "novice",
+        "--rules",
+        cart_rules,
+        "--episodes",
+        4,
+        "--seed",
+        7,
+        "--json",
+    )
     document = json.loads(run(*arguments))
     assert [episode["seed"] for episode in document["episodes"]] == [7, 8, 9, 10]
     for episode in document["episodes"]:
@@ -238,7 +326,13 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
         assert 0 <= episode["interventions"] <= episode["covered"] <= episode["length"]
     summary = document["summary"]
     assert set(summary) == {
-        "mean", "std", "iqm", "iqm_low", "iqm_high", "intervention_rate", "coverage",
+        "mean",
+        "std",
+        "iqm",
+        "iqm_low",
+        "iqm_high",
+        "intervention_rate",
+        "coverage",
     }
     assert summary["mean"] == np.mean([episode["return"] for episode in document["episodes"]])
     assert summary["intervention_rate"] > 0
@@ -250,8 +344,10 @@ def test_evaluate_prints_a_row_an_episode_and_a_shield_helps_a_novice(run, cart_
         arguments = ("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--episodes", 5)
         text = run(*arguments, *more)
         assert "interventions" in text
-        assert sum(line.split()[:1] == [str(seed)] for seed in range(5)
-                   for line in text.splitlines()) == 5
+        assert (
+            sum(line.split()[:1] == [str(seed)] for seed in range(5) for line in text.splitlines())
+            == 5
+        )
         return json.loads(run(*arguments, *more, "--json"))["summary"]["mean"]
 
     assert mean("--rules", cart_rules) > 5 * mean()
@@ -261,8 +357,22 @@ def test_evaluate_projects_as_told(run, tmp_path):
     rules = tmp_path / "rules.json"
     run("mine", PENDULUM, "--support", 0, "--confidence", 0.9, "--divider", 5, "--out", rules)
     means = {
-        json.loads(run("evaluate", "--env", "Pendulum-v1", "--agent", "novice", "--rules", rules,
-                       "--episodes", 2, "--projection", projection, "--json"))["summary"]["mean"]
+        json.loads(
+            run(
+                "evaluate",
+                "--env",
+                "Pendulum-v1",
+                "--agent",
+                "novice",
+                "--rules",
+                rules,
+                "--episodes",
+                2,
+                "--projection",
+                projection,
+                "--json",
+            )
+        )["summary"]["mean"]
         for projection in ("centre", "clip", "expert")
     }
     assert len(means) == 3
@@ -270,8 +380,17 @@ def test_evaluate_projects_as_told(run, tmp_path):
 
 def test_evaluate_samples_a_trained_agent_only_when_told(run):
     def evaluate(*more):
-        return run("evaluate", "--env", "Pendulum-v1", "--agent", "expert", "--episodes", 1,
-                   "--json", *more)
+        return run(
+            "evaluate",
+            "--env",
+            "Pendulum-v1",
+            "--agent",
+            "expert",
+            "--episodes",
+            1,
+            "--json",
+            *more,
+        )
 
     assert evaluate() == evaluate()
     assert evaluate() != evaluate("--stochastic")
@@ -279,8 +398,19 @@ def test_evaluate_samples_a_trained_agent_only_when_told(run):
 
 def test_render_side_by_side_as_gif(run, cart_rules, tmp_path):
     path = tmp_path / "replay.gif"
-    arguments = ("render", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules,
-                 "--seed", 1, "--out", path)
+    arguments = (
+        "render",
+        "--env",
+        "CartPole-v1",
+        "--agent",
+        "novice",
+        "--rules",
+        cart_rules,
+        "--seed",
+        1,
+        "--out",
+        path,
+    )
     alone = json.loads(run(*arguments, "--json"))
     with Image.open(path) as picture:
         width = picture.width
@@ -333,10 +463,25 @@ def test_json_is_all_there_is_on_standard_output(tmp_path):
         "gymnasium.register('Chatty-v0', entry_point=Chatty, max_episode_steps=5)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-m", "sarl_core", "evaluate", "--env", "chatty:Chatty-v0", "--agent",
-         "novice", "--episodes", "2", "--json"],
-        cwd=ROOT, env={"PYTHONPATH": str(tmp_path), "PATH": ""}, stdin=subprocess.DEVNULL,
-        capture_output=True, text=True, check=False,
+        [
+            sys.executable,
+            "-m",
+            "sarl_core",
+            "evaluate",
+            "--env",
+            "chatty:Chatty-v0",
+            "--agent",
+            "novice",
+            "--episodes",
+            "2",
+            "--json",
+        ],
+        cwd=ROOT,
+        env={"PYTHONPATH": str(tmp_path), "PATH": ""},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)["episodes"]) == 2

@@ -159,10 +159,26 @@ def test_what_nobody_expected_is_one_line_and_with_debug_a_traceback(fail, monke
 def test_control_c_is_one_line_and_code_130(tmp_path):
     out = tmp_path / "long.csv"
     process = subprocess.Popen(
-        [sys.executable, "-m", "sarl_core", "record", "--env", "CartPole-v1", "--agent", "novice",
-         "--steps", "100000000", "--out", str(out)],
-        cwd=ROOT, env={**os.environ}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True,
+        [
+            sys.executable,
+            "-m",
+            "sarl_core",
+            "record",
+            "--env",
+            "CartPole-v1",
+            "--agent",
+            "novice",
+            "--steps",
+            "100000000",
+            "--out",
+            str(out),
+        ],
+        cwd=ROOT,
+        env={**os.environ},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     # Only a program that has come to its work can be interrupted in it.
     busy = Path(f"/proc/{process.pid}/maps")

@@ -53,9 +53,7 @@ def parse_grid(text: str, name: str) -> NDArray[np.float64]:
     if first < 0 or last > 1:
         raise InputError(f"{name} is {text!r}; thresholds are shares from 0 to 1")
     if (last - first) / step >= MAX_VALUES:
-        raise InputError(
-            f"{name} is {text!r}, more than {MAX_VALUES:,} values; give a larger step"
-        )
+        raise InputError(f"{name} is {text!r}, more than {MAX_VALUES:,} values; give a larger step")
     count = int((last - first) / step) + 1
     return np.array([float(first + index * step) for index in range(count)])
 
@@ -90,8 +88,10 @@ def save_landscape(
         from sarl_core.explaining.threshold_figures import landscape_figure
 
         figure = landscape_figure(landscape, title=title)
-        content = figure_to_png(figure) if suffix == ".png" else (
-            figure.to_html(include_plotlyjs=True).encode()
+        content = (
+            figure_to_png(figure)
+            if suffix == ".png"
+            else (figure.to_html(include_plotlyjs=True).encode())
         )
     else:
         raise InputError(f"{path} ends in none of .json, .csv, .html, .png; choose one")
@@ -126,8 +126,7 @@ def _layers(landscape: Landscape) -> dict[str, Any]:
     layers = {layer: getattr(landscape, layer).tolist() for layer in _LAYERS}
     # NaN, the only number that is not itself, is where nothing is covered.
     layers["fidelity"] = [
-        [None if value != value else value for value in row]
-        for row in layers["fidelity"]
+        [None if value != value else value for value in row] for row in layers["fidelity"]
     ]
     return layers
 

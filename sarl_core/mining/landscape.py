@@ -159,7 +159,10 @@ def _axis(values: ArrayLike, name: str) -> Floats:
 
 
 def _sums(
-    tree: PolicyTree, supports: Floats, confidences: Floats, lift_min: float,
+    tree: PolicyTree,
+    supports: Floats,
+    confidences: Floats,
+    lift_min: float,
     max_depth: int | None,
 ) -> _Sums:
     rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
@@ -186,9 +189,7 @@ def _sums(
     return _Sums(*planes[:, :, :-1])
 
 
-def _layers(
-    supports: Floats, confidences: Floats, sums: _Sums, steps: int
-) -> Landscape:
+def _layers(supports: Floats, confidences: Floats, sums: _Sums, steps: int) -> Landscape:
     with np.errstate(invalid="ignore"):
         fidelity = sums.correct / sums.covered
     return Landscape(
@@ -263,6 +264,8 @@ def next_changes(
         return max(inside) if largest else min(inside)
 
     return Changes(
-        pick(below_s, largest=True), pick(above_s, largest=False),
-        pick(below_c, largest=True), pick(above_c, largest=False),
+        pick(below_s, largest=True),
+        pick(above_s, largest=False),
+        pick(below_c, largest=True),
+        pick(above_c, largest=False),
     )

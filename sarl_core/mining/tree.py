@@ -261,8 +261,16 @@ def grow_policy_trees(
         learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
         learner.fit(demonstrations.observations, labels)
         trees.append(
-            _read(learner, demonstrations.observations, labels, index, dimension, int(divider),
-                  source, demonstrated)
+            _read(
+                learner,
+                demonstrations.observations,
+                labels,
+                index,
+                dimension,
+                int(divider),
+                source,
+                demonstrated,
+            )
         )
     return tuple(trees)
 

@@ -156,7 +156,10 @@ class Matcher:
         return left
 
     def _walk(
-        self, states: NDArray[np.float32], rows: NDArray[np.int64], rules: NDArray[np.int64],
+        self,
+        states: NDArray[np.float32],
+        rows: NDArray[np.int64],
+        rules: NDArray[np.int64],
         margins: NDArray[np.float64],
     ) -> None:
         """Walk the tree from its root with some rows; fill in where they end."""

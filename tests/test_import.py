@@ -1,0 +1,77 @@
+"""What importing loads, in a fresh interpreter."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sarl_core
+
+ROOT = Path(__file__).resolve().parents[1]
+LEARNERS = {"torch", "stable_baselines3"}
+HEAVY = LEARNERS | {
+    "numpy",
+    "scipy",
+    "sklearn",
+    "pandas",
+    "pyarrow",
+    "gymnasium",
+    "plotly",
+    "imageio",
+    "PIL",
+    "streamlit",
+}
+
+
+def loaded_after(code: str) -> set[str]:
+    """The top-level modules that some code loads."""
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"{code}\nimport json, sys\nprint(json.dumps(list(sys.modules)), file=sys.stderr)",
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    modules = json.loads(done.stderr.splitlines()[-1])
+    assert any(name.startswith("sarl_core") for name in modules)
+    return {name.split(".")[0] for name in modules}
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    assert not loaded_after("import sarl_core") & (HEAVY | {"typer", "rich"})
+
+
+def test_help_loads_nothing_heavy():
+    assert not loaded_after("from sarl_core.cli import main\nassert main(['--help']) == 0") & HEAVY
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "main(['check', 'data/demonstrations/cartpole.parquet'])",
+        "main(['evaluate', '--env', 'CartPole-v1', '--agent', 'expert', '--episodes', '1'])",
+    ],
+)
+def test_work_without_a_learner_loads_none(call):
+    assert not loaded_after(f"from sarl_core.cli import main\nassert {call} == 0") & LEARNERS
+
+
+def test_mining_and_shielding_load_no_learner():
+    names = "grow_policy_trees, mine_rules, load_demonstrations, Shield, ShieldedEnv, rollout"
+    assert not loaded_after(f"from sarl_core import {names}") & LEARNERS
+
+
+def test_every_public_name_is_there():
+    for name in sarl_core.__all__:
+        assert getattr(sarl_core, name).__name__ == name
+    assert set(sarl_core.__all__) <= set(dir(sarl_core))
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = sarl_core.nonsense

@@ -1,0 +1,132 @@
+"""What holds for the files of the project, whatever is in them."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("sarl_core", "pages", "tests", "benchmarks")
+OURS = {*FOLDERS, "app"}
+# Used by name and not by import.
+TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist", "kaleido"}
+
+
+def python_files() -> list[Path]:
+    found = [ROOT / "app.py"]
+    for folder in FOLDERS:
+        found += sorted((ROOT / folder).rglob("*.py"))
+    return found
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pins(name: str) -> dict[str, str]:
+    """Package and version of each line that is more than a comment."""
+    found = {}
+    for line in (ROOT / name).read_text().splitlines():
+        line = line.split("#")[0].strip()
+        if line and not line.startswith("-r "):
+            match = re.fullmatch(r"([A-Za-z0-9_.-]+)(?:\[[a-z0-9,]+\])?==([0-9][0-9a-z.]*)", line)
+            assert match, f"{line!r} in {name} is no exact pin"
+            found[normal(match[1])] = match[2]
+    return found
+
+
+def imported(files: list[Path]) -> set[str]:
+    """Top-level names that files import from elsewhere."""
+    names = set()
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                names.add(node.module.split(".")[0])
+    return names - OURS - set(sys.stdlib_module_names)
+
+
+def packages_of(modules: set[str]) -> set[str]:
+    """The packages that bring modules."""
+    homes = metadata.packages_distributions()
+    return {normal(home) for module in modules for home in homes.get(module, [])[:1]}
+
+
+def test_every_pin_is_what_the_tests_ran_with():
+    for package, version in (pins("requirements.txt") | pins("requirements-dev.txt")).items():
+        assert metadata.version(package).split("+")[0] == version, package
+
+
+def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
+    files = [
+        path
+        for path in python_files()
+        if path.relative_to(ROOT).parts[0] not in ("tests", "benchmarks")
+    ]
+    assert packages_of(imported(files)) | {"kaleido"} == set(pins("requirements.txt"))
+
+
+def test_what_tests_and_benchmarks_import_is_pinned():
+    known = set(pins("requirements.txt")) | set(pins("requirements-dev.txt"))
+    brought = packages_of(imported(python_files()))
+    assert brought <= known
+    assert set(pins("requirements-dev.txt")) <= brought | TOOLS
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "requirements.txt",
+        "requirements-dev.txt",
+        "pyproject.toml",
+        "Makefile",
+        ".ci/run",
+    ],
+)
+def test_no_registry_and_no_path_of_one_machine(name):
+    text = (ROOT / name).read_text()
+    assert "://" not in text.replace("http://localhost", "")
+    assert "--index" not in text
+    assert "--find-links" not in text
+    assert not re.search(r"(?<![\w.])/(home|root|work|Users|tmp|opt)\b", text)
+
+
+def test_no_python_file_has_grown_into_two_ideas():
+    lengths = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text().splitlines())
+        for path in python_files()
+    }
+    assert len(lengths) > 50
+    assert {name: length for name, length in lengths.items() if length > 450} == {}
+
+
+def test_imports_go_one_way():
+    linter = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run(
+        [linter, "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_contract_would_notice_a_dashboard_in_the_library(tmp_path):
+    """The line is drawn where the design draws it: a copy that crosses it is refused."""
+    (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
+    for path in (ROOT / "sarl_core").rglob("*.py"):
+        copy = tmp_path / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(path.read_text())
+    with (tmp_path / "sarl_core" / "errors.py").open("a") as file:
+        file.write("\nimport streamlit\n")
+    linter = Path(sys.executable).with_name("lint-imports")
+    done = subprocess.run(
+        [linter, "--no-cache"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "sarl_core.errors -> streamlit" in done.stdout
