@@ -70,7 +70,9 @@ def take_click(key: str) -> None:
     points = st.session_state[key].selection.points
     if points and "customdata" in points[0]:
         data = points[0]["customdata"]
-        st.session_state["_clicked"] = (float(data["0"]), float(data["1"]))
+        # Which of the two arrives depends on how the numbers were packed for the browser.
+        values = list(data.values()) if isinstance(data, dict) else list(data)
+        st.session_state["_clicked"] = (float(values[0]), float(values[1]))
     if "_clicked" in st.session_state:
         st.session_state["support"], st.session_state["confidence"] = st.session_state["_clicked"]
     follow()

@@ -193,12 +193,12 @@ def surface(
         paper_bgcolor="rgba(0,0,0,0)",
         scene={
             "xaxis": {key: across[key] for key in keep} | plain | {
-                "title": {"text": "Minimum support"}},
+                "title": {"text": "support"}},
             "yaxis": {key: along[key] for key in keep} | plain | {
-                "title": {"text": "Minimum confidence"}},
-            "zaxis": {"title": {"text": style.unit or layer.capitalize()}, "rangemode": "tozero",
+                "title": {"text": "confidence"}},
+            "zaxis": {"title": {"text": style.unit or layer}, "rangemode": "tozero",
                       **plain, **({"tickformat": ".0%"} if style.share else {})},
-            "camera": {"eye": {"x": 1.5, "y": -1.6, "z": 0.9}, "center": {"z": -0.15}},
+            "camera": {"eye": {"x": 1.75, "y": -1.85, "z": 1.1}, "center": {"z": -0.12}},
             "aspectmode": "manual", "aspectratio": {"x": 1.1, "y": 1.1, "z": 0.75},
         },
     )
@@ -322,7 +322,8 @@ def pareto(
         hovermode="closest", clickmode="event+select", dragmode=False,
         paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
     )
-    figure.update_xaxes(title={"text": "Number of rules"}, type="log", dtick=1, fixedrange=True)
+    figure.update_xaxes(title={"text": "Number of rules"}, type="log", dtick=1, tickformat=",d",
+                        fixedrange=True)
     figure.update_yaxes(
         title={"text": "Coverage"}, tickformat=".0%", range=[-0.03, 1.05], fixedrange=True
     )
