@@ -1,0 +1,42 @@
+"""What a person does in the dashboard, said once."""
+
+from __future__ import annotations
+
+from urllib.parse import parse_qs, urlsplit
+
+from playwright.sync_api import Page, expect
+
+PATIENCE = 60_000
+
+
+def visit(screen: Page, path: str, title: str) -> None:
+    """Open a page and wait until it has been written to the end."""
+    screen.goto(path)
+    expect(screen.get_by_role("heading", name=title, level=1)).to_be_visible(timeout=PATIENCE)
+    settle(screen)
+
+
+def settle(screen: Page) -> None:
+    """Wait until the script has run to its end, and the page says so twice in a row."""
+    for _ in range(2):
+        screen.wait_for_timeout(150)
+        screen.wait_for_function(
+            "() => document.querySelector('[data-test-script-state]')"
+            "?.getAttribute('data-test-script-state') === 'notRunning'"
+        )
+
+
+def metric(screen: Page, label: str) -> str:
+    """The value of a metric."""
+    found = screen.get_by_test_id("stMetric").filter(has=screen.get_by_text(label, exact=True))
+    return found.first.get_by_test_id("stMetricValue").inner_text().strip()
+
+
+def parameters(screen: Page) -> dict[str, str]:
+    """What the URL says."""
+    return {name: values[0] for name, values in parse_qs(urlsplit(screen.url).query).items()}
+
+
+def no_trace(screen: Page) -> None:
+    """No page shows an exception."""
+    assert screen.get_by_test_id("stException").count() == 0
