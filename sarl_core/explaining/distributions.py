@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,8 +146,9 @@ def interval_histogram(
     """
     k = dimension.n_labels
     each = max(1, bins // k)
-    edges = np.linspace(dimension.edges[0], dimension.edges[-1], k * each + 1)
-    edges[::each] = dimension.edges
+    parts = [np.linspace(low, high, each, endpoint=False)
+             for low, high in pairwise(dimension.edges)]
+    edges = np.concatenate([*parts, [dimension.edges[-1]]])
     index = np.searchsorted(edges[1:-1], values.astype(np.float64), side="right")
     return Histogram(edges, _count(index, index // each, k, k * each))
 

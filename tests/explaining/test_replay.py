@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.explaining.replay import (
+    environment_dimensions,
+    margin_text,
+    step_texts,
+    step_view,
+    tracks,
+)
+from sarl_core.explaining.replay_figures import (
+    ReturnLine,
+    ReturnRow,
+    comparison_figure,
+    intervention_strip,
+    return_figure,
+)
+from sarl_core.rollouts.steps import StepTable
+
+DATA = Path(__file__).parents[2] / "data" / "demonstrations"
+
+
+def played(name: str, *, divider: int = 2) -> tuple[RuleSet, StepTable]:
+    demonstrations = load_demonstrations(DATA / f"{name}.parquet")
+    rules = mine_rules(demonstrations, supp_min=0.0, conf_min=1.0, divider=divider)
+    episode = rollout(demonstrations.env_id, "novice", shield=Shield(rules), episodes=1, seed=3)
+    assert episode.steps is not None
+    return rules, episode.steps
+
+
+@pytest.fixture(scope="module", params=["cartpole", "pendulum"])
+def replayed(request: pytest.FixtureRequest) -> tuple[RuleSet, StepTable]:
+    return played(request.param)
+
+
+def test_a_changed_step_says_what_was_wanted_and_done_and_why(
+    replayed: tuple[RuleSet, StepTable],
+) -> None:
+    rules, steps = replayed
+    row = int(np.flatnonzero(steps.intervened)[0])
+    view = step_view(steps, row, rules.actions, rules.source.features, rules)
+    (action,) = view.actions
+    assert view.intervened
+    assert action.changed
+    assert action.proposed != action.executed
+    assert action.executed_label == rules.rules[int(steps.rules[row, 0])].action
+    assert action.proposed_label != action.executed_label
+    assert action.rule.startswith("If ")
+    assert action.rule_id == rules.rules[int(steps.rules[row, 0])].id
+    assert len(view.state) == steps.observation.shape[1]
+
+
+def test_a_step_that_was_not_changed_says_one_action(
+    replayed: tuple[RuleSet, StepTable],
+) -> None:
+    rules, steps = replayed
+    row = int(np.flatnonzero(~steps.intervened)[0])
+    view = step_view(steps, row, rules.actions, rules.source.features, None)
+    assert not view.intervened
+    assert view.actions[0].proposed == view.actions[0].executed
+    assert view.actions[0].rule == ""
+
+
+def test_the_strip_marks_exactly_the_interventions(replayed: tuple[RuleSet, StepTable]) -> None:
+    rules, steps = replayed
+    rows = tracks(steps, rules.actions, shielded=True)
+    assert [row.name for row in rows] == ["wanted", "done", "changed"]
+    assert (~np.isnan(rows[-1].labels) == steps.intervened).all()
+    assert ((rows[0].labels != rows[1].labels) == steps.intervened).all()
+    figure = intervention_strip(
+        rows, step_texts(steps, rules.actions, rules), current=0
+    )
+    points = figure.data[-1]
+    assert points.customdata[:, 0].tolist() == list(range(len(steps))) * 3
+    assert figure.layout.hoverdistance == -1
+    assert len(tracks(steps, rules.actions, shielded=False)) == 1
+
+
+def test_tooltips_name_the_rule_and_the_change(replayed: tuple[RuleSet, StepTable]) -> None:
+    rules, steps = replayed
+    for row, text in enumerate(step_texts(steps, rules.actions, rules)):
+        assert text.startswith(f"step {row}<br>")
+        assert ("wanted" in text) == bool(steps.intervened[row])
+        assert ("no rule applies" in text) == (steps.rules[row, 0] < 0)
+
+
+def test_labels_come_from_the_environment_where_they_are_discrete() -> None:
+    description = describe_environment("CartPole-v1")
+    (dimension,) = environment_dimensions(description, None)
+    assert dimension.label_names == ("push left", "push right")
+
+
+def test_labels_come_from_the_rules_where_actions_are_continuous() -> None:
+    rules, _ = played("pendulum", divider=3)
+    description = describe_environment("Pendulum-v1")
+    assert environment_dimensions(description, rules)[0].n_labels == 3
+    (alone,) = environment_dimensions(description, None, divider=2)
+    assert alone.edges == (-2.0, 0.0, 2.0)
+
+
+def test_a_margin_is_told_in_words() -> None:
+    assert margin_text(float("inf")) == "no threshold was looked at"
+    assert margin_text(0.0125) == "0.0125 from the nearest threshold"
+
+
+def test_returns_are_drawn_for_each_run() -> None:
+    lines = [ReturnLine("with", np.array([1.0, 2.0, 3.0]), "#000000"),
+             ReturnLine("without", np.array([1.0]), "#111111")]
+    figure = return_figure(lines, current=1)
+    assert figure.data[0].y.tolist() == [1.0, 2.0, 3.0]
+    assert figure.layout.showlegend
+    assert not return_figure(lines[:1], current=0).layout.showlegend
+
+
+def test_episodes_are_drawn_with_their_interval() -> None:
+    row = ReturnRow("with", np.array([1.0, 2.0, 6.0]), 2.5, 1.0, 5.0, "#000000")
+    points, mean = comparison_figure([row]).data
+    assert points.x.tolist() == [1.0, 2.0, 6.0]
+    assert mean.error_x.array[0] == 2.5
+    assert mean.error_x.arrayminus[0] == 1.5
