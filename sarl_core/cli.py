@@ -11,7 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from sarl_core import terminal
+from sarl_core.commandline import terminal
+from sarl_core.commandline.options import (
+    AgentName,
+    Divider,
+    Env,
+    EnvOfFile,
+    File,
+    Json,
+    ProjectionName,
+    Rules,
+    Seed,
+    Stochastic,
+)
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,70 +37,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Readable safety rules from expert demonstrations, and a shield made of them.",
 )
-
-File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
-EnvOfFile = Annotated[
-    str | None,
-    typer.Option(
-        "--env",
-        metavar="ENV",
-        show_default=False,
-        help="Take spaces, names and bounds from this environment where the file has none.",
-    ),
-]
-Env = Annotated[
-    str,
-    typer.Option(
-        "--env",
-        metavar="ENV",
-        show_default=False,
-        help="What gymnasium.make takes, module:Id included.",
-    ),
-]
-AgentName = Annotated[
-    str,
-    typer.Option(
-        "--agent",
-        metavar="AGENT",
-        show_default=False,
-        help="novice (uniform random actions), untrained (fresh PPO weights, sampled), expert (the "
-        "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
-    ),
-]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same result.")]
-Stochastic = Annotated[
-    bool,
-    typer.Option(
-        "--stochastic",
-        help="Sample a trained agent's actions instead of taking the likeliest.",
-    ),
-]
-Rules = Annotated[
-    Path | None,
-    typer.Option(
-        "--rules",
-        metavar="RULES.json",
-        show_default=False,
-        help="Shield the agent with these rules.",
-    ),
-]
-ProjectionName = Annotated[
-    Literal["centre", "clip", "expert"],
-    typer.Option(
-        "--projection",
-        help="What a continuous action that breaks a rule becomes: the centre of the "
-        "rule's interval, the nearest value in it, or the expert's median.",
-    ),
-]
-Divider = Annotated[
-    int,
-    typer.Option(
-        "--divider",
-        min=2,
-        help="Intervals of each continuous action dimension.",
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -223,7 +171,7 @@ def mine(
             divider=divider,
         )
         rule_set.save(out)
-    from sarl_core.answers import describe_rules, print_rules
+    from sarl_core.commandline.answers import describe_rules, print_rules
 
     if as_json:
         terminal.print_json(describe_rules(rule_set, out))
@@ -292,8 +240,8 @@ def landscape(
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
     terminal.print_lines(
         [
-            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} rules, "
-            f"from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
+            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} "
+            f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
         ]
     )
 
@@ -338,36 +286,10 @@ def evaluate(
     if as_json:
         terminal.print_json(document)
         return
-    from sarl_core.explaining.language import share_text
+    from sarl_core.commandline.answers import print_episodes
 
-    summary = document["summary"]
     shielded = "unshielded" if rules is None else f"shielded by {rules}"
-    terminal.print_lines([f"{found.agent} in {env}, {shielded}"])
-    terminal.print_table(
-        ("seed", "return", "length", "interventions", "covered"),
-        [
-            (
-                str(row["seed"]),
-                f"{row['return']:.2f}",
-                f"{row['length']:,}",
-                f"{row['interventions']:,}",
-                f"{row['covered']:,}",
-            )
-            for row in document["episodes"]
-        ],
-    )
-    terminal.print_facts(
-        [
-            ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
-            (
-                "IQM of the returns",
-                f"{summary['iqm']:.2f} (95 % interval {summary['iqm_low']:.2f} to "
-                f"{summary['iqm_high']:.2f})",
-            ),
-            ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
-            ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
-        ]
-    )
+    print_episodes(document, f"{found.agent} in {env}, {shielded}")
 
 
 @app.command()
@@ -418,7 +340,7 @@ def render(
             )
     with terminal.working("Writing") as advance:
         replay.save(out, progress=advance)
-    from sarl_core.answers import describe_replay, print_replay
+    from sarl_core.commandline.answers import describe_replay, print_replay
 
     document = describe_replay(replay, out, [shield is not None, False])
     if as_json:
@@ -473,13 +395,14 @@ def train_expert(
     terminal.print_lines(
         [
             f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
-            f"({returns['min']:.1f} to {returns['max']:.1f}), after {card['kept_after_steps']:,} steps."
+            f"({returns['min']:.1f} to {returns['max']:.1f}), after "
+            f"{card['kept_after_steps']:,} steps."
         ]
     )
 
 
 def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:
-    from sarl_core.answers import describe_demonstrations, print_demonstrations
+    from sarl_core.commandline.answers import describe_demonstrations, print_demonstrations
 
     document = describe_demonstrations(demonstrations, path)
     if as_json:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sarl_core import terminal
+from sarl_core.commandline import terminal
 from sarl_core.demonstrations.checks import find_warnings
 
 if TYPE_CHECKING:
@@ -242,6 +242,35 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
     )
 
 
+def print_episodes(document: dict[str, Any], title: str) -> None:
+    """Print what `Episodes.to_dict` holds.
+
+    Args:
+        document: What it gave.
+        title: Above the table.
+    """
+    from sarl_core.explaining.language import share_text
+
+    summary = document["summary"]
+    terminal.print_lines([title])
+    names = ("seed", "return", "length", "interventions", "covered")
+    terminal.print_table(names, [_episode(row) for row in document["episodes"]])
+    interval = f"95 % interval {summary['iqm_low']:.2f} to {summary['iqm_high']:.2f}"
+    terminal.print_facts(
+        [
+            ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
+            ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
+            ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
+            ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
+        ]
+    )
+
+
+def _episode(row: dict[str, Any]) -> tuple[str, ...]:
+    counts = (f"{row[name]:,}" for name in ("length", "interventions", "covered"))
+    return (str(row["seed"]), f"{row['return']:.2f}", *counts)
+
+
 def describe_replay(replay: Replay, path: Path, shielded: Sequence[bool]) -> dict[str, Any]:
     """What was rendered.
 
@@ -274,14 +303,7 @@ def print_replay(document: dict[str, Any]) -> None:
     terminal.print_table(
         ("agent", "seed", "return", "length", "interventions", "covered"),
         [
-            (
-                f"{entry['agent']}{', shielded' if entry['shielded'] else ''}",
-                str(entry["seed"]),
-                f"{entry['return']:.2f}",
-                f"{entry['length']:,}",
-                f"{entry['interventions']:,}",
-                f"{entry['covered']:,}",
-            )
+            (f"{entry['agent']}{', shielded' if entry['shielded'] else ''}", *_episode(entry))
             for entry in document["episodes"]
         ],
     )

@@ -13,7 +13,7 @@ import pytest
 
 from sarl_core.cli import main
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 CART = str(ROOT / "data" / "demonstrations" / "cartpole.parquet")
 PENDULUM = str(ROOT / "data" / "demonstrations" / "pendulum.parquet")
 

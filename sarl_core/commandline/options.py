@@ -1,0 +1,72 @@
+"""The options and arguments that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
+EnvOfFile = Annotated[
+    str | None,
+    typer.Option(
+        "--env",
+        metavar="ENV",
+        show_default=False,
+        help="Take spaces, names and bounds from this environment where the file has none.",
+    ),
+]
+Env = Annotated[
+    str,
+    typer.Option(
+        "--env",
+        metavar="ENV",
+        show_default=False,
+        help="What gymnasium.make takes, module:Id included.",
+    ),
+]
+AgentName = Annotated[
+    str,
+    typer.Option(
+        "--agent",
+        metavar="AGENT",
+        show_default=False,
+        help="novice (uniform random actions), untrained (fresh PPO weights, sampled), expert (the "
+        "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same result.")]
+Stochastic = Annotated[
+    bool,
+    typer.Option(
+        "--stochastic",
+        help="Sample a trained agent's actions instead of taking the likeliest.",
+    ),
+]
+Rules = Annotated[
+    Path | None,
+    typer.Option(
+        "--rules",
+        metavar="RULES.json",
+        show_default=False,
+        help="Shield the agent with these rules.",
+    ),
+]
+ProjectionName = Annotated[
+    Literal["centre", "clip", "expert"],
+    typer.Option(
+        "--projection",
+        help="What a continuous action that breaks a rule becomes: the centre of the "
+        "rule's interval, the nearest value in it, or the expert's median.",
+    ),
+]
+Divider = Annotated[
+    int,
+    typer.Option(
+        "--divider",
+        min=2,
+        help="Intervals of each continuous action dimension.",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
