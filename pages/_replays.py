@@ -15,6 +15,7 @@ from threading import Lock
 from typing import TypeVar
 
 import streamlit as st
+from _words import in_full
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.demonstrations.dataset import Feature
@@ -206,17 +207,17 @@ def with_progress(work: Callable[[Told], Result]) -> Result | None:
     try:
         return work(lambda share, text: set_bar(bar, share, text))
     except SarlError as error:
-        st.error(escaped(str(error)), icon=":material/error:")
+        refuse(error)
         return None
     finally:
         slot.empty()
 
 
+def refuse(error: SarlError) -> None:
+    """Say what is wrong, in its one sentence."""
+    st.error(in_full(str(error)), icon=":material/error:")
+
+
 def set_bar(bar: DeltaGenerator, share: float, text: str) -> None:
     """Move the bar."""
     bar.progress(min(max(share, 0.0), 1.0), text)
-
-
-def escaped(text: str) -> str:
-    """Text that Markdown leaves alone."""
-    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>#$~|:" else sign for sign in text)

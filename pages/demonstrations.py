@@ -10,6 +10,7 @@ from pathlib import Path
 import _state as state
 import plotly.graph_objects as go
 import streamlit as st
+from _words import escaped, in_full
 
 from sarl_core.demonstrations.checks import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
@@ -216,7 +217,7 @@ def upload_section(*, expanded: bool) -> None:
         )
         error = st.session_state.get("_upload_error")
         if error:
-            st.error(escaped(error), icon=":material/error:")
+            st.error(in_full(error), icon=":material/error:")
             if state.chosen_demonstrations() is not None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()
@@ -234,12 +235,6 @@ def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
         return table_columns(content, name)
     except SarlError:
         return ()
-
-
-def sentence(text: str) -> str:
-    """An error as a sentence: with a capital and a full stop."""
-    text = text.strip()
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?')) else '.'}"
 
 
 # --- the page ----------------------------------------------------------------------------------
@@ -292,14 +287,9 @@ def overview(demonstrations: Demonstrations, found: Contents) -> None:
     if remarks:
         with st.container(border=True, gap="xsmall"):
             for remark in remarks[:8]:
-                st.markdown(f":material/info: :gray[{escaped(sentence(remark))}]")
+                st.markdown(f":material/info: :gray[{in_full(remark)}]")
             if len(remarks) > 8:
                 st.caption(f"… and {len(remarks) - 8} more.")
-
-
-def escaped(text: str) -> str:
-    """Text that Markdown leaves alone."""
-    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>#$~|:" else sign for sign in text)
 
 
 def actions_section(demonstrations: Demonstrations, divider: int) -> None:

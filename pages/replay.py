@@ -19,13 +19,14 @@ from _replays import (
     Replay,
     Request,
     compare,
-    escaped,
     kept_comparisons,
     kept_replays,
     movie,
+    refuse,
     run,
     with_progress,
 )
+from _words import escaped
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.environments import describe_environment
@@ -72,7 +73,8 @@ PLAIN = {"displayModeBar": False}
 def settings() -> Callable[[], Order]:
     """The widgets; what they ask for is put together when it is needed, and may be refused."""
     with st.container(border=True):
-        with st.grid(5, min_column_width=150, gap="small"):
+        in_a_row = 5 if continuous(st.session_state.get("env")) else 4
+        with st.grid(in_a_row, min_column_width=150, gap="small"):
             env = st.selectbox(
                 "Environment", state.with_own(ENVIRONMENTS, "env"), key="env",
                 bind="query-params",
@@ -347,7 +349,7 @@ def describe(view: StepView, *, shielded: bool, chosen: bool) -> None:
             st.markdown(f"**Rule {escaped(action.rule_id)}.** {escaped(action.rule)}")
             if chosen:
                 st.page_link("rules.py", label="Open this rule", icon=":material/rule:",
-                             query_params={"rule": action.rule_id})
+                             query_params={**st.query_params.to_dict(), "rule": action.rule_id})
     if shielded:
         st.caption(f"{margin_text(view.margin).capitalize()}.")
     st.dataframe(
@@ -382,7 +384,7 @@ def comparison(order: Order) -> None:
         table.append({
             "Run": name.capitalize(),
             "Mean return": f"{interval.mean:,.1f}",
-            "Middle half": f"{interval.iqm:,.1f}",
+            "Typical return": f"{interval.iqm:,.1f}",
             "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
             "Mean length": f"{episodes.lengths.mean():,.1f}",
             "Changed": share_text(float(episodes.interventions.sum()) / steps)
@@ -391,8 +393,8 @@ def comparison(order: Order) -> None:
     st.plotly_chart(comparison_figure(rows), config=PLAIN, key="comparison",
                     alt="Returns of the episodes with the rules and without")
     st.dataframe(table, hide_index=True)
-    st.caption("A point is an episode. The diamond is the mean of the middle half of the "
-               "episodes, which a few odd ones do not move, with its 95 % interval.")
+    st.caption("A point is an episode. The diamond is the typical return, the mean of the middle "
+               "half of the episodes, which a few odd ones do not move, with its 95 % interval.")
 
 
 # --- the page ----------------------------------------------------------------------------------
@@ -407,7 +409,7 @@ if started:
     try:
         ordered = order_now()
     except SarlError as error:
-        st.error(escaped(str(error)), icon=":material/error:")
+        refuse(error)
     else:
         result = kept_replays().get(ordered.request)
         if result is None:

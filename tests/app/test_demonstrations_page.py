@@ -58,7 +58,7 @@ def test_three_files_are_refused() -> None:
     file = csv_bytes(*ROWS)
     app = upload(open_page("demonstrations"), ("a.csv", file), ("b.csv", file), ("c.csv", file))
     assert errors(app) == [
-        "3 files were given; give one, or the pair of observations and actions"
+        "3 files were given; give one, or the pair of observations and actions."
     ]
 
 

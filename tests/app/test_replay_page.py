@@ -115,8 +115,8 @@ def test_twenty_episodes_are_compared() -> None:
      ({"env": "Pendulum-v1"}, "rules"),
      ({"data": "upload"}, "demonstrations do not say"),
      ({"data": "upload", "env": "CartPole-v1"}, "no demonstrations to mine"),
-     ({"agent": "own file"}, "no policy has been uploaded"),
-     ({"rules": "own file"}, "no rule file has been uploaded")],
+     ({"agent": "own file"}, "policy has been uploaded"),
+     ({"rules": "own file"}, "rule file has been uploaded")],
 )
 def test_what_cannot_be_run_is_said_in_a_sentence(query: dict[str, str], fragment: str) -> None:
     app = run(open_page("replay", **{"data": "cartpole", **query}))
