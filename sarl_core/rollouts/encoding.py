@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, WorkError
 from sarl_core.rollouts.files import whole_file
-from sarl_core.rollouts.film import TRANSPARENT, Film, Palette
+from sarl_core.rollouts.film import TRANSPARENT, Film, Palette, changed_box
 from sarl_core.rollouts.progress import Progress, report
 
 _LEAST_DELAY = 2  # hundredths of a second; browsers show anything shorter for a tenth
@@ -124,14 +124,11 @@ def _change(
     before: NDArray[np.uint8], after: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], int, int] | None:
     """The part that changed, with what stayed in it made transparent, and its left and top."""
-    differs = before != after
-    rows = np.flatnonzero(differs.any(axis=1))
-    if not len(rows):
+    box = changed_box(before, after)
+    if box is None:
         return None
-    columns = np.flatnonzero(differs[rows[0] : rows[-1] + 1].any(axis=0))
-    part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    changed = np.where(differs[part], after[part], np.uint8(TRANSPARENT))
-    return changed, int(columns[0]), int(rows[0])
+    changed = np.where(before[box] != after[box], after[box], np.uint8(TRANSPARENT))
+    return changed, box.columns.start, box.rows.start
 
 
 def _write_picture(
@@ -141,27 +138,11 @@ def _write_picture(
     # Leave the picture in place afterwards (1 << 2), and one index is transparent (1).
     out.write(b"\x21\xf9\x04" + struct.pack("<BHBB", 1 << 2 | 1, delay, TRANSPARENT, 0))
     out.write(b"\x2c" + struct.pack("<HHHHB", left, top, width, height, 0))
-    out.write(_compressed(part))
-
-
-def _compressed(part: NDArray[np.uint8]) -> bytes:
-    """The LZW blocks of a picture: Pillow writes a whole GIF, of which they are the end."""
     from PIL import Image
 
-    picture = Image.fromarray(np.ascontiguousarray(part))
-    alone = io.BytesIO()
-    picture.save(alone, "GIF", interlace=0, optimize=False)
-    data = alone.getvalue()
-    # Header, and as many colours as its flags say; then extensions up to the picture itself.
-    at = 13 + (3 << (data[10] & 7) + 1 if data[10] & 0x80 else 0)
-    while data[at] == 0x21:
-        at += 2
-        while data[at]:
-            at += data[at] + 1
-        at += 1
-    if data[at] != 0x2C or data[at + 9] & 0xC0:
-        raise WorkError("Pillow wrote a GIF of another kind; install the pinned version")
-    return data[at + 10 : -1]
+    # LZW with codes from 8 bits on, as one chain of blocks; Pillow's encoder writes these.
+    blocks = Image.fromarray(np.ascontiguousarray(part)).tobytes("gif", "L", 8, 0)
+    out.write(b"\x08" + blocks + b"\x00")
 
 
 def encode_gif(

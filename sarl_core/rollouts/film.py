@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ _UNKNOWN = 255
 # and the fuller the palette, the more it has to differ from those that are there. So the many
 # shades along smoothed edges do not take the room of a flame that appears later.
 _PATIENCE = ((128, 0), (176, 3 * 6**2), (224, 3 * 14**2), (TRANSPARENT, 3 * 28**2))
+_WHOLE_EVERY = 50  # pictures; one in between is put together from at most as many
 _COLOURS_AT_ONCE = 96  # of a picture with more new colours than there is room for
 
 
@@ -110,8 +112,51 @@ def _representatives(keys: NDArray[np.uint32], count: int) -> NDArray[np.int32]:
     return entries[np.argsort(-shares[: len(entries)], kind="stable")]
 
 
+class Box(NamedTuple):
+    """A rectangle of pixels.
+
+    Attributes:
+        rows: From the top.
+        columns: From the left.
+    """
+
+    rows: slice
+    columns: slice
+
+
+def changed_box(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> Box | None:
+    """The smallest rectangle outside which two pictures are equal.
+
+    Args:
+        before: Shape (height, width) or (height, width, 3), uint8.
+        after: The same shape.
+
+    Returns:
+        The rectangle, or None where the pictures are equal.
+    """
+    height, width = after.shape[:2]
+    # Eight bytes at a time where a row divides into as many.
+    wide = before.nbytes // height % 8 == 0
+    lines = [np.ascontiguousarray(picture).reshape(height, -1) for picture in (before, after)]
+    first, second = (line.view(np.uint64) for line in lines) if wide else lines
+    rows = np.flatnonzero((first != second).any(axis=1))
+    if not len(rows):
+        return None
+    part = slice(int(rows[0]), int(rows[-1]) + 1)
+    differs = (lines[0][part] != lines[1][part]).any(axis=0).reshape(width, -1).any(axis=1)
+    columns = np.flatnonzero(differs)
+    return Box(part, slice(int(columns[0]), int(columns[-1]) + 1))
+
+
+class _Patch(NamedTuple):
+    """What changed since the picture before; the whole picture where `box` is None."""
+
+    box: Box | None
+    compressed: bytes
+
+
 class Film:
-    """Pictures of one size, a few kilobytes each."""
+    """Pictures of one size: each as what changed since the one before, a few kilobytes."""
 
     def __init__(self, palette: Palette) -> None:
         """Start a film.
@@ -120,12 +165,13 @@ class Film:
             palette: Several films may share one.
         """
         self.palette = palette
-        self._compressed: list[bytes] = []
+        self._patches: list[_Patch | None] = []
         self._last: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None
+        self._shown: tuple[int, NDArray[np.uint8]] | None = None
 
     def __len__(self) -> int:
         """Number of pictures."""
-        return len(self._compressed)
+        return len(self._patches)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -145,33 +191,59 @@ class Film:
             WorkError: If its size differs from the first one's.
         """
         if self._last is None:
-            indexes = self.palette.indexes(picture)
-        else:
-            before, indexes = self._last
-            if before.shape != picture.shape:
-                raise WorkError(
-                    f"the environment draws pictures of {before.shape[:2]} and then of "
-                    f"{picture.shape[:2]} pixels; choose one whose pictures keep their size"
-                )
-            rows = np.flatnonzero((before != picture).reshape(len(picture), -1).any(axis=1))
-            if not len(rows):
-                self._compressed.append(self._compressed[-1])
-                return
-            # Only the rows in which anything moved.
-            changed = slice(int(rows[0]), int(rows[-1]) + 1)
-            indexes = indexes.copy()
-            indexes[changed] = self.palette.indexes(picture[changed])
-        self._last = picture.copy(), indexes
-        self._compressed.append(zlib.compress(indexes.tobytes(), 1))
+            self._keep(picture.copy(), self.palette.indexes(picture), None)
+            return
+        before, indexes = self._last
+        if before.shape != picture.shape:
+            raise WorkError(
+                f"the environment draws pictures of {before.shape[:2]} and then of "
+                f"{picture.shape[:2]} pixels; choose one whose pictures keep their size"
+            )
+        box = changed_box(before, picture)
+        if box is None and len(self) % _WHOLE_EVERY:
+            self._patches.append(None)
+            return
+        if box is not None:
+            before[box], indexes[box] = picture[box], self.palette.indexes(picture[box])
+        self._keep(before, indexes, box if len(self) % _WHOLE_EVERY else None)
+
+    def _keep(
+        self, picture: NDArray[np.uint8], indexes: NDArray[np.uint8], box: Box | None
+    ) -> None:
+        self._last = picture, indexes
+        part = indexes if box is None else indexes[box]
+        self._patches.append(_Patch(box, zlib.compress(part.tobytes(), 1)))
 
     def indexes(self, number: int) -> NDArray[np.uint8]:
-        """One picture.
+        """One picture; fastest in order.
 
         Args:
-            number: Which.
+            number: Which, from 0.
 
         Returns:
             Shape (height, width), indexes into the palette; read-only.
         """
-        data = zlib.decompress(self._compressed[number])
-        return np.frombuffer(data, dtype=np.uint8).reshape(self.size)
+        shown = self._shown
+        begin, picture = number // _WHOLE_EVERY * _WHOLE_EVERY, None
+        if shown is not None and begin <= shown[0] <= number:
+            if shown[0] == number:
+                return shown[1]
+            begin, picture = shown[0] + 1, shown[1].copy()
+        for patch in self._patches[begin : number + 1]:
+            picture = self._patched(picture, patch)
+        assert picture is not None
+        picture.flags.writeable = False
+        self._shown = number, picture
+        return picture
+
+    def _patched(
+        self, picture: NDArray[np.uint8] | None, patch: _Patch | None
+    ) -> NDArray[np.uint8]:
+        if patch is not None:
+            values = np.frombuffer(zlib.decompress(patch.compressed), dtype=np.uint8)
+            if patch.box is None:
+                return values.reshape(self.size).copy()
+            assert picture is not None
+            picture[patch.box] = values.reshape(picture[patch.box].shape)
+        assert picture is not None
+        return picture

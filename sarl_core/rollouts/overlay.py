@@ -189,10 +189,11 @@ class Panel:
         proposed, executed = self.steps.proposed[step], self.steps.executed[step]
         rules = [int(rule) for rule in self.steps.rules[step] if rule >= 0]
         if not self.shielded:
-            return Caption("", action_text(self.description, executed), "no shield", False)
+            return Caption("", action_text(self.description, executed),
+                           "No shield: every action is executed as proposed.", False)
         if not rules:
             return Caption("NO RULE", action_text(self.description, executed),
-                           "No rule applies here: the agent does as it likes.", False)
+                           "No rule applies to this state: the action stays as it is.", False)
         if not self.steps.intervened[step]:
             reason = "; ".join(self.describe_rule(rule) for rule in rules)
             return Caption("AGREES", action_text(self.description, executed), reason, True)
