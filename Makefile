@@ -28,7 +28,7 @@ lint: $(VENV)/development.stamp  ## style, types, and who may import whom
 	$(VENV)/bin/lint-imports
 
 format: $(VENV)/development.stamp  ## bring every file into shape
-	$(PYTHON) -m ruff check --fix .
+	$(PYTHON) -m ruff check --fix-only .
 	$(PYTHON) -m ruff format .
 
 bench: $(VENV)/development.stamp $(BROWSER)  ## measure, and compare with what is to be reached
