@@ -159,13 +159,17 @@ def _number(name: str, default: float, low: float, high: float) -> float:
     return number
 
 
+def chosen_limits() -> tuple[float, int | None]:
+    """Minimum lift and maximum depth in force (URL: lift, depth; depth 0 is no limit)."""
+    return _number("lift", 0.0, 0.0, MAX_LIFT), int(_number("depth", 0, 0, MAX_DEPTH)) or None
+
+
 def chosen_thresholds() -> Thresholds:
-    """The thresholds in force (URL: support, confidence, lift, depth; depth 0 is no limit)."""
+    """The thresholds in force (URL: support, confidence, and those of `chosen_limits`)."""
     return Thresholds(
-        support=_number("support", FILTERED.support, 0.0, 1.0),
-        confidence=_number("confidence", FILTERED.confidence, 0.0, 1.0),
-        lift=_number("lift", 0.0, 0.0, MAX_LIFT),
-        max_depth=int(_number("depth", 0, 0, MAX_DEPTH)) or None,
+        _number("support", FILTERED.support, 0.0, 1.0),
+        _number("confidence", FILTERED.confidence, 0.0, 1.0),
+        *chosen_limits(),
     )
 
 

@@ -19,6 +19,7 @@ from sarl_core.explaining.steps import (
     FINE_SUPPORTS,
     SUPPORT_STEPS,
     neat_jumps,
+    neat_point,
     with_step,
 )
 from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
@@ -50,10 +51,19 @@ def follow() -> None:
     st.rerun(["controls", "details"])
 
 
+def move(**thresholds: float) -> None:
+    """Put thresholds in force, by their names in the URL.
+
+    `controls` takes them over just before it draws the sliders: what a callback in a fragment
+    writes to a slider does not reach the browser when other fragments are to run as well.
+    """
+    st.session_state["_moved"] = thresholds
+    follow()
+
+
 def jump(name: str, value: float) -> None:
     """Move one threshold."""
-    st.session_state[name] = value
-    follow()
+    move(**{name: value})
 
 
 def use(setting: Thresholds) -> None:
@@ -72,10 +82,13 @@ def take_click(key: str) -> None:
         data = points[0]["customdata"]
         # Which of the two arrives depends on how the numbers were packed for the browser.
         values = list(data.values()) if isinstance(data, dict) else list(data)
-        st.session_state["_clicked"] = (float(values[0]), float(values[1]))
-    if "_clicked" in st.session_state:
-        st.session_state["support"], st.session_state["confidence"] = st.session_state["_clicked"]
-    follow()
+        clicked = Thresholds(float(values[0]), float(values[1]), *state.chosen_limits())
+        if key == "pareto":
+            clicked = neat_point(grown, clicked)
+        st.session_state["_clicked"] = (clicked.support, clicked.confidence)
+    support, confidence = st.session_state.get("_clicked", (None, None))
+    if support is not None:
+        move(support=support, confidence=confidence)
 
 
 # --- parts of the page -------------------------------------------------------------------------
@@ -98,12 +111,15 @@ def jump_buttons(name: str, below: float | None, above: float | None) -> None:
 @st.fragment(key="controls")
 def controls(dimension: int | None, grid: Landscape) -> None:
     """Sliders, named settings and jumps; the numbers of the rule set; the mark in the maps."""
+    for name, value in st.session_state.pop("_moved", {}).items():
+        st.session_state[name] = value
     thresholds = state.chosen_thresholds()
     jumps = neat_jumps(grown, thresholds)
     left, middle, right = st.columns([4, 4, 3])
     with left:
         st.select_slider(
-            "Minimum support", with_step(SUPPORT_STEPS, thresholds.support), key="support",
+            "Minimum support", with_step(SUPPORT_STEPS, thresholds.support),
+            key="support",
             value=FILTERED.support, format_func=threshold_text, bind="query-params",
             on_change=follow,
             help="Share of all demonstrated states to which a rule must apply.",
@@ -111,7 +127,8 @@ def controls(dimension: int | None, grid: Landscape) -> None:
         jump_buttons("support", jumps.support_below, jumps.support_above)
     with middle:
         st.select_slider(
-            "Minimum confidence", with_step(CONFIDENCE_STEPS, thresholds.confidence),
+            "Minimum confidence",
+            with_step(CONFIDENCE_STEPS, thresholds.confidence),
             key="confidence", value=FILTERED.confidence, format_func=threshold_text,
             bind="query-params", on_change=follow,
             help="Share of those states in which the expert did what the rule says.",

@@ -103,7 +103,7 @@ def intervention_strip(
         hovertemplate="%{text}<extra></extra>",
     )
     figure.add_vline(x=current, line={"color": _CURRENT, "width": 2})
-    figure.update_layout(**_layout(_ROW_HEIGHT * len(tracks) + 60), hoverdistance=-1)
+    figure.update_layout(**_layout(max(_ROW_HEIGHT * len(tracks) + 60, 128)), hoverdistance=-1)
     figure.update_xaxes(
         title={"text": "step", "standoff": 2}, range=[-0.5, max(n_steps, 2) - 0.5],
         fixedrange=True, showgrid=False, zeroline=False, nticks=8,

@@ -62,6 +62,30 @@ def with_step(steps: Sequence[float], value: float) -> tuple[float, ...]:
     return tuple(steps) if value in steps else tuple(sorted({*steps, value}))
 
 
+def neat_point(trees: Sequence[PolicyTree], thresholds: Thresholds) -> Thresholds:
+    """Thresholds with fewer decimals that give the same rules.
+
+    Args:
+        trees: One an action dimension.
+        thresholds: Any.
+
+    Returns:
+        At most as high as those given.
+    """
+    for name, decimals in (("support", 3), ("confidence", 2)):
+        edge = getattr(next_changes(
+            trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
+            lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+        ), f"{name}_below")
+        value = getattr(thresholds, name)
+        neat = neat_between(-1.0 if edge is None else edge, value, decimals=decimals)
+        thresholds = (
+            replace(thresholds, support=neat) if name == "support"
+            else replace(thresholds, confidence=neat)
+        )
+    return thresholds
+
+
 def neat_between(low: float, high: float, *, decimals: int = 2) -> float:
     """The number with the fewest decimals in an interval, so that people need read no more.
 

@@ -93,7 +93,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         customdata=_cell_data(landscape),
         hovertemplate=(
             "support %{customdata[0]}, confidence %{customdata[1]}<br>"
-            "<b>%{customdata[2]:,} rules</b>, %{customdata[3]} conditions on average<br>"
+            "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
             "coverage %{customdata[4]}, fidelity %{customdata[5]}<extra></extra>"
         ),
         showlegend=False,
@@ -172,7 +172,7 @@ def surface(
         ),
         hovertemplate=(
             "support %{customdata[0]}, confidence %{customdata[1]}<br>"
-            "%{customdata[2]:,} rules, %{customdata[3]} conditions on average<br>"
+            "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
             "coverage %{customdata[4]}, fidelity %{customdata[5]}<extra></extra>"
         ),
     )
@@ -306,7 +306,7 @@ def pareto(
                          "title": {"text": "Fidelity", "side": "right"}},
         },
         hovertemplate=(
-            "%{x:,} rules, coverage %{y:.1%}, fidelity %{customdata[2]}<br>"
+            "rules %{x:,}, coverage %{y:.1%}, fidelity %{customdata[2]}<br>"
             "at support %{customdata[0]:.4~g}, confidence %{customdata[1]:.4~g}<extra></extra>"
         ),
         unselected={"marker": {"opacity": 1}},
