@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, WorkError
+from sarl_core.files import whole_file
 from sarl_core.mining.landscape import Landscape
-from sarl_core.rollouts.files import whole_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

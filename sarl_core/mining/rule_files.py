@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.errors import InputError
+from sarl_core.files import whole_file
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
@@ -71,17 +71,11 @@ def save_rules(rule_set: RuleSet, path: Path) -> None:
         path: A `.json` file.
 
     Raises:
-        InputError: If the folder cannot be written to.
+        InputError: If the folder does not exist.
+        WorkError: If it cannot be written to.
     """
-    try:
-        with tempfile.NamedTemporaryFile(
-            "w", dir=path.parent, suffix=".part", delete=False, encoding="utf-8"
-        ) as file:
-            file.write(rules_to_json(rule_set))
-        Path(file.name).replace(path)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); give another place") \
-            from error
+    with whole_file(path) as unfinished:
+        unfinished.write_text(rules_to_json(rule_set), encoding="utf-8")
 
 
 def load_rules(path: Path) -> RuleSet:

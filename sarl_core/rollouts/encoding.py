@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, WorkError
-from sarl_core.rollouts.files import whole_file
+from sarl_core.files import whole_file
 from sarl_core.rollouts.film import TRANSPARENT, Film, Palette, changed_box
 from sarl_core.rollouts.progress import Progress, report
 

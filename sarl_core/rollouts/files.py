@@ -1,49 +1,20 @@
-"""Reading and writing files with care: whole or not at all, and never larger than expected."""
+"""Cards beside shipped files, and policies read with care: never larger than expected."""
 
 from __future__ import annotations
 
 import json
-import os
 import zipfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.errors import InputError, WorkError
+from sarl_core.errors import InputError
+from sarl_core.files import whole_file
 
 MAX_POLICY_BYTES = 256 * 2**20  # an MlpPolicy takes kilobytes; more is not a policy
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a path beside `path` to write to; it takes the place of `path` when all went well.
-
-    Args:
-        path: The file that is to appear; its suffix is kept, because writers look at it.
-
-    Yields:
-        The path to write to.
-
-    Raises:
-        InputError: If the folder does not exist.
-        WorkError: If the file cannot be written.
-    """
-    if not path.parent.is_dir():
-        raise InputError(f"the folder {path.parent} does not exist; make it or choose another")
-    unfinished = path.with_name(f".{path.stem}.{os.getpid()}.{os.urandom(4).hex()}{path.suffix}")
-    try:
-        yield unfinished
-        unfinished.replace(path)
-    except OSError as error:
-        raise WorkError(
-            f"{path} cannot be written ({error.strerror or error}); choose another place"
-        ) from error
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def write_card(path: Path, card: Mapping[str, Any]) -> None:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
-from sarl_core.rollouts.files import read_limited_npz, whole_file
+from sarl_core.files import whole_file
+from sarl_core.rollouts.files import read_limited_npz
 
 Head = Literal["categorical", "gaussian", "squashed_gaussian", "greedy"]
 Activation = Literal["tanh", "relu"]

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError
+from sarl_core.files import whole_file
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.canvas import OVERLAY_COLOURS
 from sarl_core.rollouts.encoding import encode_gif, encode_mp4, gif_bytes
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.files import whole_file
 from sarl_core.rollouts.film import Film, Palette
 from sarl_core.rollouts.filming import film_episode, picture_speed
 from sarl_core.rollouts.overlay import Panel, side_by_side_picture

@@ -103,5 +103,5 @@ def test_what_is_no_rule_file_is_refused(text, tmp_path):
 def test_a_missing_file_and_a_missing_folder_are_said(tmp_path, lander_like):
     with pytest.raises(InputError, match="cannot be read"):
         RuleSet.load(tmp_path / "none.json")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="does not exist"):
         mine_rules(lander_like, supp_min=0.1, conf_min=0.5).save(tmp_path / "no" / "rules.json")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -24,6 +23,7 @@ from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, w
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.tables import Table, recording_from_table
 from sarl_core.errors import InputError
+from sarl_core.files import whole_file
 
 Content = bytes | bytearray | memoryview | BinaryIO
 
@@ -154,16 +154,8 @@ def save_demonstrations(demonstrations: Demonstrations, path: str | Path) -> Non
         form = _format(path.name)
         if path.is_dir():
             raise InputError("it is a folder; give a file in it")
-        temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-        try:
-            with temporary.open("xb") as out:
-                form.write(demonstrations, out)
-            temporary.replace(path)
-        except OSError as error:
-            reason = error.strerror or type(error).__name__
-            raise InputError(f"it cannot be written ({reason}); choose another place") from error
-        finally:
-            temporary.unlink(missing_ok=True)
+        with whole_file(path) as unfinished, unfinished.open("xb") as out:
+            form.write(demonstrations, out)
 
 
 def table_columns(source: str | Path | Content, name: str | None = None) -> tuple[str, ...]:
