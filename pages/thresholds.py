@@ -144,7 +144,7 @@ def controls(dimension: int | None, grid: Landscape) -> None:
         named_settings(thresholds)
     metrics(here(thresholds, dimension))
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
-    st.html(f"<style>:root {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+    st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
 
 
 def named_settings(thresholds: Thresholds) -> None:

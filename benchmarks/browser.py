@@ -1,0 +1,166 @@
+"""What an analyst waits for: a moved slider, until the figures on screen have followed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+from benchmarks.data import demonstrations
+from benchmarks.measure import Row, duration
+from sarl_core import Demonstrations, save_demonstrations
+
+ROOT = Path(__file__).resolve().parents[1]
+CHROMIUM = "/usr/bin/chromium"
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+MANY = 1_000_000
+PATIENCE = 600_000  # milliseconds: a tree over a million states grows for a while
+
+# From the key to the frame in which the four numbers and the ring in both maps are new.
+WATCH = """
+() => {
+  const numbers = () => [...document.querySelectorAll('[data-testid=stMetricValue]')]
+    .map(one => one.innerText).join('|');
+  const rings = () => [...document.querySelectorAll('[class*=st-key-box_]')]
+    .map(one => { const ring = getComputedStyle(one, '::after');
+                  return ring.left + ' ' + ring.top; }).join('|');
+  window.followed = () => new Promise(done => {
+    const before = [numbers(), rings()];
+    window.addEventListener('keydown', () => {
+      const start = performance.now();
+      const look = () => {
+        const now = [numbers(), rings()];
+        if (now[0] !== before[0] && now[0].split('|').length === 4 && now[1] !== before[1])
+          requestAnimationFrame(() => done(performance.now() - start));
+        else if (performance.now() - start > 5000) done(null);
+        else requestAnimationFrame(look);
+      };
+      requestAnimationFrame(look);
+    }, {once: true, capture: true});
+  });
+}
+"""
+
+
+def slider(quick: bool) -> Iterable[Row]:
+    """Moves of the slider of support, at the shipped size and at a million steps."""
+    moves = 20 if quick else 40
+    with tempfile.TemporaryDirectory() as folder, _dashboard(Path(folder)) as address:
+        file = Path(folder) / "million.parquet"
+        save_demonstrations(_many(demonstrations(), MANY), file)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+            page = browser.new_page(viewport={"width": 1440, "height": 900})
+            page.set_default_timeout(PATIENCE)
+            page.goto(f"{address}/thresholds")
+            yield _row(page, f"{len(demonstrations()):,} steps", moves, 0.15)
+            page.goto(address)
+            page.get_by_text("Use your own demonstrations").first.click()
+            page.locator("input[type=file]").set_input_files(file)
+            page.get_by_text(f"{MANY:,} steps").first.wait_for()
+            page.get_by_role("link", name="Thresholds").first.click()
+            yield _row(page, f"{MANY:,} steps", moves, 0.3)
+            browser.close()
+
+
+def _row(page: Page, size: str, moves: int, reach: float) -> Row:
+    times = _follow(page, moves)
+    return Row(
+        f"slider to changed figures, {size}",
+        "-",
+        "seconds",
+        statistics.median(times),
+        reach,
+        f"median of {len(times)} moves, {duration(min(times))} to {duration(max(times))}",
+    )
+
+
+def _follow(page: Page, moves: int) -> list[float]:
+    """Seconds from each key to the changed figures."""
+    page.locator(".st-key-maps .js-plotly-plot .heatmaplayer image").nth(1).wait_for()
+    page.wait_for_timeout(3000)
+    page.evaluate(WATCH)
+    page.get_by_role("slider", name="Minimum support").focus()
+    times = []
+    for move in range(moves + 2):
+        page.evaluate("() => { window.waiting = window.followed(); }")
+        page.keyboard.press("ArrowLeft" if move % 20 < 10 else "ArrowRight")
+        took = page.evaluate("() => window.waiting")
+        # A step may change no rule; and the first moves find a server that has just woken up.
+        if took is not None and move >= 2:
+            times.append(took / 1000)
+        page.wait_for_timeout(300)
+    if len(times) < moves // 2:
+        raise RuntimeError(f"only {len(times)} of {moves} moves changed the figures")
+    return times
+
+
+def _many(few: Demonstrations, steps: int) -> Demonstrations:
+    """The same demonstrations over and over, each time with a little noise of its own."""
+    times = -(-steps // len(few))
+    rng = np.random.default_rng(0)
+    noise = 0.01 * few.observations.std(axis=0)
+    return replace(
+        few,
+        observations=np.concatenate(
+            [
+                few.observations + rng.normal(0, noise, few.observations.shape).astype(np.float32)
+                for _ in range(times)
+            ]
+        )[:steps],
+        actions=np.tile(few.actions, times)[:steps],
+        episodes=np.concatenate(
+            [few.episodes + turn * (int(few.episodes.max()) + 1) for turn in range(times)]
+        )[:steps],
+        steps=None,
+        rewards=None,
+        terminated=None,
+        truncated=None,
+    )
+
+
+@contextlib.contextmanager
+def _dashboard(folder: Path) -> Iterator[str]:
+    """A dashboard started as a user would start it."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with (folder / "log.txt").open("wb") as log:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],
+            cwd=ROOT,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=os.environ | {"HOME": str(folder)},
+        )
+        try:
+            address = f"http://127.0.0.1:{port}"
+            for _ in range(300):
+                with contextlib.suppress(urllib.error.URLError, ConnectionError):
+                    urllib.request.urlopen(f"{address}/_stcore/health").close()
+                    break
+                time.sleep(0.1)
+            yield address
+        finally:
+            server.terminate()
+            server.wait(30)
