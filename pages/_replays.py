@@ -32,7 +32,7 @@ from sarl_core.rollouts.rendering import render_episode, side_by_side
 from sarl_core.shielding.shield import Projection, Shield
 
 EPISODES = 20
-WITH, WITHOUT = "with the rules", "without"
+WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 KEPT_REPLAYS, KEPT_COMPARISONS = 6, 24
 
 Told = Callable[[float, str], None]
@@ -175,12 +175,11 @@ def compare(order: Order, tell: Told) -> tuple[tuple[str, Episodes], ...]:
     """
     agent, shield = order.agent(), order.shield
     runs: list[tuple[str, Episodes]] = []
-    for part, (name, guard) in enumerate(((WITH, shield), (WITHOUT, None))):
-        if name == WITH and guard is None:
-            continue
+    wanted = [(ALONE, None)] if shield is None else [(WITH, shield), (WITHOUT, None)]
+    for part, (name, guard) in enumerate(wanted):
 
         def told(done: int, total: int, name: str = name, part: int = part) -> None:
-            tell((part + done / total) / 2, f"{done} of {total} episodes {name} …")
+            tell((part + done / total) / len(wanted), f"{done} of {total} episodes, {name} …")
 
         runs.append((name, rollout(
             order.request.env_id, agent, shield=guard, episodes=EPISODES,

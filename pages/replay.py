@@ -12,6 +12,7 @@ import _state as state
 import numpy as np
 import streamlit as st
 from _replays import (
+    ALONE,
     EPISODES,
     WITH,
     WITHOUT,
@@ -318,7 +319,8 @@ def step_by_step(replay: Replay, request: Request) -> None:
     with pictures:
         st.image(replay.film.frame(current), width="stretch",
                  alt=f"The environment at step {current}")
-        lines = [ReturnLine(WITHOUT, np.cumsum(replay.plain.steps.reward), UNSHIELDED_COLOUR)]
+        lines = [ReturnLine(WITHOUT if shielded else ALONE,
+                            np.cumsum(replay.plain.steps.reward), UNSHIELDED_COLOUR)]
         if shielded:
             lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
         st.plotly_chart(return_figure(lines, current=current), config=PLAIN, key="return",
@@ -374,12 +376,11 @@ def comparison(order: Order) -> None:
                 kept_comparisons().put(key, runs)
                 st.rerun()
         return
-    colours = {WITH: SHIELDED_COLOUR, WITHOUT: UNSHIELDED_COLOUR}
     rows, table = [], []
     for name, episodes in runs:
         interval = summarise(episodes.returns)
         rows.append(ReturnRow(name, episodes.returns, interval.iqm, interval.low, interval.high,
-                              colours[name]))
+                              SHIELDED_COLOUR if name == WITH else UNSHIELDED_COLOUR))
         steps = float(episodes.lengths.sum())
         table.append({
             "Run": name.capitalize(),

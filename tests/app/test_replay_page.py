@@ -178,3 +178,10 @@ def test_a_bad_rule_file_is_refused(content: bytes) -> None:
     run(app)
     (sentence,) = errors(app)
     assert "rules.json" in sentence
+
+
+def test_the_agent_alone_is_run_over_twenty_episodes() -> None:
+    app = run(open_page("replay", data="cartpole", rules="none"))
+    app.button(key="compare").click().run()
+    assert not app.exception
+    assert app.dataframe[-1].value["Run"].tolist() == ["Agent alone"]
