@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,11 @@ class ShieldedVecEnv(VecEnvWrapper):
         self._decision: BatchDecision | None = None
         self._episodes = np.full(self.num_envs, -1)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed the next reset, from which the episodes in the records are counted."""
+        self._episodes[:] = -1
+        return self.venv.seed(seed)
 
     def reset(self) -> VecEnvObs:
         """Start an episode in each environment."""

@@ -16,7 +16,8 @@ class StepRecord(NamedTuple):
     """The record of one shielded step (DESIGN 3.9), in ``info["shield"]``.
 
     Attributes:
-        episode: Number of resets before this step, less one.
+        episode: Index of the episode, counted from the last reset with a seed, so that the same
+            seed gives the same records.
         step: Index of the step within its episode.
         observation: What the agent saw, (d,) float32.
         proposed: The agent's action.
@@ -74,7 +75,7 @@ class ShieldedEnv(
         """Start an episode, as the wrapped environment does."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._remember(observation)
-        self._episode += 1
+        self._episode = 0 if seed is not None else self._episode + 1
         self._step = 0
         return observation, info
 

@@ -126,7 +126,7 @@ def test_the_checkers_of_gymnasium_and_stable_baselines_pass(env_id, name):
 def test_the_record_says_what_happened(cartpole):
     env = ShieldedEnv(gymnasium.make("CartPole-v1"), cartpole, penalty=0.25)
     for episode in range(2):
-        observation, _ = env.reset(seed=episode)
+        observation, _ = env.reset(seed=None if episode else 3)
         for step in range(5):
             state = observation.copy()
             observation, reward, _, _, info = env.step(1)
@@ -149,7 +149,7 @@ def test_the_vectorised_wrapper_is_the_single_one_side_by_side(cartpole):
         env.reset(seed=5 + i)
     rng = np.random.default_rng(0)
     ended = 0
-    for _ in range(300):
+    for _ in range(600):
         actions = rng.integers(0, 2, 2)
         observations, rewards, dones, infos = venv.step(actions)
         for i, env in enumerate(singles):
