@@ -128,7 +128,7 @@ def _many(few: Demonstrations, steps: int) -> Demonstrations:
                 for _ in range(times)
             ]
         )[:steps],
-        actions=np.tile(few.actions, times)[:steps],
+        actions=np.concatenate([few.actions] * times)[:steps],
         episodes=np.concatenate(
             [few.episodes + turn * (int(few.episodes.max()) + 1) for turn in range(times)]
         )[:steps],

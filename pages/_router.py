@@ -23,19 +23,28 @@ st.set_page_config(
 
 PAGES = [
     st.Page(
-        "demonstrations.py", title="Demonstrations", icon=":material/dataset:", default=True,
+        "demonstrations.py",
+        title="Demonstrations",
+        icon=":material/dataset:",
+        default=True,
         help="What the expert did: choose a shipped set or upload your own, and look at it.",
     ),
     st.Page(
-        "thresholds.py", title="Thresholds", icon=":material/tune:",
+        "thresholds.py",
+        title="Thresholds",
+        icon=":material/tune:",
         help="How many rules, how long and how good, at every pair of thresholds.",
     ),
     st.Page(
-        "rules.py", title="Rules", icon=":material/rule:",
+        "rules.py",
+        title="Rules",
+        icon=":material/rule:",
         help="Every rule in plain language, with the evidence behind it.",
     ),
     st.Page(
-        "replay.py", title="Replay", icon=":material/play_circle:",
+        "replay.py",
+        title="Replay",
+        icon=":material/play_circle:",
         help="An agent in its environment, with the rules as a shield and without.",
     ),
 ]

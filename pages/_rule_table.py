@@ -20,19 +20,25 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
     column = st.column_config
     colours = {
         action_text(label, dimension): label_colour(label)
-        for dimension in rule_set.actions for label in range(dimension.n_labels)
+        for dimension in rule_set.actions
+        for label in range(dimension.n_labels)
     }
     return {
         "If": column.TextColumn(width="large", help="When the rule applies"),
         "Then": column.MultiselectColumn(
-            width="medium", help="What the expert does there", options=list(colours),
+            width="medium",
+            help="What the expert does there",
+            options=list(colours),
             color=list(colours.values()),
         ),
         "Support": column.NumberColumn(
             format="%.4f", help="Share of all states to which the rule applies"
         ),
         "Confidence": column.ProgressColumn(
-            min_value=0.0, max_value=1.0, format="%.3f", color="gray",
+            min_value=0.0,
+            max_value=1.0,
+            format="%.3f",
+            color="gray",
             help="Share of those in which the expert did what the rule says",
         ),
         "Lift": column.NumberColumn(

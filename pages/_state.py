@@ -11,7 +11,7 @@ import gc
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import streamlit as st
@@ -53,9 +53,9 @@ def url_choice(name: str, options: Sequence[str], default: str) -> str:
         One of `options`.
     """
     kept = f"_{name}"
-    value = st.query_params.get(name)
+    value = st.query_params.get(name, "")
     if value not in options:
-        value = st.session_state.get(kept, default)
+        value = str(st.session_state.get(kept, default))
     if value not in options:
         value = default
     set_url_choice(name, value, default)
@@ -139,15 +139,16 @@ def require_demonstrations() -> Demonstrations:
             "page, or choose a shipped set in the sidebar.",
             icon=":material/upload_file:",
         )
-        st.page_link("demonstrations.py", label="Go to Demonstrations",
-                     icon=":material/arrow_forward:")
+        st.page_link(
+            "demonstrations.py", label="Go to Demonstrations", icon=":material/arrow_forward:"
+        )
         st.stop()
     return demonstrations
 
 
 def _number(name: str, default: float, low: float, high: float) -> float:
     """A number that a widget of some page holds; else the URL's; else the default."""
-    value = st.session_state.get(name)
+    value: Any = st.session_state.get(name)
     if value is None:
         value = st.query_params.get(name, default)
     try:
@@ -176,8 +177,10 @@ def chosen_thresholds() -> Thresholds:
 def choose_thresholds(thresholds: Thresholds) -> None:
     """Put thresholds in force; for callbacks, and before the sliders are drawn."""
     for name, value in (
-        ("support", thresholds.support), ("confidence", thresholds.confidence),
-        ("lift", thresholds.lift), ("depth", thresholds.max_depth or 0),
+        ("support", thresholds.support),
+        ("confidence", thresholds.confidence),
+        ("lift", thresholds.lift),
+        ("depth", thresholds.max_depth or 0),
     ):
         if st.session_state.get(name) != value:
             st.session_state[name] = value
@@ -239,11 +242,15 @@ def _key(grown: tuple[PolicyTree, ...]) -> tuple[str, int]:
 
 
 @st.cache_resource(max_entries=48, show_spinner=False)
-def _rule_set(key: tuple[str, int], thresholds: Thresholds,
-              _trees: tuple[PolicyTree, ...]) -> RuleSet:
+def _rule_set(
+    key: tuple[str, int], thresholds: Thresholds, _trees: tuple[PolicyTree, ...]
+) -> RuleSet:
     return mine_rules(
-        _trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
-        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+        _trees,
+        supp_min=thresholds.support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=thresholds.max_depth,
     )
 
 
@@ -266,8 +273,12 @@ def rule_set(
 
 @st.cache_resource(max_entries=48, show_spinner=False)
 def _landscape(
-    key: tuple[str, int], supports: tuple[float, ...], confidences: tuple[float, ...],
-    lift: float, depth: int | None, _trees: tuple[PolicyTree, ...],
+    key: tuple[str, int],
+    supports: tuple[float, ...],
+    confidences: tuple[float, ...],
+    lift: float,
+    depth: int | None,
+    _trees: tuple[PolicyTree, ...],
 ) -> Landscape:
     return threshold_landscape(_trees, supports, confidences, lift_min=lift, max_depth=depth)
 
@@ -282,7 +293,11 @@ def landscape(
 ) -> Landscape:
     """The landscape over a grid, computed once for each combination."""
     return _landscape(
-        _key(grown), tuple(map(float, supports)), tuple(map(float, confidences)), lift, depth,
+        _key(grown),
+        tuple(map(float, supports)),
+        tuple(map(float, confidences)),
+        lift,
+        depth,
         grown,
     )
 
@@ -308,9 +323,7 @@ def _top_rules(
     return top_rules(_trees, thresholds, most)
 
 
-def largest_rules(
-    grown: tuple[PolicyTree, ...], thresholds: Thresholds, most: int
-) -> RuleSet:
+def largest_rules(grown: tuple[PolicyTree, ...], thresholds: Thresholds, most: int) -> RuleSet:
     """The rules with the most support, without making the rest of a large set."""
     return _top_rules(_key(grown), thresholds, most, grown)
 
@@ -354,7 +367,10 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
     st.session_state["_data_choice"] = name
     with st.sidebar:
         st.selectbox(
-            "Data", dataset_names(), format_func=dataset_label, key="_data_choice",
+            "Data",
+            dataset_names(),
+            format_func=dataset_label,
+            key="_data_choice",
             on_change=lambda: choose_dataset(st.session_state["_data_choice"]),
         )
         demonstrations = chosen_demonstrations()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
@@ -11,6 +14,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import action_text, conditions_text, sentence, share_text
+from sarl_core.explaining.path_table import path_table
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
 
@@ -24,7 +28,7 @@ thresholds = state.chosen_thresholds()
 
 
 @st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
-def table_of(key: tuple[str, int, object], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], object]:
+def table_of(key: tuple[str, int, object], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], Any]:
     """All rules, the most support first, and the same as a data frame."""
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     return rules, frame(rules, _rule_set)
@@ -34,13 +38,18 @@ def downloads(rule_set: RuleSet) -> None:
     """The whole rule set as files, made when asked for."""
     name = f"rules-{demonstrations.env_id.replace('/', '-') or 'unnamed'}"
     for kind, mime, make in (
-        ("JSON", "application/json", rules_to_json), ("CSV", "text/csv", rules_to_csv),
+        ("JSON", "application/json", rules_to_json),
+        ("CSV", "text/csv", rules_to_csv),
         ("Text", "text/plain", rules_to_text),
     ):
         suffix = "txt" if kind == "Text" else kind.lower()
         st.download_button(
-            kind, data=lambda make=make: make(rule_set).encode(), mime=mime,
-            file_name=f"{name}.{suffix}", on_click="ignore", icon=":material/download:",
+            kind,
+            data=partial(make, rule_set),
+            mime=mime,
+            file_name=f"{name}.{suffix}",
+            on_click="ignore",
+            icon=":material/download:",
             key=f"download_{suffix}",
             help=f"All {len(rule_set):,} rules" if len(rule_set) != 1 else "The one rule",
         )
@@ -66,17 +75,29 @@ def pick(shown: list[int], rules: tuple[Rule, ...]) -> None:
 
 def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
     """Places of the rules that the search and the choice of action let through."""
-    names = list(dict.fromkeys(
-        action_text(label, dimension)
-        for dimension in rule_set.actions for label in range(dimension.n_labels)
-    ))
+    names = list(
+        dict.fromkeys(
+            action_text(label, dimension)
+            for dimension in rule_set.actions
+            for label in range(dimension.n_labels)
+        )
+    )
     with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
         words = st.text_input(
-            "Search", key="search", bind="query-params", icon=":material/search:", width=300,
-            placeholder="a feature, an action, a number", label_visibility="collapsed",
+            "Search",
+            key="search",
+            bind="query-params",
+            icon=":material/search:",
+            width=300,
+            placeholder="a feature, an action, a number",
+            label_visibility="collapsed",
         )
         action = st.selectbox(
-            "Action", ["every action", *names], key="action", bind="query-params", width=220,
+            "Action",
+            ["every action", *names],
+            key="action",
+            bind="query-params",
+            width=220,
             label_visibility="collapsed",
         )
         downloads(rule_set)
@@ -105,9 +126,13 @@ def show_table(rule_set: RuleSet) -> Rule | None:
         return None
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
     st.dataframe(
-        table.iloc[shown], hide_index=True,  # type: ignore[attr-defined]
-        column_config=column_config(rule_set), height=table_height(len(shown), TABLE_ROWS),
-        key="rule_table", on_select=lambda: pick(shown, rules), selection_mode="single-row",
+        table.iloc[shown],
+        hide_index=True,
+        column_config=column_config(rule_set),
+        height=table_height(len(shown), TABLE_ROWS),
+        key="rule_table",
+        on_select=lambda: pick(shown, rules),
+        selection_mode="single-row",
         selection_default={"selection": {"rows": [] if place is None else [place]}},
         alt="All rules in force",
     )
@@ -141,7 +166,7 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     left, right = st.columns([6, 7], gap="medium")
     with left:
         st.subheader("From the root to the rule")
-        st.html(figures.path_table(path_steps(tree, node), tree.dimension))
+        st.html(path_table(path_steps(tree, node), tree.dimension))
     with right:
         show_tree(rule)
     if rule.conditions:
@@ -159,17 +184,25 @@ def show_tree(rule: Rule) -> None:
     tree = grown[rule.dimension]
     st.subheader("Its place in the tree")
     view = st.segmented_control(
-        "Tree", [WHOLE_TREE, AROUND], default=WHOLE_TREE, key="tree", bind="query-params",
-        required=True, label_visibility="collapsed",
+        "Tree",
+        [WHOLE_TREE, AROUND],
+        default=WHOLE_TREE,
+        key="tree",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
     )
     cut = cut_nodes(
-        tree, supp_min=thresholds.support, conf_min=thresholds.confidence,
-        lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+        tree,
+        supp_min=thresholds.support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=thresholds.max_depth,
     )
     st.plotly_chart(
-        figures.tree_figure(tree, cut, node_of(rule), around=view == AROUND,
-                            dark=state.is_dark()),
-        key="tree_figure", config={"displaylogo": False, "scrollZoom": True},
+        figures.tree_figure(tree, cut, node_of(rule), around=view == AROUND, dark=state.is_dark()),
+        key="tree_figure",
+        config={"displaylogo": False, "scrollZoom": True},
         alt="The decision tree with the path of the rule",
     )
     st.caption(
@@ -191,7 +224,8 @@ def show_features(rule: Rule) -> None:
             with column:
                 st.markdown(f"**{escape_markdown(figures.interval_text(one, feature))}**")
                 st.plotly_chart(
-                    figures.feature_figure(one, feature, colour), key=f"feature_{one.feature}",
+                    figures.feature_figure(one, feature, colour),
+                    key=f"feature_{one.feature}",
                     config={"displayModeBar": False},
                     alt=f"{feature.name}: all states and those of the rule",
                 )
@@ -207,7 +241,10 @@ def show_examples(rule: Rule) -> None:
     count = len(columns["Step"])
     st.subheader("Example states" if count > 1 else "The one state it applies to")
     st.dataframe(
-        pd.DataFrame(columns), hide_index=True, height=table_height(count, 10), key="examples",
+        pd.DataFrame(columns),
+        hide_index=True,
+        height=table_height(count, 10),
+        key="examples",
         column_config={
             name: st.column_config.NumberColumn(
                 format="%d" if name in ("Episode", "Step") else "%.4g"

@@ -12,6 +12,7 @@ from _rule_table import column_config, frame, table_height
 
 from sarl_core.explaining import threshold_figures as figures
 from sarl_core.explaining.colours import MARKER_COLOUR
+from sarl_core.explaining.front_figure import front_figure, thin_front
 from sarl_core.explaining.language import share_text, threshold_text
 from sarl_core.explaining.steps import (
     CONFIDENCE_STEPS,
@@ -27,7 +28,8 @@ from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 
 SIZE, QUALITY = "Rules and length", "Coverage and fidelity"
 LAYERS: dict[str, tuple[figures.Layer, figures.Layer]] = {
-    SIZE: ("rule_count", "mean_length"), QUALITY: ("coverage", "fidelity"),
+    SIZE: ("rule_count", "mean_length"),
+    QUALITY: ("coverage", "fidelity"),
 }
 MAPS, SURFACES = "Maps", "3-D"
 FINE, PAPER = "Fine grid", "Paper's grid"
@@ -100,7 +102,10 @@ def jump_buttons(name: str, below: float | None, above: float | None) -> None:
         for side, value in (("below", below), ("above", above)):
             st.button(
                 "no change" if value is None else threshold_text(value),
-                key=f"{name}_{side}", on_click=jump, args=(name, value), type="tertiary",
+                key=f"{name}_{side}",
+                on_click=jump,
+                args=(name, value),
+                type="tertiary",
                 icon=f":material/{'arrow_back' if side == 'below' else 'arrow_forward'}:",
                 icon_position="left" if side == "below" else "right",
                 disabled=value is None,
@@ -118,9 +123,12 @@ def controls(dimension: int | None, grid: Landscape) -> None:
     left, middle, right = st.columns([4, 4, 3])
     with left:
         st.select_slider(
-            "Minimum support", with_step(SUPPORT_STEPS, thresholds.support),
+            "Minimum support",
+            with_step(SUPPORT_STEPS, thresholds.support),
             key="support",
-            value=FILTERED.support, format_func=threshold_text, bind="query-params",
+            value=FILTERED.support,
+            format_func=threshold_text,
+            bind="query-params",
             on_change=follow,
             help="Share of all demonstrated states to which a rule must apply.",
         )
@@ -129,16 +137,24 @@ def controls(dimension: int | None, grid: Landscape) -> None:
         st.select_slider(
             "Minimum confidence",
             with_step(CONFIDENCE_STEPS, thresholds.confidence),
-            key="confidence", value=FILTERED.confidence, format_func=threshold_text,
-            bind="query-params", on_change=follow,
+            key="confidence",
+            value=FILTERED.confidence,
+            format_func=threshold_text,
+            bind="query-params",
+            on_change=follow,
             help="Share of those states in which the expert did what the rule says.",
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
     with right:
         if not demonstrations.is_discrete:
             st.slider(
-                "Divider", state.MIN_DIVIDER, state.MAX_DIVIDER, key="divider",
-                value=state.MIN_DIVIDER, bind="query-params", on_change=st.rerun,
+                "Divider",
+                state.MIN_DIVIDER,
+                state.MAX_DIVIDER,
+                key="divider",
+                value=state.MIN_DIVIDER,
+                bind="query-params",
+                on_change=st.rerun,
                 help="Number of equal intervals each continuous action is divided into.",
             )
         named_settings(thresholds)
@@ -152,17 +168,23 @@ def named_settings(thresholds: Thresholds) -> None:
     with st.container(horizontal=True, gap="small", horizontal_alignment="right"):
         for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
             st.button(
-                name, key=name.lower(), on_click=use, args=(setting,),
+                name,
+                key=name.lower(),
+                on_click=use,
+                args=(setting,),
                 type="primary" if thresholds == setting else "secondary",
                 help=f"The paper's setting: support {setting.support:g}, "
-                     f"confidence {setting.confidence:g}",
+                f"confidence {setting.confidence:g}",
             )
 
 
 def here(thresholds: Thresholds, dimension: int | None) -> Landscape:
     """The landscape of the one point that is in force."""
     point = state.landscape(
-        grown, [thresholds.support], [thresholds.confidence], lift=thresholds.lift,
+        grown,
+        [thresholds.support],
+        [thresholds.confidence],
+        lift=thresholds.lift,
         depth=thresholds.max_depth,
     )
     return point if dimension is None else point.dimensions[dimension]
@@ -173,25 +195,44 @@ def metrics(point: Landscape) -> None:
     rules = int(point.rule_count[0, 0])
     with st.container(horizontal=True, key="metrics"):
         st.metric("Rules", f"{rules:,}")
-        st.metric("Mean length", f"{point.mean_length[0, 0]:.1f}" if rules else "–",
-                  help="Conditions a rule, on average")
-        st.metric("Coverage", share_text(float(point.coverage[0, 0]), decimals=1),
-                  help="Share of the demonstrated states in which some rule applies")
-        st.metric("Fidelity", share_text(float(point.fidelity[0, 0]), decimals=1),
-                  help="Share of those in which the expert did what the rule says")
+        st.metric(
+            "Mean length",
+            f"{point.mean_length[0, 0]:.1f}" if rules else "–",
+            help="Conditions a rule, on average",
+        )
+        st.metric(
+            "Coverage",
+            share_text(float(point.coverage[0, 0]), decimals=1),
+            help="Share of the demonstrated states in which some rule applies",
+        )
+        st.metric(
+            "Fidelity",
+            share_text(float(point.fidelity[0, 0]), decimals=1),
+            help="Share of those in which the expert did what the rule says",
+        )
 
 
 def more() -> None:
     """What changes the whole plane, and is rarely needed."""
     with st.popover("More", icon=":material/tune:"):
         st.slider(
-            "Minimum lift", 0.0, state.MAX_LIFT, value=0.0, step=0.1, key="lift",
+            "Minimum lift",
+            0.0,
+            state.MAX_LIFT,
+            value=0.0,
+            step=0.1,
+            key="lift",
             bind="query-params",
             help="How many times more often than over all states the expert must have done what "
-                 "the rule says. 0: no limit.",
+            "the rule says. 0: no limit.",
         )
         st.slider(
-            "Maximum depth", 0, state.MAX_DEPTH, value=0, key="depth", bind="query-params",
+            "Maximum depth",
+            0,
+            state.MAX_DEPTH,
+            value=0,
+            key="depth",
+            bind="query-params",
             help="Most conditions of a rule. 0: no limit.",
         )
 
@@ -202,18 +243,32 @@ def chosen_dimension() -> int | None:
         return None
     names = [tree.dimension.name for tree in grown]
     name = st.segmented_control(
-        "Action", [WHOLE, *names], default=WHOLE, key="dimension", bind="query-params",
-        required=True, label_visibility="collapsed",
+        "Action",
+        [WHOLE, *names],
+        default=WHOLE,
+        key="dimension",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
     )
     return names.index(name) if name in names else None
 
 
 def switch(label: str, key: str, options: list[str], hint: str) -> str:
     """A choice between two ways to look."""
-    return st.segmented_control(
-        label, options, default=options[0], key=key, bind="query-params", required=True,
-        label_visibility="collapsed", help=hint,
-    ) or options[0]
+    return (
+        st.segmented_control(
+            label,
+            options,
+            default=options[0],
+            key=key,
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+            help=hint,
+        )
+        or options[0]
+    )
 
 
 def show_maps(landscape: Landscape, layers: tuple[figures.Layer, figures.Layer]) -> None:
@@ -239,10 +294,12 @@ def show_maps(landscape: Landscape, layers: tuple[figures.Layer, figures.Layer])
                 with st.container(key=f"box_{layer}"):
                     st.plotly_chart(
                         figures.heatmap(landscape, layer, dark=state.is_dark()),
-                        key=f"map_{layer}", config=BARE, selection_mode="points",
+                        key=f"map_{layer}",
+                        config=BARE,
+                        selection_mode="points",
                         on_select=lambda key=f"map_{layer}": take_click(key),
                         alt=f"{figures.LAYERS[layer].title}, for every minimum support and "
-                            "minimum confidence",
+                        "minimum confidence",
                     )
     st.caption("Click a cell to set both thresholds to it. The ring marks the present ones.")
 
@@ -257,12 +314,21 @@ def show_surfaces(
         with column:
             st.markdown(f"**{figures.LAYERS[layer].title}**")
             figure = figures.surface(
-                landscape, layer, dark=state.is_dark(),
-                chosen=(thresholds.support, thresholds.confidence,
-                        float(getattr(point, layer)[0, 0])),
+                landscape,
+                layer,
+                dark=state.is_dark(),
+                chosen=(
+                    thresholds.support,
+                    thresholds.confidence,
+                    float(getattr(point, layer)[0, 0]),
+                ),
             )
-            st.plotly_chart(figure, key=f"surface_{layer}", config={"displaylogo": False},
-                            alt=f"{figures.LAYERS[layer].title} as a surface")
+            st.plotly_chart(
+                figure,
+                key=f"surface_{layer}",
+                config={"displaylogo": False},
+                alt=f"{figures.LAYERS[layer].title} as a surface",
+            )
     st.caption("Drag to turn. The dot marks the present thresholds.")
 
 
@@ -295,8 +361,11 @@ def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None
     some = state.largest_rules(grown, thresholds, TABLE_ROWS)
     shown = [rule for rule in some.rules if dimension in (None, rule.dimension)][:TABLE_ROWS]
     st.dataframe(
-        frame(shown, some), hide_index=True, column_config=column_config(some),
-        height=table_height(len(shown), 10), key="largest_table",
+        frame(shown, some),
+        hide_index=True,
+        column_config=column_config(some),
+        height=table_height(len(shown), 10),
+        key="largest_table",
         alt="The rules with the most support",
     )
     if rules > len(shown):
@@ -309,21 +378,30 @@ def show_trade_offs(thresholds: Thresholds, point: Landscape, dimension: int | N
     with st.spinner("Looking for the best trade-offs …"):
         front = state.pareto(trees, lift=thresholds.lift, depth=thresholds.max_depth)
     if not front:
-        st.info("There is no rule at any thresholds; lower the minimum lift under More.",
-                icon=":material/filter_alt_off:")
+        st.info(
+            "There is no rule at any thresholds; lower the minimum lift under More.",
+            icon=":material/filter_alt_off:",
+        )
         return
     st.caption(
         "No other thresholds give fewer rules, more coverage and more fidelity than these. "
         "Click a point to use its thresholds."
     )
-    points = figures.thin_front(front)
-    figure = figures.pareto(
-        points, dark=state.is_dark(),
-        chosen=(int(point.rule_count[0, 0]), float(point.coverage[0, 0]),
-                float(point.fidelity[0, 0])),
+    points = thin_front(front)
+    figure = front_figure(
+        points,
+        dark=state.is_dark(),
+        chosen=(
+            int(point.rule_count[0, 0]),
+            float(point.coverage[0, 0]),
+            float(point.fidelity[0, 0]),
+        ),
     )
     st.plotly_chart(
-        figure, key="pareto", config=BARE, selection_mode="points",
+        figure,
+        key="pareto",
+        config=BARE,
+        selection_mode="points",
         on_select=lambda: take_click("pareto"),
         alt="Number of rules against coverage, coloured by fidelity",
     )
@@ -342,15 +420,20 @@ top = st.container()
 with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
     shown = switch("Show", "layer", [SIZE, QUALITY], "What the two figures show")
     view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
-    axes = switch("Grid", "grid", [FINE, PAPER],
-                  "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.")
+    axes = switch(
+        "Grid",
+        "grid",
+        [FINE, PAPER],
+        "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.",
+    )
     more()
     dimension = chosen_dimension()
 in_force = state.chosen_thresholds()
 whole = state.landscape(
     grown,
     *((PAPER_SUPPORTS, PAPER_CONFIDENCES) if axes == PAPER else (FINE_SUPPORTS, FINE_CONFIDENCES)),
-    lift=in_force.lift, depth=in_force.max_depth,
+    lift=in_force.lift,
+    depth=in_force.max_depth,
 )
 landscape = whole if dimension is None else whole.dimensions[dimension]
 with top:
@@ -360,5 +443,6 @@ if view == SURFACES:
 else:
     show_maps(landscape, LAYERS[shown])
 details(dimension)
-st.page_link("rules.py", label="All rules, with the evidence behind each",
-             icon=":material/arrow_forward:")
+st.page_link(
+    "rules.py", label="All rules, with the evidence behind each", icon=":material/arrow_forward:"
+)

@@ -24,7 +24,11 @@ MARKER_COLOUR = "#D55E00"  # what is chosen: a point, a rule's path, its interva
 MUTED_COLOUR = "#8796A3"  # what is there for comparison
 LAYER_SCALE = (
     # Perceptually even, from ground to ink, legible with every kind of colour vision.
-    (0.0, "#f4ecd8"), (0.2, "#c9dcc0"), (0.4, "#8fc3b5"), (0.6, "#4f9fae"), (0.8, "#2c6f99"),
+    (0.0, "#f4ecd8"),
+    (0.2, "#c9dcc0"),
+    (0.4, "#8fc3b5"),
+    (0.6, "#4f9fae"),
+    (0.8, "#2c6f99"),
     (1.0, "#1c3f6e"),
 )
 

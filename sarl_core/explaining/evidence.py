@@ -77,18 +77,24 @@ def path_steps(tree: PolicyTree, node: int) -> tuple[PathStep, ...]:
         if above >= 0:
             left = int(tree.children_left[above]) == here
             query = query_text(
-                Condition(int(tree.feature[above]), "<=" if left else ">",
-                          float(tree.threshold[above])),
+                Condition(
+                    int(tree.feature[above]), "<=" if left else ">", float(tree.threshold[above])
+                ),
                 tree.source.features,
             )
         counts = tree.counts[here]
-        steps.append(PathStep(
-            node=here, query=query, samples=int(tree.samples[here]),
-            support=float(tree.support[here]), confidence=float(tree.confidence[here]),
-            label=int(tree.label[here]),
-            shares=tuple(float(count) / int(tree.samples[here]) for count in counts),
-            is_cut=here == node,
-        ))
+        steps.append(
+            PathStep(
+                node=here,
+                query=query,
+                samples=int(tree.samples[here]),
+                support=float(tree.support[here]),
+                confidence=float(tree.confidence[here]),
+                label=int(tree.label[here]),
+                shares=tuple(float(count) / int(tree.samples[here]) for count in counts),
+                is_cut=here == node,
+            )
+        )
     return tuple(steps)
 
 
@@ -111,10 +117,15 @@ def feature_evidence(
     for bounds in rule.bounds:
         values = demonstrations.observations[:, bounds.feature]
         edges = _edges(values, values[rows], bounds, bins)
-        found.append(FeatureEvidence(
-            bounds.feature, bounds, edges,
-            _shares(values, edges), _shares(values[rows], edges),
-        ))
+        found.append(
+            FeatureEvidence(
+                bounds.feature,
+                bounds,
+                edges,
+                _shares(values, edges),
+                _shares(values[rows], edges),
+            )
+        )
     return tuple(found)
 
 
@@ -181,7 +192,8 @@ def example_columns(
     labels = dimension.labels_of(values)
     assert demonstrations.steps is not None
     did = (
-        [f"{value:.4g}" for value in values.tolist()] if dimension.is_interval
+        [f"{value:.4g}" for value in values.tolist()]
+        if dimension.is_interval
         else [label_text(label, dimension) for label in labels.tolist()]
     )
     columns: dict[str, list[object]] = {

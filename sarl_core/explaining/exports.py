@@ -9,8 +9,20 @@ from sarl_core.explaining.language import exact_condition, label_text, sentence,
 from sarl_core.mining.rules import RuleSet
 
 CSV_COLUMNS = (
-    "id", "dimension", "action", "rule", "conditions", "support", "confidence", "lift",
-    "joint_support", "samples", "length", "merged_length", "enabled", "origin",
+    "id",
+    "dimension",
+    "action",
+    "rule",
+    "conditions",
+    "support",
+    "confidence",
+    "lift",
+    "joint_support",
+    "samples",
+    "length",
+    "merged_length",
+    "enabled",
+    "origin",
 )
 _FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 
@@ -32,13 +44,24 @@ def rules_to_csv(rule_set: RuleSet) -> str:
     for rule in rule_set.rules:
         dimension = rule_set.actions[rule.dimension]
         conditions = " and ".join(exact_condition(c, features) for c in rule.conditions)
-        writer.writerow((
-            rule.id, _cell(dimension.name), _cell(label_text(rule.action, dimension)),
-            _cell(sentence(rule, rule_set, evidence=False)), _cell(conditions or "always"),
-            repr(rule.support), repr(rule.confidence), repr(rule.lift),
-            repr(rule.joint_support), rule.samples, rule.length, rule.merged_length,
-            "yes" if rule.enabled else "no", rule.origin,
-        ))
+        writer.writerow(
+            (
+                rule.id,
+                _cell(dimension.name),
+                _cell(label_text(rule.action, dimension)),
+                _cell(sentence(rule, rule_set, evidence=False)),
+                _cell(conditions or "always"),
+                repr(rule.support),
+                repr(rule.confidence),
+                repr(rule.lift),
+                repr(rule.joint_support),
+                rule.samples,
+                rule.length,
+                rule.merged_length,
+                "yes" if rule.enabled else "no",
+                rule.origin,
+            )
+        )
     return text.getvalue()
 
 
@@ -54,7 +77,8 @@ def rules_to_text(rule_set: RuleSet) -> str:
     """
     source, thresholds = rule_set.source, rule_set.thresholds
     limits = [
-        f"support at least {thresholds.support:g}", f"confidence at least {thresholds.confidence:g}"
+        f"support at least {thresholds.support:g}",
+        f"confidence at least {thresholds.confidence:g}",
     ]
     if thresholds.lift:
         limits.append(f"lift at least {thresholds.lift:g}")
@@ -64,8 +88,7 @@ def rules_to_text(rule_set: RuleSet) -> str:
         limits.append(f"divider {rule_set.divider}")
     lines = [
         f"Rules for {source.env_id or 'an unnamed environment'}",
-        f"Mined from {source.steps:,} steps in {source.episodes:,} episodes: "
-        f"{', '.join(limits)}.",
+        f"Mined from {source.steps:,} steps in {source.episodes:,} episodes: {', '.join(limits)}.",
         f"{rule_set.rule_count:,} rules, {rule_set.mean_length:.2f} conditions on average; they "
         f"cover {share_text(rule_set.coverage)} of the states and are right in "
         f"{share_text(rule_set.fidelity)} of those.",
@@ -75,8 +98,7 @@ def rules_to_text(rule_set: RuleSet) -> str:
         rules = sorted(rule_set.of_dimension(index), key=lambda rule: -rule.support)
         lines += ["", f"{dimension.name}: {len(rules):,} rules", ""]
         lines += [
-            f"{number:>4}. {sentence(rule, rule_set)}"
-            for number, rule in enumerate(rules, start=1)
+            f"{number:>4}. {sentence(rule, rule_set)}" for number, rule in enumerate(rules, start=1)
         ]
     return "\n".join(lines) + "\n"
 

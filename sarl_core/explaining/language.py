@@ -150,7 +150,8 @@ def query_text(condition: Condition, features: tuple[Feature, ...]) -> str:
     """
     infinite = math.inf
     bounds = (
-        Bounds(condition.feature, -infinite, condition.threshold) if condition.op == "<="
+        Bounds(condition.feature, -infinite, condition.threshold)
+        if condition.op == "<="
         else Bounds(condition.feature, condition.threshold, infinite)
     )
     return short_condition(bounds, features[condition.feature])

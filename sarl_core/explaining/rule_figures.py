@@ -1,8 +1,7 @@
-"""Figures of one rule: its place in the tree, its intervals; and its path as a table."""
+"""Figures of one rule: its place in the tree, and its intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
-from sarl_core.explaining.evidence import FeatureEvidence, PathStep
+from sarl_core.explaining.evidence import FeatureEvidence
 from sarl_core.explaining.language import (
     label_text,
     number_text,
@@ -20,7 +19,6 @@ from sarl_core.explaining.language import (
     share_text,
     short_condition,
 )
-from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
 
@@ -70,26 +68,43 @@ def tree_figure(
             (mine[rules[mine]], 0.95, "a rule"),
         ):
             _add_boxes(figure, tree, part, faded(label_colour(label), opacity), f"{name}, {what}")
-    _add_boxes(figure, tree, shown[below[shown]], faded(MUTED_COLOUR, 0.22 if dark else 0.16),
-               "cut off below a rule")
+    _add_boxes(
+        figure,
+        tree,
+        shown[below[shown]],
+        faded(MUTED_COLOUR, 0.22 if dark else 0.16),
+        "cut off below a rule",
+    )
     _add_hover(figure, tree, shown, window)
     _add_path(figure, tree, path, dark=dark)
     if around:
         _add_queries(figure, tree, path, window, dark=dark)
     left, right, top, bottom = window
     figure.update_layout(
-        height=height, margin={"l": 50, "r": 10, "t": 8, "b": 44}, showlegend=False,
-        hovermode="closest", hoverdistance=30, dragmode="zoom",
-        paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
+        height=height,
+        margin={"l": 50, "r": 10, "t": 8, "b": 44},
+        showlegend=False,
+        hovermode="closest",
+        hoverdistance=30,
+        dragmode="zoom",
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
     )
     figure.update_xaxes(
-        range=[left / total, right / total], title={"text": "Share of the states"},
-        tickformat="~%" if right - left > total / 50 else ".2~%", showgrid=False, zeroline=False,
+        range=[left / total, right / total],
+        title={"text": "Share of the states"},
+        tickformat="~%" if right - left > total / 50 else ".2~%",
+        showgrid=False,
+        zeroline=False,
         nticks=6,
     )
     figure.update_yaxes(
-        range=[bottom + 0.05, top - 0.05], title={"text": "Queries answered"}, showgrid=False,
-        zeroline=False, nticks=min(bottom - top + 1, 9), tickformat="d",
+        range=[bottom + 0.05, top - 0.05],
+        title={"text": "Queries answered"},
+        showgrid=False,
+        zeroline=False,
+        nticks=min(bottom - top + 1, 9),
+        tickformat="d",
     )
     return figure
 
@@ -121,25 +136,39 @@ def feature_figure(
         ("states of the rule", evidence.at_rule, faded(colour, 0.75)),
     ):
         figure.add_bar(
-            x=centres, y=np.round(shares, 6), width=widths, name=name, customdata=ranges,
+            x=centres,
+            y=np.round(shares, 6),
+            width=widths,
+            name=name,
+            customdata=ranges,
             marker={"color": fill, "line": {"width": 0}},
             hovertemplate=f"%{{customdata}}<br>%{{y:.1%}} of {name}<extra></extra>",
         )
     low = bounds.low if np.isfinite(bounds.low) else float(edges[0])
     high = bounds.high if np.isfinite(bounds.high) else float(edges[-1])
-    figure.add_vrect(x0=low, x1=high, fillcolor=MARKER_COLOUR, opacity=0.13, line_width=0,
-                     layer="below")
+    figure.add_vrect(
+        x0=low, x1=high, fillcolor=MARKER_COLOUR, opacity=0.13, line_width=0, layer="below"
+    )
     for edge in (bounds.low, bounds.high):
         if np.isfinite(edge):
             figure.add_vline(x=edge, line={"color": MARKER_COLOUR, "width": 2})
     figure.update_layout(
-        height=height, margin={"l": 44, "r": 10, "t": 6, "b": 40}, barmode="overlay", bargap=0,
-        showlegend=False, hovermode="closest", dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
+        height=height,
+        margin={"l": 44, "r": 10, "t": 6, "b": 40},
+        barmode="overlay",
+        bargap=0,
+        showlegend=False,
+        hovermode="closest",
+        dragmode=False,
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
     )
     figure.update_xaxes(
-        range=[float(edges[0]), float(edges[-1])], fixedrange=True, showgrid=False,
-        zeroline=False, nticks=6,
+        range=[float(edges[0]), float(edges[-1])],
+        fixedrange=True,
+        showgrid=False,
+        zeroline=False,
+        nticks=6,
         title={"text": feature.unit or feature.name, "standoff": 4},
     )
     figure.update_yaxes(tickformat=".0%", fixedrange=True, nticks=4, zeroline=False)
@@ -157,93 +186,6 @@ def interval_text(evidence: FeatureEvidence, feature: Feature) -> str:
         As "pole angle > 0.02 rad".
     """
     return short_condition(evidence.bounds, feature)
-
-
-def label_mix(shares: Sequence[float], dimension: LabelledDimension) -> str:
-    """The shares of the labels as a bar.
-
-    Args:
-        shares: One a label, summing to 1.
-        dimension: The labels.
-
-    Returns:
-        HTML without script, styled in place.
-    """
-    parts = "".join(
-        f'<span title="{escape(label_text(label, dimension))}: {share_text(share)}" '
-        f'style="width:{100 * share:.2f}%;background:{label_colour(label)}"></span>'
-        for label, share in enumerate(shares) if share > 0
-    )
-    return f'<span class="sarl-mix">{parts}</span>'
-
-
-_STYLE = """<style>
-.sarl-path { width: 100%; border-collapse: collapse; font-size: 0.875rem; }
-.sarl-path th { text-align: left; font-weight: 400; opacity: 0.7; padding: 0.15rem 0.5rem 0.3rem 0;
-  white-space: nowrap; }
-.sarl-path td { padding: 0.24rem 0.5rem 0.24rem 0; border-top: 1px solid rgba(128,140,150,0.25);
-  vertical-align: middle; }
-.sarl-path .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
-.sarl-path tr.cut td { font-weight: 600; }
-.sarl-path tr.cut td:first-child { box-shadow: inset 3px 0 0 MARKER; padding-left: 0.5rem; }
-.sarl-path .bar { width: 26%; min-width: 64px; }
-@media (max-width: 640px) { .sarl-path .s { display: none; } }
-.sarl-mix { display: flex; height: 12px; border-radius: 3px; overflow: hidden; width: 100%; }
-.sarl-mix span { display: block; height: 100%; }
-.sarl-key { display: flex; flex-wrap: wrap; gap: 0.2rem 0.9rem; font-size: 0.82rem;
-  margin-bottom: 0.4rem; }
-.sarl-key i { display: inline-block; width: 11px; height: 11px; border-radius: 2px;
-  margin-right: 0.35rem; vertical-align: -1px; }
-</style>""".replace("MARKER", MARKER_COLOUR)
-
-
-def label_key(dimension: LabelledDimension) -> str:
-    """Which colour is which label.
-
-    Args:
-        dimension: The labels.
-
-    Returns:
-        HTML without script.
-    """
-    parts = "".join(
-        f'<span><i style="background:{label_colour(label)}"></i>'
-        f"{escape(label_text(label, dimension))}</span>"
-        for label in range(dimension.n_labels)
-    )
-    return f'{_STYLE}<div class="sarl-key">{parts}</div>'
-
-
-def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
-    """The way from the root to a rule, node by node.
-
-    Args:
-        steps: The root first.
-        dimension: The labels.
-
-    Returns:
-        HTML without script; every name escaped.
-    """
-    rows = []
-    for step in steps:
-        query = escape(step.query) if step.query else "all states"
-        note = " – cut here: this is the rule" if step.is_cut else ""
-        rows.append(
-            f'<tr class="{"cut" if step.is_cut else ""}"><td>{query}{note}</td>'
-            f'<td class="n">{step.samples:,}</td><td class="n s">{share_text(step.support)}</td>'
-            f'<td class="n">{share_text(step.confidence)}</td>'
-            f'<td class="bar">{label_mix(step.shares, dimension)}</td></tr>'
-        )
-    head = "".join(
-        f"<th{css}>{name}</th>" for name, css in (
-            ("Query", ""), ("States", ' class="n"'), ("Support", ' class="n s"'),
-            ("Confidence", ' class="n"'), ("What the expert did", ""),
-        )
-    )
-    return (
-        f'{label_key(dimension)}<div style="overflow-x:auto"><table class="sarl-path">'
-        f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
-    )
 
 
 def _below(tree: PolicyTree, cut: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -299,13 +241,21 @@ def _add_boxes(
     x = np.column_stack([left, right, right, left, gap]).ravel()
     y = np.column_stack([top, top, top + 0.92, top + 0.92, gap]).ravel()
     figure.add_scatter(
-        x=np.round(x, 7), y=y, mode="lines", fill="toself", fillcolor=colour, line={"width": 0},
-        name=name, hoverinfo="skip",
+        x=np.round(x, 7),
+        y=y,
+        mode="lines",
+        fill="toself",
+        fillcolor=colour,
+        line={"width": 0},
+        name=name,
+        hoverinfo="skip",
     )
 
 
 def _add_hover(
-    figure: go.Figure, tree: PolicyTree, nodes: NDArray[np.int64],
+    figure: go.Figure,
+    tree: PolicyTree,
+    nodes: NDArray[np.int64],
     window: tuple[int, int, int, int],
 ) -> None:
     """Invisible points that say what a box is; the widest boxes are enough."""
@@ -326,34 +276,47 @@ def _add_hover(
             f"{escape(label_text(int(tree.label[node]), tree.dimension))}{asked}"
         )
     figure.add_scatter(
-        x=(start + end) / 2 / total, y=tree.depth[some] + 0.46, mode="markers",
-        marker={"size": 1, "color": "rgba(0,0,0,0)"}, text=texts,
+        x=(start + end) / 2 / total,
+        y=tree.depth[some] + 0.46,
+        mode="markers",
+        marker={"size": 1, "color": "rgba(0,0,0,0)"},
+        text=texts,
         hovertemplate="%{text}<extra></extra>",
     )
 
 
-def _add_path(
-    figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64], *, dark: bool
-) -> None:
+def _add_path(figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64], *, dark: bool) -> None:
     halo = "#12181d" if dark else "#ffffff"
     total = float(tree.samples[0])
     middle = (tree.sample_start[path] + tree.samples[path] / 2) / total
     depth = tree.depth[path] + 0.46
     figure.add_scatter(
-        x=middle, y=depth, mode="lines", line={"color": halo, "width": 7},
-        hoverinfo="skip", opacity=0.85,
+        x=middle,
+        y=depth,
+        mode="lines",
+        line={"color": halo, "width": 7},
+        hoverinfo="skip",
+        opacity=0.85,
     )
     sizes = [7] * (len(path) - 1) + [15]
     figure.add_scatter(
-        x=middle, y=depth, mode="lines+markers", hoverinfo="skip", name="path",
+        x=middle,
+        y=depth,
+        mode="lines+markers",
+        hoverinfo="skip",
+        name="path",
         line={"color": MARKER_COLOUR, "width": 3},
         marker={"color": MARKER_COLOUR, "size": sizes, "line": {"color": halo, "width": 1.5}},
     )
 
 
 def _add_queries(
-    figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64],
-    window: tuple[int, int, int, int], *, dark: bool,
+    figure: go.Figure,
+    tree: PolicyTree,
+    path: NDArray[np.int64],
+    window: tuple[int, int, int, int],
+    *,
+    dark: bool,
 ) -> None:
     """The queries of the path, written beside it."""
     total = float(tree.samples[0])
@@ -364,14 +327,18 @@ def _add_queries(
             continue
         middle = (tree.sample_start[here] + tree.samples[here] / 2) / total
         query = Condition(
-            int(tree.feature[above]), "<=" if int(tree.children_left[above]) == here else ">",
+            int(tree.feature[above]),
+            "<=" if int(tree.children_left[above]) == here else ">",
             float(tree.threshold[above]),
         )
         rightwards = middle * total < (left + right) / 2
         note: dict[str, Any] = {
-            "x": middle, "y": float(tree.depth[here]) + 0.46, "showarrow": False,
+            "x": middle,
+            "y": float(tree.depth[here]) + 0.46,
+            "showarrow": False,
             "text": escape(query_text(query, tree.source.features)),
-            "xanchor": "left" if rightwards else "right", "xshift": 12 if rightwards else -12,
+            "xanchor": "left" if rightwards else "right",
+            "xshift": 12 if rightwards else -12,
             "font": {"size": 11, "color": ink},
             "bgcolor": "rgba(18,24,29,0.6)" if dark else "rgba(255,255,255,0.7)",
         }

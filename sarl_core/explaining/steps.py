@@ -14,7 +14,10 @@ from sarl_core.mining.tree import PolicyTree
 # Most that is of interest happens below a support of 0.05, so the steps grow with the support.
 _DECADE = (1, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8, 9)
 SUPPORT_STEPS: tuple[float, ...] = (
-    0.0, 0.00001, 0.00002, 0.00005,
+    0.0,
+    0.00001,
+    0.00002,
+    0.00005,
     *(float(f"{digit:g}e-{power}") for power in (4, 3, 2) for digit in _DECADE),
     *(step / 20 for step in range(2, 21)),
 )
@@ -24,12 +27,52 @@ CONFIDENCE_STEPS: tuple[float, ...] = (
     *(step / 200 for step in range(180, 201)),
 )
 FINE_SUPPORTS: tuple[float, ...] = (
-    0.0, 0.0002, 0.0005, 0.001, 0.002, 0.003, 0.004, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.04,
-    0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5,
+    0.0,
+    0.0002,
+    0.0005,
+    0.001,
+    0.002,
+    0.003,
+    0.004,
+    0.005,
+    0.007,
+    0.01,
+    0.015,
+    0.02,
+    0.03,
+    0.04,
+    0.05,
+    0.07,
+    0.1,
+    0.15,
+    0.2,
+    0.3,
+    0.4,
+    0.5,
 )
 FINE_CONFIDENCES: tuple[float, ...] = (
-    0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.92, 0.94, 0.95,
-    0.96, 0.97, 0.98, 0.99, 1.0,
+    0.0,
+    0.1,
+    0.2,
+    0.3,
+    0.4,
+    0.5,
+    0.55,
+    0.6,
+    0.65,
+    0.7,
+    0.75,
+    0.8,
+    0.85,
+    0.9,
+    0.92,
+    0.94,
+    0.95,
+    0.96,
+    0.97,
+    0.98,
+    0.99,
+    1.0,
 )
 
 
@@ -73,14 +116,21 @@ def neat_point(trees: Sequence[PolicyTree], thresholds: Thresholds) -> Threshold
         At most as high as those given.
     """
     for name, decimals in (("support", 3), ("confidence", 2)):
-        edge = getattr(next_changes(
-            trees, supp_min=thresholds.support, conf_min=thresholds.confidence,
-            lift_min=thresholds.lift, max_depth=thresholds.max_depth,
-        ), f"{name}_below")
+        edge = getattr(
+            next_changes(
+                trees,
+                supp_min=thresholds.support,
+                conf_min=thresholds.confidence,
+                lift_min=thresholds.lift,
+                max_depth=thresholds.max_depth,
+            ),
+            f"{name}_below",
+        )
         value = getattr(thresholds, name)
         neat = neat_between(-1.0 if edge is None else edge, value, decimals=decimals)
         thresholds = (
-            replace(thresholds, support=neat) if name == "support"
+            replace(thresholds, support=neat)
+            if name == "support"
             else replace(thresholds, confidence=neat)
         )
     return thresholds
@@ -120,7 +170,10 @@ def neat_jumps(trees: Sequence[PolicyTree], thresholds: Thresholds) -> Jumps:
 
     def edges(at: Thresholds) -> tuple[float | None, float | None, float | None, float | None]:
         return next_changes(
-            trees, supp_min=at.support, conf_min=at.confidence, lift_min=at.lift,
+            trees,
+            supp_min=at.support,
+            conf_min=at.confidence,
+            lift_min=at.lift,
             max_depth=at.max_depth,
         )
 
@@ -128,7 +181,8 @@ def neat_jumps(trees: Sequence[PolicyTree], thresholds: Thresholds) -> Jumps:
 
     def beyond(place: int, value: float) -> float | None:
         moved = (
-            replace(thresholds, support=value) if place < 2
+            replace(thresholds, support=value)
+            if place < 2
             else replace(thresholds, confidence=value)
         )
         return edges(moved)[place]

@@ -25,8 +25,11 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
     rules: list[Rule] = []
     for tree in trees:
         nodes = cut_nodes(
-            tree, supp_min=thresholds.support, conf_min=thresholds.confidence,
-            lift_min=thresholds.lift, max_depth=thresholds.max_depth,
+            tree,
+            supp_min=thresholds.support,
+            conf_min=thresholds.confidence,
+            lift_min=thresholds.lift,
+            max_depth=thresholds.max_depth,
         )
         first = np.argsort(-tree.samples[nodes], kind="stable")[:most]
         rules += rules_at(tree, nodes[first])

@@ -1,4 +1,4 @@
-"""Figures of the threshold plane: heatmaps, the paper's surface, the Pareto front.
+"""Figures of the threshold plane: heatmaps, and the paper's surface.
 
 Cells of a grid are drawn equally large, whatever the gaps between the thresholds: a position
 counts cells, and the axis says which threshold stands there.
@@ -6,7 +6,6 @@ counts cells, and the axis says which threshold stands there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,10 +13,9 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR, MUTED_COLOUR
+from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.language import number_text
 from sarl_core.mining.landscape import Landscape
-from sarl_core.mining.pareto import ParetoPoint
 
 Layer = Literal["rule_count", "mean_length", "coverage", "fidelity"]
 Floats = NDArray[np.float64]
@@ -69,26 +67,43 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     figure = go.Figure()
     bar = {
-        "thickness": 10, "outlinewidth": 0, "len": 1.0, "y": 0.5, "x": 1.01,
-        "tickfont": {"size": 11}, "nticks": 6, "tickformat": ".0%" if style.share else "",
+        "thickness": 10,
+        "outlinewidth": 0,
+        "len": 1.0,
+        "y": 0.5,
+        "x": 1.01,
+        "tickfont": {"size": 11},
+        "nticks": 6,
+        "tickformat": ".0%" if style.share else "",
     }
     shown = values
     if layer == "rule_count":
         # From one rule to thousands: by powers of ten.
         shown = np.log10(1.0 + values)
         ticks = _power_ticks(float(values.max()))
-        bar |= {"tickmode": "array", "tickvals": np.log10(1.0 + np.array(ticks)).tolist(),
-                "ticktext": [f"{tick:,}" for tick in ticks]}
+        bar |= {
+            "tickmode": "array",
+            "tickvals": np.log10(1.0 + np.array(ticks)).tolist(),
+            "ticktext": [f"{tick:,}" for tick in ticks],
+        }
     figure.add_heatmap(
-        z=np.round(shown.T, 4), colorscale=_scale(dark=dark), hoverinfo="skip", colorbar=bar,
-        xgap=1, ygap=1, hoverongaps=False,
-        zmin=0 if layer != "fidelity" else None, zmax=1 if style.share else None,
+        z=np.round(shown.T, 4),
+        colorscale=layer_scale(dark=dark),
+        hoverinfo="skip",
+        colorbar=bar,
+        xgap=1,
+        ygap=1,
+        hoverongaps=False,
+        zmin=0 if layer != "fidelity" else None,
+        zmax=1 if style.share else None,
     )
     columns, rows = np.meshgrid(
         np.arange(len(landscape.supports)), np.arange(len(landscape.confidences)), indexing="ij"
     )
     figure.add_scatter(
-        x=columns.ravel(), y=rows.ravel(), mode="markers",
+        x=columns.ravel(),
+        y=rows.ravel(),
+        mode="markers",
         marker={"size": 1, "color": "rgba(0,0,0,0)"},
         customdata=_cell_data(landscape),
         hovertemplate=(
@@ -99,9 +114,16 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         showlegend=False,
     )
     figure.update_layout(
-        height=HEIGHT, margin=MARGIN, hoverdistance=-1, hovermode="closest", dragmode=False,
-        clickmode="event+select", paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
-        font={"size": 12}, showlegend=False,
+        height=HEIGHT,
+        margin=MARGIN,
+        hoverdistance=-1,
+        hovermode="closest",
+        dragmode=False,
+        clickmode="event+select",
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        font={"size": 12},
+        showlegend=False,
     )
     figure.update_xaxes(**_axis("Minimum support", landscape.supports))
     figure.update_yaxes(**_axis("Minimum confidence", landscape.confidences))
@@ -166,10 +188,12 @@ def surface(
     rows = np.arange(len(landscape.confidences))
     figure = go.Figure()
     figure.add_surface(
-        x=columns, y=rows, z=values.T, colorscale=_scale(dark=dark), showscale=False,
-        customdata=np.moveaxis(
-            _cell_data(landscape).reshape(len(columns), len(rows), -1), 0, 1
-        ),
+        x=columns,
+        y=rows,
+        z=values.T,
+        colorscale=layer_scale(dark=dark),
+        showscale=False,
+        customdata=np.moveaxis(_cell_data(landscape).reshape(len(columns), len(rows), -1), 0, 1),
         hovertemplate=(
             "support %{customdata[0]}, confidence %{customdata[1]}<br>"
             "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
@@ -179,27 +203,38 @@ def surface(
     if chosen is not None and np.isfinite(chosen[2]):
         figure.add_scatter3d(
             x=[position(chosen[0], landscape.supports)],
-            y=[position(chosen[1], landscape.confidences)], z=[chosen[2]],
-            mode="markers", marker={"size": 6, "color": MARKER_COLOUR}, hoverinfo="skip",
+            y=[position(chosen[1], landscape.confidences)],
+            z=[chosen[2]],
+            mode="markers",
+            marker={"size": 6, "color": MARKER_COLOUR},
+            hoverinfo="skip",
             showlegend=False,
         )
-    plain = {"gridcolor": "rgba(128,128,128,0.35)", "showbackground": False, "color": ink,
-             "zeroline": False}
+    plain = {
+        "gridcolor": "rgba(128,128,128,0.35)",
+        "showbackground": False,
+        "color": ink,
+        "zeroline": False,
+    }
     across = _axis("Minimum support", landscape.supports, most=5)
     along = _axis("Minimum confidence", landscape.confidences, most=5)
     keep = ("tickmode", "tickvals", "ticktext", "range")
     figure.update_layout(
-        height=420, margin={"l": 0, "r": 0, "t": 8, "b": 0},
+        height=420,
+        margin={"l": 0, "r": 0, "t": 8, "b": 0},
         paper_bgcolor="rgba(0,0,0,0)",
         scene={
-            "xaxis": {key: across[key] for key in keep} | plain | {
-                "title": {"text": "support"}},
-            "yaxis": {key: along[key] for key in keep} | plain | {
-                "title": {"text": "confidence"}},
-            "zaxis": {"title": {"text": style.unit or layer}, "rangemode": "tozero",
-                      **plain, **({"tickformat": ".0%"} if style.share else {})},
+            "xaxis": {key: across[key] for key in keep} | plain | {"title": {"text": "support"}},
+            "yaxis": {key: along[key] for key in keep} | plain | {"title": {"text": "confidence"}},
+            "zaxis": {
+                "title": {"text": style.unit or layer},
+                "rangemode": "tozero",
+                **plain,
+                **({"tickformat": ".0%"} if style.share else {}),
+            },
             "camera": {"eye": {"x": 1.75, "y": -1.85, "z": 1.1}, "center": {"z": -0.12}},
-            "aspectmode": "manual", "aspectratio": {"x": 1.1, "y": 1.1, "z": 0.75},
+            "aspectmode": "manual",
+            "aspectratio": {"x": 1.1, "y": 1.1, "z": 0.75},
         },
     )
     return figure
@@ -219,7 +254,10 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
     from plotly.subplots import make_subplots
 
     figure = make_subplots(
-        rows=2, cols=2, horizontal_spacing=0.14, vertical_spacing=0.15,
+        rows=2,
+        cols=2,
+        horizontal_spacing=0.14,
+        vertical_spacing=0.15,
         subplot_titles=[style.title for style in LAYERS.values()],
     )
     for number, layer in enumerate(LAYERS):
@@ -236,97 +274,17 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
     ground, ink = ("#12181d", "#e4eaee") if dark else ("#ffffff", "#1d2730")
     figure.update_layout(
         title={"text": title, "x": 0.02, "font": {"size": 17}} if title else None,
-        width=1080, height=860, margin={"l": 70, "r": 70, "t": 90 if title else 50, "b": 60},
-        paper_bgcolor=ground, plot_bgcolor=ground, font={"color": ink, "size": 12},
-        hoverdistance=-1, hovermode="closest", showlegend=False,
+        width=1080,
+        height=860,
+        margin={"l": 70, "r": 70, "t": 90 if title else 50, "b": 60},
+        paper_bgcolor=ground,
+        plot_bgcolor=ground,
+        font={"color": ink, "size": 12},
+        hoverdistance=-1,
+        hovermode="closest",
+        showlegend=False,
     )
     figure.update_annotations(font={"size": 14})
-    return figure
-
-
-def thin_front(points: Sequence[ParetoPoint], most: int = 240) -> tuple[ParetoPoint, ...]:
-    """Few enough points of a Pareto front to draw, spread over it.
-
-    Args:
-        points: The front.
-        most: How many to keep, roughly.
-
-    Returns:
-        From each patch of similar size and fidelity the one with the most coverage.
-    """
-    if len(points) <= most:
-        return tuple(points)
-    side = max(int(most**0.5), 1)
-    size = np.log(np.array([point.rules for point in points], dtype=np.float64))
-    right = np.array([point.fidelity for point in points])
-
-    def patch(values: Floats) -> NDArray[np.int64]:
-        low, high = float(values.min()), float(values.max())
-        scaled = (values - low) / max(high - low, 1e-12) * side
-        return np.minimum(scaled.astype(np.int64), side - 1)
-
-    best: dict[tuple[int, int], ParetoPoint] = {}
-    for key, point in zip(zip(patch(size).tolist(), patch(right).tolist(), strict=True), points,
-                          strict=True):
-        if key not in best or point.coverage > best[key].coverage:
-            best[key] = point
-    return tuple(sorted(best.values()))
-
-
-def pareto(
-    points: Sequence[ParetoPoint],
-    *,
-    chosen: tuple[int, float, float] | None = None,
-    dark: bool = False,
-) -> go.Figure:
-    """The rule sets that no other one beats: few rules, much coverage, much fidelity.
-
-    Args:
-        points: The front, or some of it.
-        chosen: Rules, coverage and fidelity of the rule set in force.
-        dark: Whether it stands on dark ground.
-
-    Returns:
-        Rules to the right (powers of ten), coverage upwards, fidelity as colour; each point
-        carries its thresholds as `customdata`.
-    """
-    figure = go.Figure()
-    figure.add_scatter(
-        x=[point.rules for point in points],
-        y=[point.coverage for point in points],
-        mode="markers",
-        customdata=[
-            [point.support, point.confidence, f"{point.fidelity:.2%}"] for point in points
-        ],
-        marker={
-            "size": 9, "color": [point.fidelity for point in points],
-            "colorscale": _scale(dark=dark), "showscale": True,
-            "line": {"width": 0.5, "color": MUTED_COLOUR},
-            "colorbar": {"thickness": 10, "outlinewidth": 0, "tickformat": ".0%", "x": 1.01,
-                         "title": {"text": "Fidelity", "side": "right"}},
-        },
-        hovertemplate=(
-            "rules %{x:,}, coverage %{y:.1%}, fidelity %{customdata[2]}<br>"
-            "at support %{customdata[0]:.4~g}, confidence %{customdata[1]:.4~g}<extra></extra>"
-        ),
-        unselected={"marker": {"opacity": 1}},
-    )
-    if chosen is not None and chosen[0]:
-        figure.add_scatter(
-            x=[chosen[0]], y=[chosen[1]], mode="markers", hoverinfo="skip", name="chosen",
-            marker={"size": 16, "symbol": "circle-open", "color": MARKER_COLOUR,
-                    "line": {"width": 3}},
-        )
-    figure.update_layout(
-        height=360, margin={"l": 58, "r": 20, "t": 8, "b": 50}, showlegend=False,
-        hovermode="closest", clickmode="event+select", dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)", plot_bgcolor="rgba(0,0,0,0)",
-    )
-    figure.update_xaxes(title={"text": "Number of rules"}, type="log", dtick=1, tickformat=",d",
-                        fixedrange=True)
-    figure.update_yaxes(
-        title={"text": "Coverage"}, tickformat=".0%", range=[-0.03, 1.05], fixedrange=True
-    )
     return figure
 
 
@@ -336,13 +294,22 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
     confidences = [float(value) for value in landscape.confidences]
     rows: list[list[Any]] = []
     layers = zip(
-        landscape.rule_count.tolist(), landscape.mean_length.tolist(),
-        landscape.coverage.tolist(), landscape.fidelity.tolist(), strict=True,
+        landscape.rule_count.tolist(),
+        landscape.mean_length.tolist(),
+        landscape.coverage.tolist(),
+        landscape.fidelity.tolist(),
+        strict=True,
     )
     for support, (counts, lengths, covered, right) in zip(supports, layers, strict=True):
         rows += [
-            [support, confidence, count, f"{length:.1f}", f"{share:.1%}",
-             f"{truth:.1%}" if truth == truth else "–"]
+            [
+                support,
+                confidence,
+                count,
+                f"{length:.1f}",
+                f"{share:.1%}",
+                f"{truth:.1%}" if truth == truth else "–",
+            ]
             for confidence, count, length, share, truth in zip(
                 confidences, counts, lengths, covered, right, strict=True
             )
@@ -359,10 +326,15 @@ def _axis(title: str, grid: Floats, most: int = _TICKS) -> dict[str, Any]:
             ticks.pop()
         ticks.append(len(grid) - 1)
     return {
-        "title": {"text": title, "standoff": 8}, "range": [-0.5, len(grid) - 0.5],
-        "tickmode": "array", "tickvals": ticks,
+        "title": {"text": title, "standoff": 8},
+        "range": [-0.5, len(grid) - 0.5],
+        "tickmode": "array",
+        "tickvals": ticks,
         "ticktext": [number_text(float(grid[tick])) for tick in ticks],
-        "fixedrange": True, "showgrid": False, "zeroline": False, "automargin": False,
+        "fixedrange": True,
+        "showgrid": False,
+        "zeroline": False,
+        "automargin": False,
     }
 
 
@@ -370,7 +342,15 @@ def _power_ticks(top: float) -> list[int]:
     return [0, *(10**power for power in range(7) if 10**power <= max(top, 1.0))]
 
 
-def _scale(*, dark: bool) -> list[list[Any]]:
+def layer_scale(*, dark: bool) -> list[list[Any]]:
+    """The colour scale of a layer.
+
+    Args:
+        dark: Whether it stands on dark ground.
+
+    Returns:
+        Pairs of place and colour.
+    """
     if dark:  # nothing is as dark as the ground, much is light
         shades = [shade for _, shade in LAYER_SCALE][::-1]
         return [[at, shade] for (at, _), shade in zip(LAYER_SCALE, shades, strict=True)]

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
+from sarl_core.explaining.exports import CSV_COLUMNS, rules_to_csv, rules_to_text
+from sarl_core.mining.rules import Condition
+
+
+@pytest.fixture(scope="module")
+def unfiltered(lander_trees: tuple[PolicyTree, ...]) -> RuleSet:
+    return mine_rules(lander_trees, supp_min=0.0, conf_min=1.0)
+
+
+def rows_of(rule_set: RuleSet) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(rules_to_csv(rule_set))))
+
+
+def test_csv_holds_every_rule_at_full_precision(
+    unfiltered: RuleSet, lander_like: Demonstrations
+) -> None:
+    rows = rows_of(unfiltered)
+    assert len(rows) == unfiltered.rule_count > 100
+    names = [feature.name for feature in lander_like.features]
+    for row, rule in zip(rows, unfiltered.rules, strict=True):
+        assert tuple(row) == CSV_COLUMNS
+        read = []
+        for part in row["conditions"].split(" and "):
+            name, op, threshold = part.rsplit(" ", 2)
+            assert op in ("<=", ">")
+            read.append((names.index(name), op, float(threshold)))
+        assert read == [tuple(condition) for condition in rule.conditions]
+        assert float(row["confidence"]) == rule.confidence
+        assert int(row["samples"]) == rule.samples
+
+
+def test_csv_conditions_select_the_rows_of_the_rule(
+    unfiltered: RuleSet, lander_like: Demonstrations
+) -> None:
+    rule = max(unfiltered.rules, key=lambda one: one.samples)
+    assert int(np.count_nonzero(rule.applies(lander_like.observations))) == rule.samples
+
+
+def test_no_cell_is_a_formula(unfiltered: RuleSet) -> None:
+    features = tuple(
+        replace(feature, name="=cmd()" if index == 0 else feature.name)
+        for index, feature in enumerate(unfiltered.source.features)
+    )
+    first = replace(unfiltered.rules[0], conditions=(Condition(0, ">", 1.0),))
+    harmful = replace(
+        unfiltered, rules=(first,), source=replace(unfiltered.source, features=features)
+    )
+    assert rows_of(harmful)[0]["conditions"] == "'=cmd() > 1.0"
+
+
+def test_text_numbers_every_rule_and_promises_nothing(unfiltered: RuleSet) -> None:
+    text = rules_to_text(unfiltered)
+    assert f"{unfiltered.rule_count:,} rules" in text
+    assert f"{unfiltered.rule_count:>4}. If " in text
+    assert "guarantee nothing" in text
+
+
+def test_an_empty_rule_set_is_a_header_and_a_sentence(
+    lander_trees: tuple[PolicyTree, ...],
+) -> None:
+    empty = mine_rules(lander_trees, supp_min=1.0, conf_min=1.0)
+    assert rules_to_csv(empty) == ",".join(CSV_COLUMNS) + "\n"
+    assert "0 rules" in rules_to_text(empty)
+
+
+def test_text_says_divider_lift_and_depth(two_torques: Demonstrations) -> None:
+    rules = mine_rules(
+        two_torques, supp_min=0.01, conf_min=0.7, lift_min=1.1, max_depth=4, divider=3
+    )
+    text = rules_to_text(rules)
+    assert "lift at least 1.1, at most 4 conditions, divider 3" in text
+    assert "\nhip: " in text
+    assert "\nknee: " in text

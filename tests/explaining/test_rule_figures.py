@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining import rule_figures as figures
+from sarl_core.explaining.evidence import (
+    example_columns,
+    example_rows,
+    feature_evidence,
+    path_steps,
+)
+from sarl_core.explaining.path_table import path_table
+from sarl_core.explaining.tables import rule_columns, top_rules
+from sarl_core.mining.rules import Thresholds, cut_nodes, node_of
+
+AT = {"supp_min": 0.005, "conf_min": 0.9}
+
+
+@pytest.fixture(scope="module")
+def rules(lander_trees: tuple[PolicyTree, ...]) -> RuleSet:
+    return mine_rules(lander_trees, **AT)
+
+
+def test_a_path_goes_from_all_states_to_those_of_the_rule(
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    for rule in rules.rules:
+        steps = path_steps(lander_trees[0], node_of(rule))
+        assert len(steps) == rule.length + 1
+        assert steps[0].query == ""
+        assert steps[0].support == 1.0
+        assert steps[-1].samples == rule.samples
+        assert [step.is_cut for step in steps] == [False] * rule.length + [True]
+        assert all(sum(step.shares) == pytest.approx(1.0) for step in steps)
+        # Algorithm 1: nothing above the rule was frequent and certain enough.
+        assert all(step.confidence < 0.9 for step in steps[:-1])
+
+
+def test_evidence_of_a_feature_is_that_of_its_states(
+    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    rule = max(rules.rules, key=lambda one: one.merged_length)
+    found = feature_evidence(lander_like, lander_trees[0], rule)
+    assert [one.bounds for one in found] == list(rule.bounds)
+    for one in found:
+        assert one.everywhere.sum() == pytest.approx(1.0)
+        assert one.at_rule.sum() == pytest.approx(1.0)
+        width = one.edges[1] - one.edges[0]
+        inside = (one.edges[1:] > one.bounds.low - width) & (
+            one.edges[:-1] < one.bounds.high + width
+        )
+        assert one.at_rule[~inside].sum() == 0.0
+
+
+def test_examples_are_states_of_the_rule(
+    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    rule = rules.rules[0]
+    rows = example_rows(lander_trees[0], node_of(rule))
+    assert len(rows) == min(10, rule.samples)
+    assert rule.applies(lander_like.observations[rows]).all()
+    columns = example_columns(lander_like, lander_trees[0], rule)
+    assert columns["Episode"] == lander_like.episodes[rows].tolist()
+    asked = lander_like.features[rule.bounds[0].feature].name
+    assert list(columns)[4] == asked
+    agrees = np.array(columns["As the rule says"])
+    assert np.array_equal(agrees, lander_trees[0].demonstrated[rows] == rule.action)
+
+
+def test_examples_of_continuous_actions_are_values(two_torques: Demonstrations) -> None:
+    trees = grow_policy_trees(two_torques, divider=3)
+    rule = mine_rules(trees, supp_min=0.02, conf_min=0.8).of_dimension(1)[0]
+    columns = example_columns(two_torques, trees[1], rule)
+    assert all(-2.0 <= float(str(value)) <= 2.0 for value in columns["Expert did"])
+
+
+@pytest.mark.parametrize("around", [False, True])
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_path_is_lit_in_the_tree(
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet, around: bool, dark: bool
+) -> None:
+    tree = lander_trees[0]
+    node = node_of(rules.rules[-1])
+    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node, around=around, dark=dark)
+    lit = next(trace for trace in figure.data if trace.name == "path")
+    assert len(lit.x) == len(tree.path(node))
+    assert list(np.floor(lit.y)) == tree.depth[list(tree.path(node))].tolist()
+    low, high = figure.layout.xaxis.range
+    assert low <= lit.x[-1] <= high
+    assert bool(figure.layout.annotations) == around
+    json.loads(figure.to_json())
+
+
+def test_boxes_cover_every_level_of_the_tree(
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    tree = lander_trees[0]
+    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node_of(rules.rules[0]))
+    boxes = sum(len(trace.x) // 5 for trace in figure.data if trace.fill == "toself")
+    assert boxes == tree.n_nodes
+
+
+def test_a_large_tree_keeps_its_rules_when_boxes_are_left_out(
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "MAX_BOXES", 20)
+    tree = lander_trees[0]
+    cut = cut_nodes(tree, **AT)
+    figure = figures.tree_figure(tree, cut, int(cut[-1]))
+    boxes = sum(
+        len(trace.x) // 5
+        for trace in figure.data
+        if trace.fill == "toself" and trace.name.endswith("a rule")
+    )
+    assert boxes == len(cut)
+
+
+def test_a_rule_at_the_root_has_a_figure(lander_trees: tuple[PolicyTree, ...]) -> None:
+    cut = cut_nodes(lander_trees[0], supp_min=0.0, conf_min=0.1)
+    assert cut.tolist() == [0]
+    for around in (False, True):
+        assert figures.tree_figure(lander_trees[0], cut, 0, around=around).data
+
+
+def test_the_interval_is_shaded(
+    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    for one in feature_evidence(lander_like, lander_trees[0], rules.rules[0]):
+        figure = figures.feature_figure(one, lander_like.features[one.feature], "#0072B2")
+        assert len(figure.data) == 2
+        shade = figure.layout.shapes[0]
+        assert shade.x0 < shade.x1
+        finite = np.isfinite([one.bounds.low, one.bounds.high]).sum()
+        assert len(figure.layout.shapes) == 1 + finite
+
+
+def test_the_path_table_escapes_names_from_files(
+    lander_like: Demonstrations,
+) -> None:
+    harmful = replace(
+        lander_like,
+        feature_names=("<script>alert(1)</script>", *(f"f{i}" for i in range(7))),
+        label_names=(("<b>", "1", "2", "3"),),
+    )
+    tree = grow_policy_trees(harmful)[0]
+    rule = mine_rules((tree,), **AT).rules[0]
+    html = path_table(path_steps(tree, node_of(rule)), tree.dimension)
+    assert "<script>" not in html
+    assert "<b>" not in html
+    assert "this is the rule" in html
+
+
+def test_interval_text_names_the_feature(
+    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    one = feature_evidence(lander_like, lander_trees[0], rules.rules[0])[0]
+    assert "tilt" in figures.interval_text(one, Feature("tilt", "rad"))
+
+
+def test_the_largest_rules_are_the_first_of_all(lander_trees: tuple[PolicyTree, ...]) -> None:
+    everything = mine_rules(lander_trees, supp_min=0.0, conf_min=1.0)
+    some = top_rules(lander_trees, Thresholds(0.0, 1.0), 7)
+    largest = sorted((rule.samples for rule in everything.rules), reverse=True)[:7]
+    assert [rule.samples for rule in some.rules] == largest
+    assert {rule.id for rule in some.rules} <= {rule.id for rule in everything.rules}
+    columns = rule_columns(some.rules, some)
+    assert columns["States"] == largest
+    assert columns["Joint support"] == [rule.joint_support for rule in some.rules]
