@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import io
-import os
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,8 +206,8 @@ def encode_mp4(
                 height, width = frame.shape[:2]
                 even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
                 if writer is None:
-                    writer = _open_mp4(unfinished, even.shape, fps)
-                writer.send(np.ascontiguousarray(even))
+                    writer = _open_mp4(unfinished, fps)
+                writer.append_data(np.ascontiguousarray(even))
                 done += 1
                 report(progress, done, count or done)
         except OSError as error:
@@ -222,14 +221,11 @@ def encode_mp4(
             raise WorkError(f"{path} could not be encoded; try a .gif")
 
 
-def _open_mp4(path: Path, shape: Sequence[int], fps: float):  # type: ignore[no-untyped-def]
-    """A generator of imageio-ffmpeg that takes pictures."""
-    import imageio_ffmpeg
+def _open_mp4(path: Path, fps: float) -> Any:
+    """A writer of imageio that takes pictures."""
+    import imageio.v2
 
-    writer = imageio_ffmpeg.write_frames(
-        os.fspath(path), (shape[1], shape[0]), fps=fps, codec="libx264", pix_fmt_in="rgb24",
-        pix_fmt_out="yuv420p", macro_block_size=2, quality=None, ffmpeg_log_level="error",
-        output_params=list(_MP4),
+    return imageio.v2.get_writer(
+        path, format="FFMPEG", fps=fps, codec="libx264", pixelformat="yuv420p",
+        macro_block_size=2, quality=None, ffmpeg_log_level="error", output_params=list(_MP4),
     )
-    writer.send(None)
-    return writer
