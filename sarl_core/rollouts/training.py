@@ -66,7 +66,7 @@ RECIPES: dict[str, Recipe] = {
         algorithm="PPO", steps=2_000_000, n_envs=16, normalise=False, validation_every=100_000,
         gamma=0.999,
         parameters={"n_steps": 1024, "batch_size": 256, "n_epochs": 6, "gae_lambda": 0.98,
-                    "ent_coef": 0.01, "learning_rate": "linear:0.0006", "clip_range": 0.2},
+                    "learning_rate": "linear:0.0006", "clip_range": 0.2},
     ),
     "Pendulum-v1": Recipe(
         algorithm="SAC", steps=20_000, n_envs=1, normalise=False, validation_every=2_500,
