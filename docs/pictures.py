@@ -40,8 +40,20 @@ def replay() -> None:
         rules = str(Path(folder) / "rules.json")
         demonstrations = "data/demonstrations/lunar_lander.parquet"
         sarl("mine", demonstrations, "--support", "0", "--confidence", "1", "--out", rules)
-        sarl("render", "--env", "LunarLander-v3", "--agent", "novice", "--rules", rules,
-             "--seed", "1", "--side-by-side", "--out", str(DOCS / "replay.gif"))
+        sarl(
+            "render",
+            "--env",
+            "LunarLander-v3",
+            "--agent",
+            "novice",
+            "--rules",
+            rules,
+            "--seed",
+            "1",
+            "--side-by-side",
+            "--out",
+            str(DOCS / "replay.gif"),
+        )
 
 
 def screenshots() -> None:
@@ -51,7 +63,9 @@ def screenshots() -> None:
         port = free.getsockname()[1]
     server = subprocess.Popen(
         [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],
-        cwd=ROOT, stdout=subprocess.DEVNULL, env=os.environ,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        env=os.environ,
     )
     try:
         with sync_playwright() as playwright:

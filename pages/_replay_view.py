@@ -53,16 +53,29 @@ def numbers(replay: Replay) -> None:
         st.metric("Return without", f"{alone:,.1f}", border=True, height="stretch")
         st.metric("Length with rules", f"{length:,}", border=True, height="stretch")
         st.metric("Length without", f"{int(plain.lengths[0]):,}", border=True, height="stretch")
-        st.metric("Changed", share_text(changed / length), border=True, height="stretch",
-                  help=f"The rules changed the action at {changed:,} of {length:,} steps.")
-        st.metric("Covered", share_text(covered / length), border=True, height="stretch",
-                  help=f"Some rule applied at {covered:,} of {length:,} steps.")
+        st.metric(
+            "Changed",
+            share_text(changed / length),
+            border=True,
+            height="stretch",
+            help=f"The rules changed the action at {changed:,} of {length:,} steps.",
+        )
+        st.metric(
+            "Covered",
+            share_text(covered / length),
+            border=True,
+            height="stretch",
+            help=f"Some rule applied at {covered:,} of {length:,} steps.",
+        )
     if not changed:
         st.markdown(
             ":material/info: :gray[The rules changed nothing in this episode: "
-            + ("no rule applied in any of its states. Lower the minimum support or confidence on "
-               "the Thresholds page, or choose the unfiltered rules.]" if not covered else
-               "wherever one applied, the agent did what it says.]")
+            + (
+                "no rule applied in any of its states. Lower the minimum support or confidence on "
+                "the Thresholds page, or choose the unfiltered rules.]"
+                if not covered
+                else "wherever one applied, the agent did what it says.]"
+            )
         )
 
 
@@ -80,7 +93,8 @@ def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
     many = len(dimensions) > 1
     entries = [
         swatch(f"{dimension.name} {text}" if many else text, label)
-        for dimension in dimensions for label in range(min(dimension.n_labels, 24))
+        for dimension in dimensions
+        for label in range(min(dimension.n_labels, 24))
         for text in [label_text(label, dimension)]
     ]
     if marks:
@@ -123,42 +137,72 @@ def step_by_step(replay: Replay, *, linked: bool) -> None:
     legend(replay.dimensions, marks=shielded)
     strip = st.container()
     if last > 0:
-        current = int(st.slider(
-            "Step", 0, last, key="step", bind="query-params",
-            help="Move it, or click a step in the strip above.",
-        ))
+        current = int(
+            st.slider(
+                "Step",
+                0,
+                last,
+                key="step",
+                bind="query-params",
+                help="Move it, or click a step in the strip above.",
+            )
+        )
     else:
         current = 0
     changes = np.flatnonzero(steps.intervened)
     if shielded:
         before, after = changes[changes < current], changes[changes > current]
         with st.container(horizontal=True, vertical_alignment="center"):
-            st.button("Previous change", icon=":material/skip_previous:", on_click=go_to,
-                      args=(int(before[-1]) if len(before) else current,),
-                      disabled=not len(before), key="previous")
-            st.button("Next change", icon=":material/skip_next:", on_click=go_to,
-                      args=(int(after[0]) if len(after) else current,),
-                      disabled=not len(after), key="next")
+            st.button(
+                "Previous change",
+                icon=":material/skip_previous:",
+                on_click=go_to,
+                args=(int(before[-1]) if len(before) else current,),
+                disabled=not len(before),
+                key="previous",
+            )
+            st.button(
+                "Next change",
+                icon=":material/skip_next:",
+                on_click=go_to,
+                args=(int(after[0]) if len(after) else current,),
+                disabled=not len(after),
+                key="next",
+            )
             st.caption(f"{len(changes):,} of {len(steps):,} steps were changed.")
     strip.plotly_chart(
         intervention_strip(
             tracks(steps, replay.dimensions, shielded=shielded),
-            step_texts(steps, replay.dimensions, replay.rule_set), current=current,
+            step_texts(steps, replay.dimensions, replay.rule_set),
+            current=current,
         ),
-        key="strip", on_select=pick_step, selection_mode="points", config=PLAIN,
+        key="strip",
+        on_select=pick_step,
+        selection_mode="points",
+        config=PLAIN,
         alt="What the agent wanted, what was done, and where the two differ, step by step",
     )
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
-        st.image(replay.film.frame(current), width="stretch",
-                 alt=f"The environment at step {current}")
-        lines = [ReturnLine(WITHOUT if shielded else ALONE,
-                            np.cumsum(replay.plain.steps.reward), UNSHIELDED_COLOUR)]
+        st.image(
+            replay.film.frame(current), width="stretch", alt=f"The environment at step {current}"
+        )
+        lines = [
+            ReturnLine(
+                WITHOUT if shielded else ALONE,
+                np.cumsum(replay.plain.steps.reward),
+                UNSHIELDED_COLOUR,
+            )
+        ]
         if shielded:
             lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
-        st.plotly_chart(return_figure(lines, current=current), config=PLAIN, key="return",
-                        alt="Return so far, step by step")
+        st.plotly_chart(
+            return_figure(lines, current=current),
+            config=PLAIN,
+            key="return",
+            alt="Return so far, step by step",
+        )
     with words:
         describe(view, shielded=shielded, linked=linked)
 
@@ -171,8 +215,10 @@ def describe(view: StepView, *, shielded: bool, linked: bool) -> None:
         done = swatch(action.executed, action.executed_label)
         if action.changed:
             st.badge("Changed by the rules", icon=":material/edit:", color="orange")
-            st.html(f"The agent wanted {swatch(action.proposed, action.proposed_label)}, "
-                    f"and {done} was done.")
+            st.html(
+                f"The agent wanted {swatch(action.proposed, action.proposed_label)}, "
+                f"and {done} was done."
+            )
         elif action.rule:
             st.badge("Allowed by the rules", icon=":material/check:", color="green")
             st.html(f"The agent wanted {done}, as the rule says.")
@@ -184,15 +230,22 @@ def describe(view: StepView, *, shielded: bool, linked: bool) -> None:
         if action.rule:
             st.markdown(f"**Rule {escaped(action.rule_id)}.** {escaped(action.rule)}")
             if linked:
-                st.page_link("rules.py", label="Open this rule", icon=":material/rule:",
-                             query_params={**st.query_params.to_dict(), "rule": action.rule_id})
+                st.page_link(
+                    "rules.py",
+                    label="Open this rule",
+                    icon=":material/rule:",
+                    query_params={**st.query_params.to_dict(), "rule": action.rule_id},
+                )
     if shielded:
         st.caption(f"{margin_text(view.margin).capitalize()}.")
     st.dataframe(
-        {"State": [name for name, _, _ in view.state],
-         "Value": [value for _, value, _ in view.state],
-         "Unit": [unit or "–" for _, _, unit in view.state]},
-        hide_index=True, height="content" if len(view.state) <= 12 else 400,
+        {
+            "State": [name for name, _, _ in view.state],
+            "Value": [value for _, value, _ in view.state],
+            "Unit": [unit or "–" for _, _, unit in view.state],
+        },
+        hide_index=True,
+        height="content" if len(view.state) <= 12 else 400,
     )
 
 
@@ -203,8 +256,9 @@ def comparison(order: Order) -> None:
     runs = kept_comparisons().get(key)
     if runs is None:
         st.caption("One episode may be luck. Run more of them, each on a seed of its own.")
-        if st.button(f"Run {EPISODES} episodes", key="compare",
-                     icon=":material/stacked_bar_chart:"):
+        if st.button(
+            f"Run {EPISODES} episodes", key="compare", icon=":material/stacked_bar_chart:"
+        ):
             runs = with_progress(lambda tell: compare(order, tell))
             if runs is not None:
                 kept_comparisons().put(key, runs)
@@ -213,20 +267,37 @@ def comparison(order: Order) -> None:
     rows, table = [], []
     for name, episodes in runs:
         interval = summarise(episodes.returns)
-        rows.append(ReturnRow(name, episodes.returns, interval.iqm, interval.low, interval.high,
-                              SHIELDED_COLOUR if name == WITH else UNSHIELDED_COLOUR))
+        rows.append(
+            ReturnRow(
+                name,
+                episodes.returns,
+                interval.iqm,
+                interval.low,
+                interval.high,
+                SHIELDED_COLOUR if name == WITH else UNSHIELDED_COLOUR,
+            )
+        )
         steps = float(episodes.lengths.sum())
-        table.append({
-            "Run": name.capitalize(),
-            "Mean return": f"{interval.mean:,.1f}",
-            "Typical return": f"{interval.iqm:,.1f}",
-            "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
-            "Mean length": f"{episodes.lengths.mean():,.1f}",
-            "Changed": share_text(float(episodes.interventions.sum()) / steps)
-            if name == WITH else "–",
-        })
-    st.plotly_chart(comparison_figure(rows), config=PLAIN, key="comparison",
-                    alt="Returns of the episodes with the rules and without")
+        table.append(
+            {
+                "Run": name.capitalize(),
+                "Mean return": f"{interval.mean:,.1f}",
+                "Typical return": f"{interval.iqm:,.1f}",
+                "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
+                "Mean length": f"{episodes.lengths.mean():,.1f}",
+                "Changed": share_text(float(episodes.interventions.sum()) / steps)
+                if name == WITH
+                else "–",
+            }
+        )
+    st.plotly_chart(
+        comparison_figure(rows),
+        config=PLAIN,
+        key="comparison",
+        alt="Returns of the episodes with the rules and without",
+    )
     st.dataframe(table, hide_index=True)
-    st.caption("A point is an episode. The diamond is the typical return, the mean of the middle "
-               "half of the episodes, which a few odd ones do not move, with its 95 % interval.")
+    st.caption(
+        "A point is an episode. The diamond is the typical return, the mean of the middle "
+        "half of the episodes, which a few odd ones do not move, with its 95 % interval."
+    )

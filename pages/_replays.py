@@ -147,7 +147,11 @@ def run(order: Order, tell: Told) -> Replay:
         film = render_episode(request.env_id, agent, seed=request.seed, progress=playing)
     else:
         film = side_by_side(
-            request.env_id, agent, shield, seed=request.seed, progress=playing,
+            request.env_id,
+            agent,
+            shield,
+            seed=request.seed,
+            progress=playing,
             describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         )
 
@@ -161,8 +165,8 @@ def run(order: Order, tell: Told) -> Replay:
         rule_set=rule_set,
         dimensions=environment_dimensions(description, rule_set),
         features=tuple(
-            Feature(name, unit) for name, unit in
-            zip(description.feature_names, description.feature_units, strict=True)
+            Feature(name, unit)
+            for name, unit in zip(description.feature_names, description.feature_units, strict=True)
         ),
     )
 
@@ -181,10 +185,20 @@ def compare(order: Order, tell: Told) -> tuple[tuple[str, Episodes], ...]:
         def told(done: int, total: int, name: str = name, part: int = part) -> None:
             tell((part + done / total) / len(wanted), f"{done} of {total} episodes, {name} …")
 
-        runs.append((name, rollout(
-            order.request.env_id, agent, shield=guard, episodes=EPISODES,
-            seed=order.request.seed, keep_steps=False, progress=told,
-        )))
+        runs.append(
+            (
+                name,
+                rollout(
+                    order.request.env_id,
+                    agent,
+                    shield=guard,
+                    episodes=EPISODES,
+                    seed=order.request.seed,
+                    keep_steps=False,
+                    progress=told,
+                ),
+            )
+        )
     return tuple(runs)
 
 

@@ -10,18 +10,14 @@ from pathlib import Path
 import _state as state
 import plotly.graph_objects as go
 import streamlit as st
+from _upload import upload_section
 from _words import escaped, in_full
 
 from sarl_core.demonstrations.checks import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
 from sarl_core.demonstrations.formats import (
-    ColumnMap,
-    guess_columns,
-    read_demonstrations,
     save_demonstrations,
-    table_columns,
 )
-from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.demonstration_figures import (
     action_figure,
@@ -38,7 +34,6 @@ from sarl_core.explaining.distributions import (
 from sarl_core.explaining.language import label_text
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 
-ENVIRONMENTS = ("CartPole-v1", "LunarLander-v3", "Pendulum-v1")
 FIGURES_AT_FIRST = 12
 RETURN_COLOUR, LENGTH_COLOUR = "#0b6e99", "#7A8AA0"
 PLAIN = {"displayModeBar": False}
@@ -66,7 +61,10 @@ def contents(digest: str, _demonstrations: Demonstrations) -> Contents:
 
 @st.cache_resource(max_entries=16, show_spinner="Counting …")
 def feature_figures(
-    digest: str, divider: int, by: int, features: tuple[int, ...],
+    digest: str,
+    divider: int,
+    by: int,
+    features: tuple[int, ...],
     _demonstrations: Demonstrations,
 ) -> tuple[go.Figure, ...]:
     """A figure for each of some features, coloured by the labels of one action dimension."""
@@ -75,8 +73,7 @@ def feature_figures(
     return tuple(
         feature_figure(
             _demonstrations.features[index],
-            histogram_by_label(_demonstrations.observations[:, index], labels,
-                               dimension.n_labels),
+            histogram_by_label(_demonstrations.observations[:, index], labels, dimension.n_labels),
             dimension,
         )
         for index in features
@@ -107,10 +104,12 @@ def episode_figures(
     """Returns (if there are rewards) and lengths of the episodes."""
     finished, returns = _demonstrations.episode_finished, _demonstrations.episode_returns
     return (
-        None if returns is None
+        None
+        if returns is None
         else episode_figure(episode_series(returns, finished), "return", RETURN_COLOUR),
-        episode_figure(episode_series(_demonstrations.episode_lengths, finished), "length",
-                       LENGTH_COLOUR),
+        episode_figure(
+            episode_series(_demonstrations.episode_lengths, finished), "length", LENGTH_COLOUR
+        ),
     )
 
 
@@ -120,121 +119,6 @@ def as_file(demonstrations: Demonstrations, extension: str) -> bytes:
         path = Path(folder) / f"demonstrations{extension}"
         save_demonstrations(demonstrations, path)
         return path.read_bytes()
-
-
-# --- uploading ---------------------------------------------------------------------------------
-
-
-def uploaded_files() -> list[tuple[memoryview, str]]:
-    """Content and name of each file in the uploader."""
-    return [(file.getbuffer(), file.name) for file in st.session_state.get("upload_files") or []]
-
-
-def read_upload(columns: ColumnMap | None = None) -> None:
-    """Read what was uploaded; keep what was chosen before where that fails.
-
-    Args:
-        columns: Which column is what; guessed where not given.
-    """
-    st.session_state.pop("_upload_error", None)
-    files = uploaded_files()
-    if not files:
-        return
-    try:
-        if len(files) > 2:
-            raise InputError(f"{len(files)} files were given; give one, or the pair of "
-                             "observations and actions")
-        (content, name), *others = files
-        with st.spinner("Reading and checking …"):
-            demonstrations = read_demonstrations(
-                content, name, env_id=environment() or None, columns=columns,
-                companion=others[0] if others else None,
-            )
-    except SarlError as error:
-        st.session_state["_upload_error"] = str(error)
-        return
-    state.set_upload(demonstrations, file_name=", ".join(name for _, name in files))
-    st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
-
-
-def environment() -> str:
-    """The environment that names and bounds are taken from, "" for none."""
-    return str(st.session_state.get("upload_env") or "").strip()
-
-
-def read_mapped() -> None:
-    """Read again, with the columns as they stand in the form."""
-    chosen = st.session_state
-    read_upload(ColumnMap(
-        observations=tuple(chosen["map_observations"]), actions=tuple(chosen["map_actions"]),
-        **{role: chosen[f"map_{role}"] for role in SINGLE_COLUMNS},
-    ))
-
-
-SINGLE_COLUMNS = {
-    "episode": "Episode", "step": "Step", "reward": "Reward", "terminated": "Ended by itself",
-    "truncated": "Ended by a limit",
-}
-
-
-def mapping_form(names: tuple[str, ...]) -> None:
-    """Ask which column is what.
-
-    Args:
-        names: Columns of the uploaded table.
-    """
-    guess = guess_columns(names)
-    with st.form("columns", border=True):
-        st.markdown("**Which column is what?**")
-        st.multiselect("Observations, in their order", names, default=guess.observations,
-                       key="map_observations")
-        st.multiselect("Actions", names, default=guess.actions, key="map_actions")
-        with st.grid("auto", min_column_width=150):
-            for role, label in SINGLE_COLUMNS.items():
-                guessed = getattr(guess, role)
-                st.selectbox(label, names, key=f"map_{role}", placeholder="none",
-                             index=names.index(guessed) if guessed in names else None)
-        st.form_submit_button("Read with these columns", on_click=read_mapped, type="primary")
-
-
-def upload_section(*, expanded: bool) -> None:
-    """Upload files, say what is wrong with them, map their columns."""
-    with st.expander("Use your own demonstrations", icon=":material/upload_file:",
-                     expanded=expanded):
-        left, right = st.columns([3, 2], gap="medium")
-        left.file_uploader(
-            "Parquet, CSV or NPZ, or the pair obs.csv and actions.csv",
-            accept_multiple_files=True, key="upload_files", on_change=read_upload,
-            help="One row a step: episode, step, obs_<name> …, action or action_<name> …, and "
-                 "if there are any reward, terminated, truncated.",
-        )
-        right.selectbox(
-            "Environment (optional)", state.with_own(ENVIRONMENTS, "upload_env"), index=None,
-            accept_new_options=True,
-            placeholder="none", key="upload_env", on_change=read_upload, bind="query-params",
-            help="Names, units and bounds are taken from it where the file has none. Any id "
-                 "that Gymnasium knows.",
-        )
-        error = st.session_state.get("_upload_error")
-        if error:
-            st.error(in_full(error), icon=":material/error:")
-            if state.chosen_demonstrations() is not None:
-                st.caption("Nothing has changed: the set below is still the one chosen.")
-        files = uploaded_files()
-        if len(files) == 1:
-            names = columns_of(*files[0])
-            # An error about a row is not mended by another map; one about columns is.
-            asked = error is not None and "column" in error and "row" not in error
-            if names and (asked or st.toggle("Map the columns myself", key="map_columns")):
-                mapping_form(names)
-
-
-def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
-    """Columns of an uploaded table, () where it has none that can be read."""
-    try:
-        return table_columns(content, name)
-    except SarlError:
-        return ()
 
 
 # --- the page ----------------------------------------------------------------------------------
@@ -262,19 +146,27 @@ def overview(demonstrations: Demonstrations, found: Contents) -> None:
         kind = "discrete" if demonstrations.is_discrete else "continuous"
         actions, of_actions = f"{len(dimensions)}", f"{kind} action dimensions"
     with st.grid(6, min_column_width=130):
-        st.metric("Steps", f"{summary.steps:,}", border=True,
-                  help="Pairs of a state and the action the expert took in it.")
+        st.metric(
+            "Steps",
+            f"{summary.steps:,}",
+            border=True,
+            help="Pairs of a state and the action the expert took in it.",
+        )
         st.metric("Episodes", f"{summary.episodes:,}", border=True)
-        st.metric("Features", f"{summary.features:,}", border=True,
-                  help="Numbers that describe a state.")
+        st.metric(
+            "Features", f"{summary.features:,}", border=True, help="Numbers that describe a state."
+        )
         st.metric("Actions", actions, border=True, help=of_actions.capitalize() + ".")
-        st.metric("Mean length", f"{summary.length_mean:,.1f}", border=True,
-                  help="Steps an episode.")
+        st.metric(
+            "Mean length", f"{summary.length_mean:,.1f}", border=True, help="Steps an episode."
+        )
         st.metric(
             "Mean return",
-            "–" if summary.return_mean is None else f"{summary.return_mean:,.1f}", border=True,
+            "–" if summary.return_mean is None else f"{summary.return_mean:,.1f}",
+            border=True,
             help="Sum of rewards of an episode, over the episodes that ended."
-            if summary.return_mean is not None else "There are no rewards in these data.",
+            if summary.return_mean is not None
+            else "There are no rewards in these data.",
         )
     parts = [
         f"Environment **{demonstrations.env_id or 'not given'}**",
@@ -301,21 +193,32 @@ def actions_section(demonstrations: Demonstrations, divider: int) -> None:
         for index, figure in enumerate(figures[:FIGURES_AT_FIRST]):
             with grid.cell():
                 st.markdown(f"**Actions: {escaped(dimensions[index].name)}**")
-                st.plotly_chart(figure, config=PLAIN, key=f"action_{index}",
-                                alt=f"How often each action of {dimensions[index].name} was taken")
+                st.plotly_chart(
+                    figure,
+                    config=PLAIN,
+                    key=f"action_{index}",
+                    alt=f"How often each action of {dimensions[index].name} was taken",
+                )
         if returns is not None:
             with grid.cell():
                 st.markdown("**Return of each episode**")
-                st.plotly_chart(returns, config=PLAIN, key="returns",
-                                alt="Return of each episode, in order")
+                st.plotly_chart(
+                    returns, config=PLAIN, key="returns", alt="Return of each episode, in order"
+                )
         with grid.cell():
             st.markdown("**Length of each episode**")
-            st.plotly_chart(lengths, config=PLAIN, key="lengths",
-                            alt="Number of steps of each episode, in order")
+            st.plotly_chart(
+                lengths,
+                config=PLAIN,
+                key="lengths",
+                alt="Number of steps of each episode, in order",
+            )
     finished = demonstrations.episode_finished
     if finished is not None and not finished.all():
-        st.caption("A hollow point is an episode that had not ended when the recording stopped; "
-                   "the mean return leaves it out.")
+        st.caption(
+            "A hollow point is an episode that had not ended when the recording stopped; "
+            "the mean return leaves it out."
+        )
 
 
 def features_section(demonstrations: Demonstrations, found: Contents, divider: int) -> None:
@@ -326,14 +229,21 @@ def features_section(demonstrations: Demonstrations, found: Contents, divider: i
     by = 0
     if len(dimensions) > 1:
         by = st.selectbox(
-            "Colour by", range(len(dimensions)), key="colour",
-            format_func=lambda index: dimensions[index].name, bind="query-params",
+            "Colour by",
+            range(len(dimensions)),
+            key="colour",
+            format_func=lambda index: dimensions[index].name,
+            bind="query-params",
         )
     shown: list[int] = list(range(len(names)))
     if len(names) > FIGURES_AT_FIRST:
         shown = st.multiselect(
-            "Features to show", range(len(names)), default=list(range(FIGURES_AT_FIRST)),
-            format_func=lambda index: names[index], key="features", bind="query-params",
+            "Features to show",
+            range(len(names)),
+            default=list(range(FIGURES_AT_FIRST)),
+            format_func=lambda index: names[index],
+            key="features",
+            bind="query-params",
             max_selections=48,
         )
     legend(dimensions[by])
@@ -345,8 +255,12 @@ def features_section(demonstrations: Demonstrations, found: Contents, divider: i
             with grid.cell():
                 unit = found.rows[index].unit
                 st.markdown(f"**{escaped(names[index])}**" + (f" :gray[{unit}]" if unit else ""))
-                st.plotly_chart(figure, config=PLAIN, key=f"feature_{index}",
-                                alt=f"Distribution of {names[index]}, by action")
+                st.plotly_chart(
+                    figure,
+                    config=PLAIN,
+                    key=f"feature_{index}",
+                    alt=f"Distribution of {names[index]}, by action",
+                )
     st.dataframe(
         {
             "Feature": names,
@@ -355,7 +269,8 @@ def features_section(demonstrations: Demonstrations, found: Contents, divider: i
             "Median": [row.median for row in found.rows],
             "Largest": [row.high for row in found.rows],
         },
-        hide_index=True, height="content" if len(names) <= 24 else 480,
+        hide_index=True,
+        height="content" if len(names) <= 24 else 480,
         column_config={
             column: st.column_config.NumberColumn(format="%.3g")
             for column in ("Least", "Median", "Largest")
@@ -372,20 +287,29 @@ def downloads(demonstrations: Demonstrations) -> None:
             ("Download as CSV", ".csv", "text/csv"),
         ):
             st.download_button(
-                label, lambda extension=extension: as_file(demonstrations, extension),
-                file_name=f"{name}{extension}", mime=mime, on_click="ignore",
-                icon=":material/download:", key=f"download_{extension[1:]}",
+                label,
+                lambda extension=extension: as_file(demonstrations, extension),
+                file_name=f"{name}{extension}",
+                mime=mime,
+                on_click="ignore",
+                icon=":material/download:",
+                key=f"download_{extension[1:]}",
             )
 
 
 st.title("Demonstrations")
-st.caption("What the expert did: at every step a state, and the action taken in it. Rules are "
-           "mined from these pairs.")
+st.caption(
+    "What the expert did: at every step a state, and the action taken in it. Rules are "
+    "mined from these pairs."
+)
 chosen = state.chosen_demonstrations()
 upload_section(expanded=chosen is None)
 if chosen is None:
-    st.info("Nothing has been uploaded in this session. Upload a file above, or choose a shipped "
-            "set in the sidebar.", icon=":material/upload_file:")
+    st.info(
+        "Nothing has been uploaded in this session. Upload a file above, or choose a shipped "
+        "set in the sidebar.",
+        icon=":material/upload_file:",
+    )
     st.stop()
 numbers = contents(chosen.digest, chosen)
 intervals = state.chosen_divider()

@@ -48,41 +48,58 @@ def settings() -> Callable[[], Order]:
         in_a_row = 5 if continuous(st.session_state.get("env")) else 4
         with st.grid(in_a_row, min_column_width=150, gap="small"):
             env = st.selectbox(
-                "Environment", state.with_own(ENVIRONMENTS, "env"), key="env",
+                "Environment",
+                state.with_own(ENVIRONMENTS, "env"),
+                key="env",
                 bind="query-params",
                 accept_new_options=True,
                 help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-                     "CartPole-v1.",
+                "CartPole-v1.",
             )
             agent = st.selectbox(
-                "Agent", AGENTS, key="agent", bind="query-params",
+                "Agent",
+                AGENTS,
+                key="agent",
+                bind="query-params",
                 help="Novice: random actions. Untrained: a fresh network, its actions sampled. "
-                     "Expert: the one that is shipped for this environment. Own file: a policy "
-                     "of yours.",
+                "Expert: the one that is shipped for this environment. Own file: a policy "
+                "of yours.",
             )
             rules = st.selectbox(
-                "Rules", RULE_SETS, key="rules", bind="query-params",
+                "Rules",
+                RULE_SETS,
+                key="rules",
+                bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                     "confidence 0.95. Unfiltered: support 0, confidence 1. Own file: rules you "
-                     "saved. None: the agent alone.",
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Own file: rules you "
+                "saved. None: the agent alone.",
             )
             seed = st.number_input(
-                "Seed", 0, 2**31 - 1, 1, key="seed", bind="query-params",
+                "Seed",
+                0,
+                2**31 - 1,
+                1,
+                key="seed",
+                bind="query-params",
                 help="Both runs start in the same state and draw the same random numbers; the "
-                     "same seed gives the same replay.",
+                "same seed gives the same replay.",
             )
             projection = PROJECTIONS[0]
             if continuous(env):
                 projection = st.selectbox(
-                    "Replace by", PROJECTIONS, key="projection", bind="query-params",
+                    "Replace by",
+                    PROJECTIONS,
+                    key="projection",
+                    bind="query-params",
                     help="What a continuous action that breaks a rule becomes. Centre: the "
-                         "middle of the rule's interval. Clip: the nearest value in it. Expert: "
-                         "what the expert typically did there.",
+                    "middle of the rule's interval. Clip: the nearest value in it. Expert: "
+                    "what the expert typically did there.",
                 )
         policy_file = rule_file = None
         if agent == OWN_FILE:
             policy_file = st.file_uploader(
-                "Policy: .npz, or a Stable-Baselines3 .zip (PPO, A2C or DQN)", key="policy_file",
+                "Policy: .npz, or a Stable-Baselines3 .zip (PPO, A2C or DQN)",
+                key="policy_file",
             )
         if rules == OWN_FILE:
             rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
@@ -93,7 +110,8 @@ def settings() -> Callable[[], Order]:
         make, digest = agent_for(agent, policy_file, env_id, int(seed or 0))
         return Order(
             Request(env_id, agent, digest, rules, rules_digest, projection, int(seed or 0)),
-            make, rule_set,
+            make,
+            rule_set,
         )
 
     return order
@@ -109,8 +127,10 @@ def environment_of(choice: str | None) -> str:
         return choice.strip()
     demonstrations = state.chosen_demonstrations()
     if demonstrations is None or not demonstrations.env_id:
-        raise InputError("the demonstrations do not say which environment they are from; choose "
-                         "one, or type its id")
+        raise InputError(
+            "the demonstrations do not say which environment they are from; choose "
+            "one, or type its id"
+        )
     return demonstrations.env_id
 
 
@@ -137,8 +157,10 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | Non
         return rules_from_json(content, name=uploaded.name), digest_of(content)
     demonstrations = state.chosen_demonstrations()
     if demonstrations is None:
-        raise InputError("there are no demonstrations to mine rules from; upload some on the "
-                         "Demonstrations page, or choose a shipped set in the sidebar")
+        raise InputError(
+            "there are no demonstrations to mine rules from; upload some on the "
+            "Demonstrations page, or choose a shipped set in the sidebar"
+        )
     grown = state.trees(demonstrations, state.chosen_divider())
     rule_set = state.rule_set(grown, PAPERS.get(choice))
     return rule_set, repr((rule_set.source.digest, rule_set.thresholds, rule_set.divider))
@@ -179,9 +201,11 @@ def agent_for(
 # --- the page ----------------------------------------------------------------------------------
 
 st.title("Replay")
-st.caption("An agent in its environment, with the rules as a shield and without. An action that "
-           "breaks a rule is replaced before it is executed. The rules are learned from "
-           "demonstrations: they guarantee nothing.")
+st.caption(
+    "An agent in its environment, with the rules as a shield and without. An action that "
+    "breaks a rule is replaced before it is executed. The rules are learned from "
+    "demonstrations: they guarantee nothing."
+)
 order_now = settings()
 started = st.button("Run", type="primary", icon=":material/play_arrow:", key="run")
 if started:
@@ -200,8 +224,11 @@ if started:
 shown = st.session_state.get("_replay")
 replayed = kept_replays().get(shown.request) if shown is not None else None
 if shown is None or replayed is None:
-    st.info("Choose an agent and the rules, then press Run. Try the novice first: it acts at "
-            "random, so what the rules do is plain to see.", icon=":material/play_circle:")
+    st.info(
+        "Choose an agent and the rules, then press Run. Try the novice first: it acts at "
+        "random, so what the rules do is plain to see.",
+        icon=":material/play_circle:",
+    )
     st.stop()
 try:
     same = order_now().request == shown.request
@@ -219,9 +246,23 @@ gif = replayed.film.gif()
 st.image(gif, width="content", alt="The episode, with the rules and without")
 name = f"replay-{asked.env_id.rsplit('/', 1)[-1].rsplit(':', 1)[-1]}-{asked.agent}-{asked.seed}"
 with st.container(horizontal=True):
-    st.download_button("Download GIF", gif, f"{name}.gif", "image/gif", key="gif",
-                       on_click="ignore", icon=":material/download:")
-    st.download_button("Download MP4", lambda: movie(replayed), f"{name}.mp4", "video/mp4",
-                       key="mp4", on_click="ignore", icon=":material/download:")
+    st.download_button(
+        "Download GIF",
+        gif,
+        f"{name}.gif",
+        "image/gif",
+        key="gif",
+        on_click="ignore",
+        icon=":material/download:",
+    )
+    st.download_button(
+        "Download MP4",
+        lambda: movie(replayed),
+        f"{name}.mp4",
+        "video/mp4",
+        key="mp4",
+        on_click="ignore",
+        icon=":material/download:",
+    )
 step_by_step(replayed, linked=asked.rules == CHOSEN)
 comparison(shown)

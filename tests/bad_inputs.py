@@ -34,8 +34,10 @@ def changed(row: int, text: str) -> bytes:
 
 def good_columns() -> dict[str, Any]:
     return {
-        "episode": [0, 0, 0, 1, 1], "step": [0, 1, 2, 0, 1],
-        "obs_x": [0.5, 0.25, 0.125, 0.75, 0.0], "obs_y": [1.5, 1.25, 1.0, 0.5, 0.25],
+        "episode": [0, 0, 0, 1, 1],
+        "step": [0, 1, 2, 0, 1],
+        "obs_x": [0.5, 0.25, 0.125, 0.75, 0.0],
+        "obs_y": [1.5, 1.25, 1.0, 0.5, 0.25],
         "action": [0, 1, 0, 1, 1],
     }
 
@@ -59,7 +61,8 @@ def good_arrays() -> dict[str, Any]:
     columns = good_columns()
     return {
         "observations": np.array([columns["obs_x"], columns["obs_y"]], np.float32).T,
-        "actions": np.array(columns["action"]), "episodes": np.array(columns["episode"]),
+        "actions": np.array(columns["action"]),
+        "episodes": np.array(columns["episode"]),
     }
 
 
@@ -140,34 +143,47 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "white space csv": ("demo.csv", b" \n\n  \n", ("white space",)),
     "header only csv": ("demo.csv", csv_bytes(), ("no steps", "header")),
     "no rows parquet": (
-        "demo.parquet", parquet_bytes(pa.table(good_columns()).slice(0, 0)), ("no steps",)
+        "demo.parquet",
+        parquet_bytes(pa.table(good_columns()).slice(0, 0)),
+        ("no steps",),
     ),
     "no rows npz": (
-        "demo.npz", npz_bytes(observations=np.zeros((0, 2)), actions=np.zeros(0, int)),
+        "demo.npz",
+        npz_bytes(observations=np.zeros((0, 2)), actions=np.zeros(0, int)),
         ("no steps",),
     ),
     "one row csv": ("demo.csv", csv_bytes(ROWS[0]), ("one observation only",)),
     "one row parquet": (
-        "demo.parquet", parquet_bytes(pa.table(good_columns()).slice(0, 1)),
+        "demo.parquet",
+        parquet_bytes(pa.table(good_columns()).slice(0, 1)),
         ("one observation only",),
     ),
     "one row npz": (
-        "demo.npz", npz_bytes(observations=np.zeros((1, 2)), actions=np.zeros(1, int)),
+        "demo.npz",
+        npz_bytes(observations=np.zeros((1, 2)), actions=np.zeros(1, int)),
         ("one observation only",),
     ),
     # Columns
     "no action column csv": (
-        "demo.csv", csv_bytes("1,2", "3,4", header="obs_x,obs_y"), ("no action", "'obs_x'")
+        "demo.csv",
+        csv_bytes("1,2", "3,4", header="obs_x,obs_y"),
+        ("no action", "'obs_x'"),
     ),
     "no action column parquet": (
-        "demo.parquet", parquet_bytes({"obs_x": [1.0, 2.0]}), ("no action", "'obs_x'")
+        "demo.parquet",
+        parquet_bytes({"obs_x": [1.0, 2.0]}),
+        ("no action", "'obs_x'"),
     ),
     "no actions npz": ("demo.npz", npz_bytes(obs=np.zeros((5, 2))), ("no actions", "'obs'")),
     "no observation column csv": (
-        "demo.csv", csv_bytes("0,1", "0,0", header="episode,action"), ("no observation",)
+        "demo.csv",
+        csv_bytes("0,1", "0,0", header="episode,action"),
+        ("no observation",),
     ),
     "missing numbered column csv": (
-        "demo.csv", csv_bytes("0,1,0", "0,1,1", header="obs_0,obs_2,action"), ("'obs_1'", "missing")
+        "demo.csv",
+        csv_bytes("0,1,0", "0,1,1", header="obs_0,obs_2,action"),
+        ("'obs_1'", "missing"),
     ),
     "missing column of the metadata parquet": (
         "demo.parquet",
@@ -175,17 +191,23 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         ("'obs_y'", "missing"),
     ),
     "doubled column csv": (
-        "demo.csv", csv_bytes("0,1,0", "0,1,1", header="obs_x,obs_x,action"), ("'obs_x'", "twice")
+        "demo.csv",
+        csv_bytes("0,1,0", "0,1,1", header="obs_x,obs_x,action"),
+        ("'obs_x'", "twice"),
     ),
     "doubled column parquet": (
         "demo.parquet",
-        parquet_bytes(pa.Table.from_arrays(
-            [pa.array([1.0, 2.0])] * 2 + [pa.array([0, 1])], names=["obs_x", "obs_x", "action"]
-        )),
+        parquet_bytes(
+            pa.Table.from_arrays(
+                [pa.array([1.0, 2.0])] * 2 + [pa.array([0, 1])], names=["obs_x", "obs_x", "action"]
+            )
+        ),
         ("'obs_x'", "twice"),
     ),
     "unclear columns csv": (
-        "demo.csv", csv_bytes("0,1,1,0", "1,2,1,1", header="x,seed,y,action"), ("unclear", "'x'")
+        "demo.csv",
+        csv_bytes("0,1,1,0", "1,2,1,1", header="x,seed,y,action"),
+        ("unclear", "'x'"),
     ),
     "no header csv": ("demo.csv", csv_bytes(*ROWS, header=None), ("no header", "5 columns")),
     "ten thousand columns csv": ("demo.csv", _wide(10_000), ("10,000 columns",)),
@@ -195,39 +217,50 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         ("10,000 columns",),
     ),
     "ten thousand columns npz": (
-        "demo.npz", npz_bytes(observations=np.zeros((2, 10_000)), actions=np.zeros(2, int)),
+        "demo.npz",
+        npz_bytes(observations=np.zeros((2, 10_000)), actions=np.zeros(2, int)),
         ("10,000 features",),
     ),
     # Rows
     "short row csv": ("demo.csv", changed(3, "0,2,0.1,1.0"), ("row 3", "line 4", "4 fields")),
     "long row csv": ("demo.csv", changed(5, "1,1,0,0,1,9"), ("row 5", "line 6", "6 fields")),
     "text in a number csv": (
-        "demo.csv", changed(2, "0,1,0.25,abc,1"), ("'obs_y'", "'abc'", "row 2", "line 3")
+        "demo.csv",
+        changed(2, "0,1,0.25,abc,1"),
+        ("'obs_y'", "'abc'", "row 2", "line 3"),
     ),
     "text in an action csv": (
-        "demo.csv", changed(4, "1,0,1,1,left"), ("'action'", "'left'", "row 4")
+        "demo.csv",
+        changed(4, "1,0,1,1,left"),
+        ("'action'", "'left'", "row 4"),
     ),
     "date in a number csv": (
-        "demo.csv", csv_bytes("2020-01-01,0", "2020-01-02,1", header="obs_x,action"),
+        "demo.csv",
+        csv_bytes("2020-01-01,0", "2020-01-02,1", header="obs_x,action"),
         ("'obs_x'", "'2020-01-01'", "row 1"),
     ),
     "text in a number parquet": (
-        "demo.parquet", parquet_bytes(good_columns() | {"obs_y": ["a", "b", "c", "d", "e"]}),
+        "demo.parquet",
+        parquet_bytes(good_columns() | {"obs_y": ["a", "b", "c", "d", "e"]}),
         ("'obs_y'", "'a'", "row 1"),
     ),
     "text in a number npz": (
-        "demo.npz", npz_bytes(**good_arrays() | {"observations": np.array([["a", "b"]] * 5)}),
+        "demo.npz",
+        npz_bytes(**good_arrays() | {"observations": np.array([["a", "b"]] * 5)}),
         ("'observations'", "no numbers"),
     ),
     "empty field csv": ("demo.csv", changed(3, "0,2,,1.0,0"), ("'obs_x'", "empty", "row 3")),
     "empty field parquet": (
-        "demo.parquet", parquet_bytes(with_value("obs_x", 3, None)), ("'obs_x'", "empty", "row 3")
+        "demo.parquet",
+        parquet_bytes(with_value("obs_x", 3, None)),
+        ("'obs_x'", "empty", "row 3"),
     ),
     "empty quoted field csv": ("demo.csv", changed(3, '0,2,"",1.0,0'), ("'obs_x'", "row 3")),
     "empty action csv": ("demo.csv", changed(2, "0,1,1,1,"), ("'action'", "empty", "row 2")),
     "NaN csv": ("demo.csv", changed(4, "1,0,nan,1,0"), ("'obs_x'", "not a number", "row 4")),
     "NaN parquet": (
-        "demo.parquet", parquet_bytes(with_value("obs_x", 4, float("nan"))),
+        "demo.parquet",
+        parquet_bytes(with_value("obs_x", 4, float("nan"))),
         ("'obs_x'", "not a number", "row 4"),
     ),
     "NaN npz": (
@@ -237,61 +270,82 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     ),
     "infinity csv": ("demo.csv", changed(1, "0,0,1,-inf,0"), ("'obs_y'", "infinite", "row 1")),
     "infinity parquet": (
-        "demo.parquet", parquet_bytes(with_value("obs_y", 5, float("inf"))),
+        "demo.parquet",
+        parquet_bytes(with_value("obs_y", 5, float("inf"))),
         ("'obs_y'", "infinite", "row 5"),
     ),
     "beyond float32 csv": (
-        "demo.csv", changed(2, "0,1,1e39,1,0"), ("'obs_x'", "infinite", "row 2")
+        "demo.csv",
+        changed(2, "0,1,1e39,1,0"),
+        ("'obs_x'", "infinite", "row 2"),
     ),
     "NaN reward csv": (
-        "demo.csv", csv_bytes("0,1,0", "0,nan,1", header="obs_x,reward,action"),
+        "demo.csv",
+        csv_bytes("0,1,0", "0,nan,1", header="obs_x,reward,action"),
         ("'reward'", "not a number", "row 2"),
     ),
     "different lengths npz": (
-        "demo.npz", npz_bytes(observations=np.zeros((9, 2)), actions=np.zeros(5, int)),
+        "demo.npz",
+        npz_bytes(observations=np.zeros((9, 2)), actions=np.zeros(5, int)),
         ("5 actions", "9 observations"),
     ),
     # Actions
     "negative action csv": ("demo.csv", changed(3, "0,2,1,1,-1"), ("'action'", "-1", "row 3")),
     "negative action parquet": (
-        "demo.parquet", parquet_bytes(with_value("action", 3, -1)), ("'action'", "-1", "row 3")
+        "demo.parquet",
+        parquet_bytes(with_value("action", 3, -1)),
+        ("'action'", "-1", "row 3"),
     ),
     "huge action csv": (
-        "demo.csv", changed(3, "0,2,1,1,9223372036854775807"), ("'action'", "row 3")
+        "demo.csv",
+        changed(3, "0,2,1,1,9223372036854775807"),
+        ("'action'", "row 3"),
     ),
     "action beyond its labels parquet": (
-        "demo.parquet", parquet_bytes(with_value("action", 4, 2), _GOOD_METADATA),
+        "demo.parquet",
+        parquet_bytes(with_value("action", 4, 2), _GOOD_METADATA),
         ("'action'", "is 2", "row 4", "0 to 1"),
     ),
     "true and false actions csv": (
-        "demo.csv", csv_bytes("1,true", "2,false", header="obs_x,action"), ("'action'", "true")
+        "demo.csv",
+        csv_bytes("1,true", "2,false", header="obs_x,action"),
+        ("'action'", "true"),
     ),
     "true and false actions parquet": (
-        "demo.parquet", parquet_bytes({"obs_x": [1.0, 2.0], "action": [True, False]}),
+        "demo.parquet",
+        parquet_bytes({"obs_x": [1.0, 2.0], "action": [True, False]}),
         ("'action'", "true"),
     ),
     "true and false actions npz": (
-        "demo.npz", npz_bytes(**good_arrays() | {"actions": np.ones(5, bool)}),
+        "demo.npz",
+        npz_bytes(**good_arrays() | {"actions": np.ones(5, bool)}),
         ("'actions'", "true"),
     ),
     # Episodes and steps
     "steps out of order csv": ("demo.csv", changed(3, "0,1,0,1,0"), ("'step'", "row 3", "sort")),
     "steps out of order parquet": (
-        "demo.parquet", parquet_bytes(with_value("step", 2, 7)), ("'step'", "row 3")
+        "demo.parquet",
+        parquet_bytes(with_value("step", 2, 7)),
+        ("'step'", "row 3"),
     ),
     "episode comes back csv": ("demo.csv", changed(5, "0,3,0,1,0"), ("'episode'", "row 5")),
     "negative episode csv": ("demo.csv", changed(1, "-1,0,0,1,0"), ("'episode'", "-1", "row 1")),
     "half an episode csv": ("demo.csv", changed(1, "0.5,0,0,1,0"), ("'episode'", "0.5", "row 1")),
     "huge episode csv": (
-        "demo.csv", changed(5, "99999999999999999999,1,0,1,0"), ("'episode'", "row 5")
+        "demo.csv",
+        changed(5, "99999999999999999999,1,0,1,0"),
+        ("'episode'", "row 5"),
     ),
     "done is two csv": (
-        "demo.csv", csv_bytes("1,0,0", "2,2,1", header="obs_x,done,action"), ("'done'", "row 2")
+        "demo.csv",
+        csv_bytes("1,0,0", "2,2,1", header="obs_x,done,action"),
+        ("'done'", "row 2"),
     ),
     # Files that are something else
     "pickle npz": ("demo.npz", pickle.dumps([1, 2]), ("pickle", "never opened")),
     "object array npz": (
-        "demo.npz", npz_bytes(**good_arrays() | {"actions": np.array([0, None, 1, 1, 1])}),
+        "demo.npz",
+        npz_bytes(**good_arrays() | {"actions": np.array([0, None, 1, 1, 1])}),
         ("'actions'", "pickle", "never opened"),
     ),
     "single array npz": ("demo.npz", npy(np.zeros((5, 2))), ("single NumPy array",)),
@@ -317,7 +371,8 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "unknown extension": ("demo.xlsx", csv_bytes(*ROWS), ("'.xlsx'", ".parquet")),
     "no extension": ("demo", csv_bytes(*ROWS), ("no extension",)),
     "latin-1 csv": (
-        "demo.csv", csv_bytes(*ROWS, header=HEADER.replace("y", "ü")).replace(b"\xc3\xbc", b"\xfc"),
+        "demo.csv",
+        csv_bytes(*ROWS, header=HEADER.replace("y", "ü")).replace(b"\xc3\xbc", b"\xfc"),
         ("not UTF-8", "line 1"),
     ),
     "UTF-16 csv": ("demo.csv", csv_bytes(*ROWS).decode().encode("utf-16"), ("UTF-16", "UTF-8")),
@@ -326,32 +381,40 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "truncated parquet": ("demo.parquet", parquet_bytes()[:-20], ("cut off",)),
     "damaged parquet": ("demo.parquet", b"PAR1" + b"\7" * 99 + b"PAR1", ("damaged",)),
     "list column parquet": (
-        "demo.parquet", parquet_bytes({"obs": [[1.0, 2.0], [3.0, 4.0]], "action": [0, 1]}),
+        "demo.parquet",
+        parquet_bytes({"obs": [[1.0, 2.0], [3.0, 4.0]], "action": [0, 1]}),
         ("'obs'", "list"),
     ),
     "struct column parquet": (
-        "demo.parquet", parquet_bytes({"obs_x": [{"a": 1.0}, {"a": 2.0}], "action": [0, 1]}),
+        "demo.parquet",
+        parquet_bytes({"obs_x": [{"a": 1.0}, {"a": 2.0}], "action": [0, 1]}),
         ("'obs_x'", "struct"),
     ),
     # Metadata
     "metadata no JSON parquet": (
-        "demo.parquet", parquet_bytes(metadata='{"features": '), ("'sarl'", "not JSON")
+        "demo.parquet",
+        parquet_bytes(metadata='{"features": '),
+        ("'sarl'", "not JSON"),
     ),
     "metadata twice parquet": (
-        "demo.parquet", parquet_bytes(metadata='{"agent": "a", "agent": "b"}'),
+        "demo.parquet",
+        parquet_bytes(metadata='{"agent": "a", "agent": "b"}'),
         ("'sarl'", "'agent' twice"),
     ),
     "metadata of another form parquet": (
-        "demo.parquet", parquet_bytes(metadata='{"features": {"x": 1}}'), ("'sarl'", "'features'")
+        "demo.parquet",
+        parquet_bytes(metadata='{"features": {"x": 1}}'),
+        ("'sarl'", "'features'"),
     ),
     "metadata with infinity parquet": (
-        "demo.parquet", parquet_bytes(metadata='{"action_low": [-Infinity]}'),
+        "demo.parquet",
+        parquet_bytes(metadata='{"action_low": [-Infinity]}'),
         ("'sarl'", "Infinity"),
     ),
     "metadata of a later version parquet": (
-        "demo.parquet", parquet_bytes(metadata='{"version": 9}'), ("'sarl'", "version 9")
+        "demo.parquet",
+        parquet_bytes(metadata='{"version": 9}'),
+        ("'sarl'", "version 9"),
     ),
-    "metadata no text npz": (
-        "demo.npz", npz_bytes(**good_arrays(), sarl=np.zeros(3)), ("'sarl'",)
-    ),
+    "metadata no text npz": ("demo.npz", npz_bytes(**good_arrays(), sarl=np.zeros(3)), ("'sarl'",)),
 }

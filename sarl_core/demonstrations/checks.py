@@ -56,18 +56,22 @@ def normalise(raw: Demonstrations) -> dict[str, Any]:
     steps = None if raw.steps is None else whole_numbers(raw.steps, n, "column 'step'")
     require_order(episodes, steps)
     fields: dict[str, Any] = {
-        "observations": observations, "actions": actions, "episodes": episodes,
+        "observations": observations,
+        "actions": actions,
+        "episodes": episodes,
         "steps": _counted(episodes) if steps is None else steps,
-        "rewards": None if raw.rewards is None else frozen(
-            column_of_numbers(raw.rewards, n, "column 'reward'"), np.float64
-        ),
-        "terminated": None if raw.terminated is None else flags(
-            raw.terminated, n, "column 'terminated'"
-        ),
-        "truncated": None if raw.truncated is None else flags(
-            raw.truncated, n, "column 'truncated'"
-        ),
-        "feature_names": feature_names, "feature_units": units, "action_names": action_names,
+        "rewards": None
+        if raw.rewards is None
+        else frozen(column_of_numbers(raw.rewards, n, "column 'reward'"), np.float64),
+        "terminated": None
+        if raw.terminated is None
+        else flags(raw.terminated, n, "column 'terminated'"),
+        "truncated": None
+        if raw.truncated is None
+        else flags(raw.truncated, n, "column 'truncated'"),
+        "feature_names": feature_names,
+        "feature_units": units,
+        "action_names": action_names,
     }
     if actions.dtype.kind == "i":
         return fields | _labels(raw, actions.reshape(n, m), action_names)
@@ -97,7 +101,8 @@ def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
     seen: dict[bytes, str] = {}
     for name, column in zip(
         (feature.name for feature in demonstrations.features),
-        demonstrations.observations.T, strict=True,
+        demonstrations.observations.T,
+        strict=True,
     ):
         if np.all(column == column[0]):
             constant.append(
@@ -108,8 +113,10 @@ def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
         if key in seen:
             doubled.append(f"feature {name!r} repeats feature {seen[key]!r} in every step")
         seen.setdefault(key, name)
-    return [*_shortened(constant, "features never change"),
-            *_shortened(doubled, "features repeat another one")]
+    return [
+        *_shortened(constant, "features never change"),
+        *_shortened(doubled, "features repeat another one"),
+    ]
 
 
 def _action_warnings(demonstrations: Demonstrations) -> list[str]:
@@ -126,7 +133,8 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
             found += _shortened(
                 [
                     f"label {label!r} of action {dimension.name!r} never occurs"
-                    for label, count in zip(dimension.labels, counts, strict=True) if count == 0
+                    for label, count in zip(dimension.labels, counts, strict=True)
+                    if count == 0
                 ],
                 f"labels of action {dimension.name!r} never occur",
             )
@@ -160,8 +168,9 @@ def _observations(given: Any) -> NDArray[np.float32]:
     if d == 0:
         raise InputError("there are no features; give at least one observation column")
     if n == 1:
-        raise InputError("there is one observation only, from which no rule can be learned; "
-                         "give more steps")
+        raise InputError(
+            "there is one observation only, from which no rule can be learned; give more steps"
+        )
     if d > MAX_FEATURES:
         raise InputError(
             f"there are {d:,} features, more than the {MAX_FEATURES:,} that rules a person "
@@ -188,8 +197,9 @@ def _actions(raw: Demonstrations, n: int) -> NDArray[Any]:
             raise InputError(f"an action is {int(actions.max())}, too large for a label")
         return frozen(actions, np.int64)
     if labelled:
-        raise InputError("actions with labels must be whole numbers of an integer type, not "
-                         f"{actions.dtype}")
+        raise InputError(
+            f"actions with labels must be whole numbers of an integer type, not {actions.dtype}"
+        )
     continuous = frozen(actions.reshape(n, -1), np.float32)
     names = _names(raw.action_names, continuous.shape[1], "action")
     require_finite(continuous, [f"action {name!r}" for name in names])
@@ -236,8 +246,13 @@ def _labels(
         names = tuple(tuple(map(str, labels)) for labels in raw.label_names)
         require_length(len(names), m, "lists of label names", "action dimensions")
         require_labels(columns, first, [len(labels) for labels in names], displays)
-    return {"label_names": names, "label_first": first,
-            "action_low": None, "action_high": None, "bounds_from": None}
+    return {
+        "label_names": names,
+        "label_first": first,
+        "action_low": None,
+        "action_high": None,
+        "bounds_from": None,
+    }
 
 
 def _bounds(
@@ -257,15 +272,23 @@ def _bounds(
     require_length(len(high), m, "upper bounds", "action dimensions")
     if not (low <= high).all():
         i = int(np.argmin(low <= high))
-        raise InputError(f"the bounds of action {action_names[i]!r}, {low[i]:g} and {high[i]:g}, "
-                         "are no interval; give the lower one first")
+        raise InputError(
+            f"the bounds of action {action_names[i]!r}, {low[i]:g} and {high[i]:g}, "
+            "are no interval; give the lower one first"
+        )
     if source == "action space":
-        require_within(actions, low.tolist(), high.tolist(),
-                       [f"action {name!r}" for name in action_names])
+        require_within(
+            actions, low.tolist(), high.tolist(), [f"action {name!r}" for name in action_names]
+        )
     # A space that is not bounded has nothing to divide: what was shown is divided.
     unbounded = ~(np.isfinite(low) & np.isfinite(high))
     if unbounded.any():
         low, high = np.where(unbounded, least, low), np.where(unbounded, most, high)
         source = "demonstrated values"
-    return {"action_low": tuple(low.tolist()), "action_high": tuple(high.tolist()),
-            "bounds_from": source, "label_names": ((),) * m, "label_first": (0,) * m}
+    return {
+        "action_low": tuple(low.tolist()),
+        "action_high": tuple(high.tolist()),
+        "bounds_from": source,
+        "label_names": ((),) * m,
+        "label_first": (0,) * m,
+    }

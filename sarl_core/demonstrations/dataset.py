@@ -233,7 +233,10 @@ class Demonstrations:
         assert self.action_high is not None
         return tuple(
             ActionDimension(
-                name, "interval", low=low, high=high,
+                name,
+                "interval",
+                low=low,
+                high=high,
                 bounds_from=self.bounds_from or "demonstrated values",
             )
             for name, low, high in zip(
@@ -261,8 +264,15 @@ class Demonstrations:
     def digest(self) -> str:
         """Fingerprint (blake2b, 32 hex digits) of the arrays and of what is known about them."""
         digest = hashlib.blake2b(digest_size=16)
-        for name in ("observations", "actions", "episodes", "steps", "rewards", "terminated",
-                     "truncated"):
+        for name in (
+            "observations",
+            "actions",
+            "episodes",
+            "steps",
+            "rewards",
+            "terminated",
+            "truncated",
+        ):
             value = getattr(self, name)
             if value is not None:
                 digest.update(f"{name}{value.dtype}{value.shape}".encode())
@@ -294,9 +304,12 @@ class Demonstrations:
 
         return replace(
             self,
-            observations=kept(self.observations), actions=kept(self.actions),
-            episodes=kept(self.episodes), rewards=kept(self.rewards),
-            terminated=kept(self.terminated), truncated=kept(self.truncated),
+            observations=kept(self.observations),
+            actions=kept(self.actions),
+            episodes=kept(self.episodes),
+            rewards=kept(self.rewards),
+            terminated=kept(self.terminated),
+            truncated=kept(self.truncated),
             steps=kept(self.steps),
         )
 

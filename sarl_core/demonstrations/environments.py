@@ -60,50 +60,74 @@ class _Names:
 
 
 _LUNAR_LANDER_FEATURES = (
-    ("horizontal position", ""), ("vertical position", ""), ("horizontal velocity", ""),
-    ("vertical velocity", ""), ("angle", "rad"), ("angular velocity", ""),
-    ("left leg contact", ""), ("right leg contact", ""),
+    ("horizontal position", ""),
+    ("vertical position", ""),
+    ("horizontal velocity", ""),
+    ("vertical velocity", ""),
+    ("angle", "rad"),
+    ("angular velocity", ""),
+    ("left leg contact", ""),
+    ("right leg contact", ""),
 )
 
 _CATALOGUE: dict[str, _Names] = {
     "CartPole": _Names(
-        (("cart position", "m"), ("cart velocity", "m/s"), ("pole angle", "rad"),
-         ("pole angular velocity", "rad/s")),
-        ("push",), (("push left", "push right"),),
+        (
+            ("cart position", "m"),
+            ("cart velocity", "m/s"),
+            ("pole angle", "rad"),
+            ("pole angular velocity", "rad/s"),
+        ),
+        ("push",),
+        (("push left", "push right"),),
     ),
     "LunarLander": _Names(
-        _LUNAR_LANDER_FEATURES, ("engine",),
+        _LUNAR_LANDER_FEATURES,
+        ("engine",),
         (("do nothing", "fire left engine", "fire main engine", "fire right engine"),),
     ),
-    "LunarLanderContinuous": _Names(
-        _LUNAR_LANDER_FEATURES, ("main engine", "lateral engines")
-    ),
+    "LunarLanderContinuous": _Names(_LUNAR_LANDER_FEATURES, ("main engine", "lateral engines")),
     "Pendulum": _Names(
         (("cosine of the angle", ""), ("sine of the angle", ""), ("angular velocity", "rad/s")),
         ("torque",),
     ),
     "BipedalWalker": _Names(
-        (("hull angle", "rad"), ("hull angular velocity", ""), ("horizontal velocity", ""),
-         ("vertical velocity", ""),
-         ("hip 1 angle", "rad"), ("hip 1 speed", ""), ("knee 1 angle", "rad"),
-         ("knee 1 speed", ""), ("leg 1 ground contact", ""),
-         ("hip 2 angle", "rad"), ("hip 2 speed", ""), ("knee 2 angle", "rad"),
-         ("knee 2 speed", ""), ("leg 2 ground contact", ""),
-         *((f"lidar {number}", "") for number in range(1, 11))),
+        (
+            ("hull angle", "rad"),
+            ("hull angular velocity", ""),
+            ("horizontal velocity", ""),
+            ("vertical velocity", ""),
+            ("hip 1 angle", "rad"),
+            ("hip 1 speed", ""),
+            ("knee 1 angle", "rad"),
+            ("knee 1 speed", ""),
+            ("leg 1 ground contact", ""),
+            ("hip 2 angle", "rad"),
+            ("hip 2 speed", ""),
+            ("knee 2 angle", "rad"),
+            ("knee 2 speed", ""),
+            ("leg 2 ground contact", ""),
+            *((f"lidar {number}", "") for number in range(1, 11)),
+        ),
         ("hip 1 torque", "knee 1 torque", "hip 2 torque", "knee 2 torque"),
     ),
     "MountainCar": _Names(
         (("car position", "m"), ("car velocity", "m/s")),
-        ("acceleration",), (("accelerate left", "do not accelerate", "accelerate right"),),
+        ("acceleration",),
+        (("accelerate left", "do not accelerate", "accelerate right"),),
     ),
-    "MountainCarContinuous": _Names(
-        (("car position", "m"), ("car velocity", "m/s")), ("force",)
-    ),
+    "MountainCarContinuous": _Names((("car position", "m"), ("car velocity", "m/s")), ("force",)),
     "Acrobot": _Names(
-        (("cosine of angle 1", ""), ("sine of angle 1", ""), ("cosine of angle 2", ""),
-         ("sine of angle 2", ""), ("angular velocity 1", "rad/s"),
-         ("angular velocity 2", "rad/s")),
-        ("torque",), (("torque -1 Nm", "no torque", "torque +1 Nm"),),
+        (
+            ("cosine of angle 1", ""),
+            ("sine of angle 1", ""),
+            ("cosine of angle 2", ""),
+            ("sine of angle 2", ""),
+            ("angular velocity 1", "rad/s"),
+            ("angular velocity 2", "rad/s"),
+        ),
+        ("torque",),
+        (("torque -1 Nm", "no torque", "torque +1 Nm"),),
     ),
 }
 
@@ -216,10 +240,13 @@ def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
         feature_units=tuple(unit for _, unit in names.features),
         action_names=names.actions,
         label_names=tuple(
-            names.labels[i] if i < len(names.labels) and len(names.labels[i]) == counts[i]
+            names.labels[i]
+            if i < len(names.labels) and len(names.labels[i]) == counts[i]
             else tuple(str(first[i] + label) for label in range(counts[i]))
             for i in range(m)
-        ) if low is None else ((),) * m,
+        )
+        if low is None
+        else ((),) * m,
         label_first=first if low is None else (0,) * m,
         action_low=low,
         action_high=high,
@@ -234,8 +261,10 @@ def _catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> _Names:
     for key in (family, f"{family}Continuous"):
         names = _CATALOGUE.get(key)
         if (
-            names is not None and bool(names.labels) == discrete
-            and len(names.features) == d and len(names.actions) == m
+            names is not None
+            and bool(names.labels) == discrete
+            and len(names.features) == d
+            and len(names.actions) == m
         ):
             return names
     return _Names(

@@ -37,13 +37,17 @@ def require_finite(
         return
     row, column = _first(~finite)
     kind = "not a number (NaN)" if np.isnan(values[row, column]) else "infinite"
-    raise InputError(f"{columns[column]} is {kind} in row {_number(row, rows)}; mend or remove "
-                     "that row")
+    raise InputError(
+        f"{columns[column]} is {kind} in row {_number(row, rows)}; mend or remove that row"
+    )
 
 
 def require_labels(
-    values: NDArray[np.int64], first: Sequence[int], counts: Sequence[int],
-    columns: Sequence[str], rows: NDArray[np.int64] | None = None,
+    values: NDArray[np.int64],
+    first: Sequence[int],
+    counts: Sequence[int],
+    columns: Sequence[str],
+    rows: NDArray[np.int64] | None = None,
 ) -> None:
     """Refuse discrete actions outside the action space.
 
@@ -69,8 +73,11 @@ def require_labels(
 
 
 def require_within(
-    values: NDArray[np.float32], low: Sequence[float], high: Sequence[float],
-    columns: Sequence[str], rows: NDArray[np.int64] | None = None,
+    values: NDArray[np.float32],
+    low: Sequence[float],
+    high: Sequence[float],
+    columns: Sequence[str],
+    rows: NDArray[np.int64] | None = None,
 ) -> None:
     """Refuse continuous actions outside the action space.
 
@@ -160,8 +167,9 @@ def flags(
     neither = (values != 0) & (values != 1)
     if neither.any():
         row = int(np.argmax(neither))
-        raise InputError(f"{column} is {values[row]} in row {_number(row, rows)}; write true or "
-                         "false, or 1 or 0")
+        raise InputError(
+            f"{column} is {values[row]} in row {_number(row, rows)}; write true or false, or 1 or 0"
+        )
     return frozen(values, np.bool_)
 
 
@@ -175,13 +183,15 @@ def whole_numbers(
         wrong |= values != np.floor(values)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError(f"{column} is {values[row]} in row {_number(row, rows)}; "
-                         "use whole numbers from 0")
+        raise InputError(
+            f"{column} is {values[row]} in row {_number(row, rows)}; use whole numbers from 0"
+        )
     return frozen(values, np.int64)
 
 
 def require_order(
-    episodes: NDArray[np.int64], steps: NDArray[np.int64] | None,
+    episodes: NDArray[np.int64],
+    steps: NDArray[np.int64] | None,
     columns: tuple[str, str] = ("column 'episode'", "column 'step'"),
     rows: NDArray[np.int64] | None = None,
 ) -> None:

@@ -112,11 +112,10 @@ def label_dimensions(
         InputError: If the divider is out of range.
     """
     if not isinstance(divider, (int, np.integer)) or not 2 <= divider <= MAX_DIVIDER:
-        raise InputError(
-            f"the divider is {divider}; give a whole number from 2 to {MAX_DIVIDER}"
-        )
-    return tuple(_labelled(dimension, int(divider)) for dimension in
-                 demonstrations.action_dimensions)
+        raise InputError(f"the divider is {divider}; give a whole number from 2 to {MAX_DIVIDER}")
+    return tuple(
+        _labelled(dimension, int(divider)) for dimension in demonstrations.action_dimensions
+    )
 
 
 def _labelled(dimension: ActionDimension, divider: int) -> LabelledDimension:

@@ -56,9 +56,9 @@ def pareto_front(
     confidences = _edges([r.confidence for r in rectangles])
     if not len(supports):
         return ()
-    return _front(threshold_landscape(
-        trees, supports, confidences, lift_min=lift_min, max_depth=max_depth
-    ))
+    return _front(
+        threshold_landscape(trees, supports, confidences, lift_min=lift_min, max_depth=max_depth)
+    )
 
 
 def _edges(values: list[NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -82,7 +82,10 @@ def _front(landscape: Landscape) -> tuple[ParetoPoint, ...]:
     # The staircase of the points so far: coverage ascending, fidelity descending.
     stairs: list[tuple[float, float]] = []
     for cell, count, covered, correct in zip(
-        order.tolist(), rules[order].tolist(), coverage[order].tolist(), fidelity[order].tolist(),
+        order.tolist(),
+        rules[order].tolist(),
+        coverage[order].tolist(),
+        fidelity[order].tolist(),
         strict=True,
     ):
         at = bisect_left(stairs, (covered, -np.inf))
@@ -95,8 +98,13 @@ def _front(landscape: Landscape) -> tuple[ParetoPoint, ...]:
             start -= 1
         stairs[start:at] = [(covered, correct)]
         row, column = divmod(cell, len(landscape.confidences))
-        points.append(ParetoPoint(
-            count, covered, correct, float(landscape.supports[row]),
-            float(landscape.confidences[column]),
-        ))
+        points.append(
+            ParetoPoint(
+                count,
+                covered,
+                correct,
+                float(landscape.supports[row]),
+                float(landscape.confidences[column]),
+            )
+        )
     return tuple(points)

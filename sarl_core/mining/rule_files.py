@@ -48,12 +48,12 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{name} is not JSON ({error}); give a rule file that `mine` wrote") \
-            from error
+        raise InputError(
+            f"{name} is not JSON ({error}); give a rule file that `mine` wrote"
+        ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(
-            f"{name} is not a rule file (its format is not {FORMAT!r}); "
-            "give one that `mine` wrote"
+            f"{name} is not a rule file (its format is not {FORMAT!r}); give one that `mine` wrote"
         )
     if document.get("version") != VERSION:
         raise InputError(
@@ -108,12 +108,16 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
         "features": [{"name": f.name, "unit": f.unit} for f in source.features],
         "actions": [_action(action) for action in rule_set.actions],
         "thresholds": {
-            "support": thresholds.support, "confidence": thresholds.confidence,
-            "lift": thresholds.lift, "max_depth": thresholds.max_depth,
+            "support": thresholds.support,
+            "confidence": thresholds.confidence,
+            "lift": thresholds.lift,
+            "max_depth": thresholds.max_depth,
         },
         "divider": rule_set.divider,
         "demonstrations": {
-            "digest": source.digest, "steps": source.steps, "episodes": source.episodes,
+            "digest": source.digest,
+            "steps": source.steps,
+            "episodes": source.episodes,
         },
         "rules": [_rule(rule) for rule in rule_set.rules],
     }
@@ -121,10 +125,18 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
 
 def _action(action: LabelledDimension) -> dict[str, Any]:
     if action.is_interval:
-        return {"name": action.name, "kind": "interval", "edges": list(action.edges),
-                "bounds_from": action.bounds_from}
-    return {"name": action.name, "kind": "discrete", "labels": list(action.label_names),
-            "first": action.first}
+        return {
+            "name": action.name,
+            "kind": "interval",
+            "edges": list(action.edges),
+            "bounds_from": action.bounds_from,
+        }
+    return {
+        "name": action.name,
+        "kind": "discrete",
+        "labels": list(action.label_names),
+        "first": action.first,
+    }
 
 
 def _rule(rule: Rule) -> dict[str, Any]:

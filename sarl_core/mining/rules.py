@@ -101,7 +101,8 @@ class Rule:
         for feature, op, threshold in self.conditions:
             before = found.get(feature, Bounds(feature, -np.inf, np.inf))
             found[feature] = (
-                before._replace(high=min(before.high, threshold)) if op == "<="
+                before._replace(high=min(before.high, threshold))
+                if op == "<="
                 else before._replace(low=max(before.low, threshold))
             )
         return tuple(found.values())
@@ -274,9 +275,7 @@ def cut_nodes(
     Returns:
         Node numbers, ascending. No one lies below another.
     """
-    qualifies = (
-        (tree.support >= supp_min) & (tree.confidence >= conf_min) & (tree.lift >= lift_min)
-    )
+    qualifies = (tree.support >= supp_min) & (tree.confidence >= conf_min) & (tree.lift >= lift_min)
     if max_depth is not None:
         qualifies &= tree.depth <= max_depth
     # An ancestor has at least the node's support, so only its confidence can spare it.
@@ -354,8 +353,12 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
         One rule a node, in their order.
     """
     numbers = zip(
-        nodes.tolist(), tree.label[nodes].tolist(), tree.support[nodes].tolist(),
-        tree.confidence[nodes].tolist(), tree.lift[nodes].tolist(), tree.samples[nodes].tolist(),
+        nodes.tolist(),
+        tree.label[nodes].tolist(),
+        tree.support[nodes].tolist(),
+        tree.confidence[nodes].tolist(),
+        tree.lift[nodes].tolist(),
+        tree.samples[nodes].tolist(),
         strict=True,
     )
     return [

@@ -189,9 +189,7 @@ def _novice(env_id: str, first: NDArray[np.int64]) -> UniformAgent:
     low = np.zeros(0) if len(counts) else space.low.reshape(-1)
     high = np.zeros(0) if len(counts) else space.high.reshape(-1)
     env.close()
-    return UniformAgent(
-        "novice", counts, first, low.astype(np.float32), high.astype(np.float32)
-    )
+    return UniformAgent("novice", counts, first, low.astype(np.float32), high.astype(np.float32))
 
 
 def _untrained(env_id: str, seed: int) -> MlpPolicy:
@@ -212,14 +210,14 @@ def _untrained(env_id: str, seed: int) -> MlpPolicy:
         actions = spaces.Box(low, high, dtype=np.float32)
     with torch.random.fork_rng(devices=[]):  # leave the caller's random numbers alone
         torch.manual_seed(seed)
-        network = ActorCriticPolicy(
-            spaces.Box(-np.inf, np.inf, (d,)), actions, lambda _: 0.0
-        )
+        network = ActorCriticPolicy(spaces.Box(-np.inf, np.inf, (d,)), actions, lambda _: 0.0)
     return policy_from_state(
         {name: value.detach().numpy().copy() for name, value in network.state_dict().items()},
         discrete=description.is_discrete,
         label_counts=tuple(counts) if description.is_discrete else (),
-        action_low=low, action_high=high, env_id=env_id,
+        action_low=low,
+        action_high=high,
+        env_id=env_id,
     )
 
 

@@ -156,8 +156,11 @@ def _runs(text: str) -> list[str]:
 def _writable(run: str) -> str:
     """What the font has; it knows Latin letters without accents."""
     plain = unicodedata.normalize("NFKD", run)
-    return "".join(c if c in "…·°±" or c.isascii() else "" if unicodedata.combining(c) else "?"
-                   for c in plain if c.isprintable())
+    return "".join(
+        c if c in "…·°±" or c.isascii() else "" if unicodedata.combining(c) else "?"
+        for c in plain
+        if c.isprintable()
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -179,10 +182,13 @@ def _mask(text: str, size: int, bold: bool) -> NDArray[np.uint8]:
         glyph = Image.new("L", (int(width + 2) * _FINE, picture.height * _FINE))
         pen = ImageDraw.Draw(glyph)
         for stroke in _DRAWN[run]:
-            points = [((1 + px * width) * _FINE, (ascent - height + py * height) * _FINE)
-                      for px, py in stroke]
-            pen.line(points, fill=255, width=int(size * (0.12 if bold else 0.09) * _FINE),
-                     joint="curve")
+            points = [
+                ((1 + px * width) * _FINE, (ascent - height + py * height) * _FINE)
+                for px, py in stroke
+            ]
+            pen.line(
+                points, fill=255, width=int(size * (0.12 if bold else 0.09) * _FINE), joint="curve"
+            )
         small = glyph.resize((int(width + 2), picture.height), Image.Resampling.BOX)
         picture.paste(small, (round(x), 0))
         x += width + 2
@@ -195,7 +201,8 @@ def _rounded(width: int, height: int) -> NDArray[np.uint8]:
 
     large = Image.new("L", (width * _FINE, height * _FINE))
     ImageDraw.Draw(large).rounded_rectangle(
-        (0, 0, width * _FINE - 1, height * _FINE - 1), radius=4 * _FINE, fill=255)
+        (0, 0, width * _FINE - 1, height * _FINE - 1), radius=4 * _FINE, fill=255
+    )
     return np.asarray(large.resize((width, height), Image.Resampling.BOX))
 
 

@@ -19,8 +19,22 @@ from sarl_core.rollouts.progress import Progress, report
 _LEAST_DELAY = 2  # hundredths of a second; browsers show anything shorter for a tenth
 _LONGEST_DELAY = 65_535
 # A fixed number of threads and no date: the same pictures give the same bytes.
-_MP4 = ("-crf", "20", "-preset", "veryfast", "-threads", "2", "-movflags", "+faststart",
-        "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1")
+_MP4 = (
+    "-crf",
+    "20",
+    "-preset",
+    "veryfast",
+    "-threads",
+    "2",
+    "-movflags",
+    "+faststart",
+    "-fflags",
+    "+bitexact",
+    "-flags:v",
+    "+bitexact",
+    "-map_metadata",
+    "-1",
+)
 
 
 class Shown(NamedTuple):
@@ -53,7 +67,8 @@ def schedule(count: int, fps: float) -> tuple[Shown, ...]:
     """
     if count < 1 or not fps > 0:
         raise InputError(
-            "there is no picture to show; render at least one" if count < 1
+            "there is no picture to show; render at least one"
+            if count < 1
             else f"{fps} pictures a second cannot be shown; give a number above 0"
         )
     starts = [int(100 * number / fps + 0.5) for number in range(count + 1)]
@@ -66,8 +81,10 @@ def schedule(count: int, fps: float) -> tuple[Shown, ...]:
     ends = [starts[number] for number in kept[1:]] + [starts[count]]
     delays = [end - starts[number] for number, end in zip(kept, ends, strict=True)]
     kept[-1] = count - 1
-    return tuple(Shown(number, min(max(delay, _LEAST_DELAY), _LONGEST_DELAY))
-                 for number, delay in zip(kept, delays, strict=True))
+    return tuple(
+        Shown(number, min(max(delay, _LEAST_DELAY), _LONGEST_DELAY))
+        for number, delay in zip(kept, delays, strict=True)
+    )
 
 
 def gif_bytes(
@@ -226,6 +243,13 @@ def _open_mp4(path: Path, fps: float) -> Any:
     import imageio.v2
 
     return imageio.v2.get_writer(
-        path, format="FFMPEG", fps=fps, codec="libx264", pixelformat="yuv420p",
-        macro_block_size=2, quality=None, ffmpeg_log_level="error", output_params=list(_MP4),
+        path,
+        format="FFMPEG",
+        fps=fps,
+        codec="libx264",
+        pixelformat="yuv420p",
+        macro_block_size=2,
+        quality=None,
+        ffmpeg_log_level="error",
+        output_params=list(_MP4),
     )

@@ -88,16 +88,25 @@ class Episodes:
         returns = summarise(self.returns)
         steps = float(self.lengths.sum())
         return {
-            "mean": returns.mean, "std": returns.std, "iqm": returns.iqm,
-            "iqm_low": returns.low, "iqm_high": returns.high,
+            "mean": returns.mean,
+            "std": returns.std,
+            "iqm": returns.iqm,
+            "iqm_low": returns.low,
+            "iqm_high": returns.high,
             "intervention_rate": float(self.interventions.sum()) / steps,
             "coverage": float(self.covered.sum()) / steps,
         }
 
     def to_dict(self) -> dict[str, Any]:
         """The document that ``evaluate --json`` prints, ready for JSON."""
-        rows = zip(self.seeds.tolist(), self.returns.tolist(), self.lengths.tolist(),
-                   self.interventions.tolist(), self.covered.tolist(), strict=True)
+        rows = zip(
+            self.seeds.tolist(),
+            self.returns.tolist(),
+            self.lengths.tolist(),
+            self.interventions.tolist(),
+            self.covered.tolist(),
+            strict=True,
+        )
         names = ("seed", "return", "length", "interventions", "covered")
         return {
             "episodes": [dict(zip(names, row, strict=True)) for row in rows],
@@ -108,11 +117,17 @@ class Episodes:
         """One row an episode: seed, return, length, interventions, covered, how it ended."""
         import pandas as pd
 
-        return pd.DataFrame({
-            "seed": self.seeds, "return": self.returns, "length": self.lengths,
-            "interventions": self.interventions, "covered": self.covered,
-            "terminated": self.terminated, "truncated": self.truncated,
-        })
+        return pd.DataFrame(
+            {
+                "seed": self.seeds,
+                "return": self.returns,
+                "length": self.lengths,
+                "interventions": self.interventions,
+                "covered": self.covered,
+                "terminated": self.terminated,
+                "truncated": self.truncated,
+            }
+        )
 
 
 def rollout(
@@ -151,8 +166,12 @@ def rollout(
         InputError: If a number is out of range, or agent, shield and environment do not fit.
         CancelledError: If `progress` returned False.
     """
-    for name, value, least in (("episodes", episodes, 1), ("seed", seed, 0),
-                               ("batch", batch, 1), ("jobs", jobs, 1)):
+    for name, value, least in (
+        ("episodes", episodes, 1),
+        ("seed", seed, 0),
+        ("batch", batch, 1),
+        ("jobs", jobs, 1),
+    ):
         if value < least:
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
@@ -167,8 +186,18 @@ def rollout(
         report(progress, done, episodes)
 
     if jobs == 1:
-        outcomes.append(play(env_id, actor, shield, seeds, batch=batch, max_steps=MAX_STEPS,
-                             keep_steps=keep_steps, finished=lambda: finished(1)))
+        outcomes.append(
+            play(
+                env_id,
+                actor,
+                shield,
+                seeds,
+                batch=batch,
+                max_steps=MAX_STEPS,
+                keep_steps=keep_steps,
+                finished=lambda: finished(1),
+            )
+        )
     else:
         for outcome in _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps):
             outcomes.append(outcome)
@@ -177,8 +206,13 @@ def rollout(
 
 
 def _in_processes(
-    env_id: str, agent: Agent, shield: Shield | None, pieces: Sequence[NDArray[np.int64]],
-    batch: int, jobs: int, keep_steps: bool,
+    env_id: str,
+    agent: Agent,
+    shield: Shield | None,
+    pieces: Sequence[NDArray[np.int64]],
+    batch: int,
+    jobs: int,
+    keep_steps: bool,
 ) -> Iterator[Outcome]:
     from joblib import Parallel, delayed
 
@@ -186,8 +220,15 @@ def _in_processes(
     with Parallel(n_jobs=jobs) as work:
         for start in range(0, len(pieces), jobs):
             yield from work(
-                delayed(play)(env_id, agent, shield, piece, batch=batch, max_steps=MAX_STEPS,
-                              keep_steps=keep_steps)
+                delayed(play)(
+                    env_id,
+                    agent,
+                    shield,
+                    piece,
+                    batch=batch,
+                    max_steps=MAX_STEPS,
+                    keep_steps=keep_steps,
+                )
                 for piece in pieces[start : start + jobs]
             )
 
@@ -196,6 +237,7 @@ def _gather(
     env_id: str, agent: str, seeds: NDArray[np.int64], outcomes: Sequence[Outcome]
 ) -> Episodes:
     """Episodes from pieces that follow each other."""
+
     def column(name: str) -> Any:
         return np.concatenate([getattr(outcome, name) for outcome in outcomes])
 
@@ -206,9 +248,14 @@ def _gather(
             tables.append(outcome.steps.numbered_from(before) if before else outcome.steps)
         before += len(outcome.returns)
     return Episodes(
-        env_id=env_id, agent=agent, seeds=seeds,
-        returns=column("returns"), lengths=column("lengths"),
-        interventions=column("interventions"), covered=column("covered"),
-        terminated=column("terminated"), truncated=column("truncated"),
+        env_id=env_id,
+        agent=agent,
+        seeds=seeds,
+        returns=column("returns"),
+        lengths=column("lengths"),
+        interventions=column("interventions"),
+        covered=column("covered"),
+        terminated=column("terminated"),
+        truncated=column("truncated"),
         steps=concatenate(tables) if tables else None,
     )

@@ -49,8 +49,9 @@ def read_limited_npz(path: Path) -> dict[str, NDArray[Any]]:
         raise
     except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise InputError(f"{path} cannot be read as a policy ({reason}); give an .npz policy") \
-            from error
+        raise InputError(
+            f"{path} cannot be read as a policy ({reason}); give an .npz policy"
+        ) from error
 
 
 def check_unpacked_size(archive: zipfile.ZipFile, path: Path) -> None:

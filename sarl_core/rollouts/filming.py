@@ -66,7 +66,12 @@ class _Row(NamedTuple):
 
 
 def film_episode(
-    env_id: str, agent: Agent, shield: Shield | None, seed: int, film: Film, limit: int,
+    env_id: str,
+    agent: Agent,
+    shield: Shield | None,
+    seed: int,
+    film: Film,
+    limit: int,
     told: Callable[[int, int], None],
 ) -> Episodes:
     """Play one episode in the wrapped environment, and film it.
@@ -96,7 +101,8 @@ def film_episode(
         while not (terminated or truncated):
             film.add(_picture(env, env_id))
             row, observation, terminated, truncated = _film_step(
-                env, adapter, agent, generator, observation, len(rows))
+                env, adapter, agent, generator, observation, len(rows)
+            )
             rows.append(row)
             truncated = bool(truncated) or (len(rows) >= limit and not terminated)
             told(len(rows), limit)
@@ -104,32 +110,50 @@ def film_episode(
         told(limit, limit)
     steps = _table(rows, adapter)
     return Episodes(
-        env_id=env_id, agent=agent.name, seeds=np.array([seed]),
-        returns=np.array([np.cumsum(steps.reward)[-1]]), lengths=np.array([len(rows)]),
+        env_id=env_id,
+        agent=agent.name,
+        seeds=np.array([seed]),
+        returns=np.array([np.cumsum(steps.reward)[-1]]),
+        lengths=np.array([len(rows)]),
         interventions=np.array([int(steps.intervened.sum())]),
         covered=np.array([int(steps.covered.sum())]),
-        terminated=np.array([bool(terminated)]), truncated=np.array([bool(truncated)]),
+        terminated=np.array([bool(terminated)]),
+        truncated=np.array([bool(truncated)]),
         steps=steps,
     )
 
 
 def _film_step(
-    env: Any, adapter: SpaceAdapter, agent: Agent, generator: np.random.Generator,
-    observation: Any, step: int,
+    env: Any,
+    adapter: SpaceAdapter,
+    agent: Agent,
+    generator: np.random.Generator,
+    observation: Any,
+    step: int,
 ) -> tuple[_Row, Any, bool, bool]:
     state = np.array(adapter.flat(observation))
     uniforms = generator.random((1, agent.n_uniforms)) if agent.n_uniforms else None
     proposed = agent.act(state[None], uniforms)
     following, reward, terminated, truncated, info = env.step(
-        adapter.native(adapter.shaped(proposed)[0]))
+        adapter.native(adapter.shaped(proposed)[0])
+    )
     record = info.get("shield")
     if record is None:
         rules = [-1] * adapter.n_dimensions
         row = _Row(0, step, state, proposed[0], proposed[0], rules, False, np.inf, float(reward))
     else:
         rules = [-1 if rule is None else rule for rule in record.rules]
-        row = _Row(0, step, state, record.proposed, record.executed, rules, record.intervened,
-                   record.margin, float(reward))
+        row = _Row(
+            0,
+            step,
+            state,
+            record.proposed,
+            record.executed,
+            rules,
+            record.intervened,
+            record.margin,
+            float(reward),
+        )
     return row, following, bool(terminated), bool(truncated)
 
 

@@ -122,29 +122,42 @@ class Panel:
             right -= 82
         caption = self.caption(step)
         ink, on_ink = {
-            "CHANGED": (INKS.changed, INKS.on_changed), "AGREES": (INKS.agreed, INKS.on_agreed),
+            "CHANGED": (INKS.changed, INKS.on_changed),
+            "AGREES": (INKS.agreed, INKS.on_agreed),
         }.get(caption.mark, (INKS.quiet, INKS.on_quiet))
         left = _MARGIN
         if caption.mark == "CHANGED":
             canvas.box(0, top, width, 4, INKS.changed.full)
         if caption.mark:
             left = canvas.label(left, top + 12, caption.mark, 12, ink, on_ink) + 10
-        canvas.text(left, top + 12, fitted(caption.action, 16, right - left), 16, INKS.text,
-                    bold=True)
+        canvas.text(
+            left, top + 12, fitted(caption.action, 16, right - left), 16, INKS.text, bold=True
+        )
         for line, text in enumerate(wrapped(caption.reason, 14, width - 2 * _MARGIN, 3)):
-            canvas.text(_MARGIN, top + 42 + 20 * line, text, 14,
-                        INKS.text if caption.has_rule else INKS.quiet)
+            canvas.text(
+                _MARGIN,
+                top + 42 + 20 * line,
+                text,
+                14,
+                INKS.text if caption.has_rule else INKS.quiet,
+            )
 
     def _write_end(self, canvas: Canvas) -> None:
         top, count = canvas.pixels.shape[0] - BOTTOM, len(self.steps)
         left = canvas.label(_MARGIN, top + 12, "ENDED", 12, INKS.text, INKS.on_text) + 10
         gained = signed(float(self._gained[-1]), 1)
-        canvas.text(left, top + 12, f"after {count} steps, return {gained}", 16, INKS.text,
-                    bold=True)
+        canvas.text(
+            left, top + 12, f"after {count} steps, return {gained}", 16, INKS.text, bold=True
+        )
         if self.shielded:
             changed = int(self.steps.intervened.sum())
-            canvas.text(_MARGIN, top + 42, f"The shield changed {changed} of {count} actions.",
-                        14, INKS.quiet)
+            canvas.text(
+                _MARGIN,
+                top + 42,
+                f"The shield changed {changed} of {count} actions.",
+                14,
+                INKS.quiet,
+            )
 
     @cached_property
     def _edges(self) -> NDArray[np.int64]:
@@ -156,8 +169,11 @@ class Panel:
     def _marks(self) -> NDArray[np.uint8]:
         """The whole bar: at every pixel whether the shield changed, agreed, or had no rule."""
         marks = np.full(self._edges[-1], TRACK_INDEX, dtype=np.uint8)
-        kinds = np.where(self.steps.intervened, INKS.changed.full,
-                         np.where(self.steps.covered, INKS.agreed.full, INKS.quiet.full))
+        kinds = np.where(
+            self.steps.intervened,
+            INKS.changed.full,
+            np.where(self.steps.covered, INKS.agreed.full, INKS.quiet.full),
+        )
         # Where several steps share a pixel, a change is shown before anything else.
         for kind in (INKS.quiet.full, INKS.agreed.full, INKS.changed.full):
             for step in np.flatnonzero(kinds == kind).tolist():
@@ -189,11 +205,19 @@ class Panel:
         proposed, executed = self.steps.proposed[step], self.steps.executed[step]
         rules = [int(rule) for rule in self.steps.rules[step] if rule >= 0]
         if not self.shielded:
-            return Caption("", action_text(self.description, executed),
-                           "No shield: every action is executed as proposed.", False)
+            return Caption(
+                "",
+                action_text(self.description, executed),
+                "No shield: every action is executed as proposed.",
+                False,
+            )
         if not rules:
-            return Caption("NO RULE", action_text(self.description, executed),
-                           "No rule applies to this state: the action stays as it is.", False)
+            return Caption(
+                "NO RULE",
+                action_text(self.description, executed),
+                "No rule applies to this state: the action stays as it is.",
+                False,
+            )
         if not self.steps.intervened[step]:
             reason = "; ".join(self.describe_rule(rule) for rule in rules)
             return Caption("AGREES", action_text(self.description, executed), reason, True)
@@ -203,7 +227,8 @@ class Panel:
             "CHANGED",
             f"{action_text(self.description, proposed, changed)} → "
             f"{action_text(self.description, executed, changed, named=len(changed) > 1)}",
-            "; ".join(reasons), True,
+            "; ".join(reasons),
+            True,
         )
 
 

@@ -96,8 +96,13 @@ class _Run:
     """The state of `play`: lanes that step together, and what they have brought so far."""
 
     def __init__(
-        self, env_id: str, agent: Agent, shield: Shield | None, seeds: NDArray[np.int64],
-        max_steps: int, keep_steps: bool,
+        self,
+        env_id: str,
+        agent: Agent,
+        shield: Shield | None,
+        seeds: NDArray[np.int64],
+        max_steps: int,
+        keep_steps: bool,
     ) -> None:
         self.env_id, self.agent, self.shield = env_id, agent, shield
         self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
@@ -116,8 +121,11 @@ class _Run:
         if self.started == len(self.seeds):
             return
         # A fresh environment: what an earlier episode left behind cannot matter.
-        lane = _Lane(self.started, make_environment(self.env_id),
-                     np.random.default_rng(int(self.seeds[self.started])))
+        lane = _Lane(
+            self.started,
+            make_environment(self.env_id),
+            np.random.default_rng(int(self.seeds[self.started])),
+        )
         self.lanes.append(lane)
         self.started += 1
         observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
@@ -127,11 +135,15 @@ class _Run:
         """Step every lane once, and give the number of episodes that ended."""
         states, adapter = self.states, self.adapter
         episodes = np.array([lane.episode for lane in self.lanes])
-        choice = choose(self.agent, self.shield, adapter, states,
-                        [lane.generator for lane in self.lanes])
+        choice = choose(
+            self.agent, self.shield, adapter, states, [lane.generator for lane in self.lanes]
+        )
         executed = adapter.shaped(choice.executed)
-        actions = (executed.tolist() if adapter.action_shape == () and adapter.is_discrete
-                   else [adapter.native(action) for action in executed])
+        actions = (
+            executed.tolist()
+            if adapter.action_shape == () and adapter.is_discrete
+            else [adapter.native(action) for action in executed]
+        )
         following = np.empty_like(states)
         rewards = np.empty(len(states))
         ended: list[tuple[int, bool, bool]] = []
@@ -142,9 +154,19 @@ class _Run:
             if terminated or truncated:
                 ended.append((index, bool(terminated), bool(truncated)))
         if self.keep_steps:
-            self.chunks.append((episodes, self.lengths[episodes], states, choice.proposed,
-                                choice.executed, choice.rules, choice.intervened,
-                                choice.margin, rewards))
+            self.chunks.append(
+                (
+                    episodes,
+                    self.lengths[episodes],
+                    states,
+                    choice.proposed,
+                    choice.executed,
+                    choice.rules,
+                    choice.intervened,
+                    choice.margin,
+                    rewards,
+                )
+            )
         self.returns[episodes] += rewards
         self.lengths[episodes] += 1
         if self.shield is not None:
@@ -179,12 +201,22 @@ class _Run:
             columns = [np.concatenate(column) for column in zip(*self.chunks, strict=True)]
             order = np.lexsort((columns[1], columns[0]))
             steps = StepTable(*(column[order] for column in columns))
-        return Outcome(self.returns, self.lengths, self.interventions, self.covered,
-                       self.terminated, self.truncated, steps)
+        return Outcome(
+            self.returns,
+            self.lengths,
+            self.interventions,
+            self.covered,
+            self.terminated,
+            self.truncated,
+            steps,
+        )
 
 
 def choose(
-    agent: Agent, shield: Shield | None, adapter: SpaceAdapter, states: NDArray[np.float32],
+    agent: Agent,
+    shield: Shield | None,
+    adapter: SpaceAdapter,
+    states: NDArray[np.float32],
     generators: list[np.random.Generator],
 ) -> Choice:
     """Let the agent propose and the shield decide.
@@ -207,11 +239,21 @@ def choose(
     proposed = agent.act(states, uniforms)
     if shield is None:
         none = np.full(proposed.shape, -1, dtype=np.int64)
-        return Choice(proposed, proposed, none, np.zeros(len(states), dtype=np.bool_),
-                      np.full(len(states), np.inf))
+        return Choice(
+            proposed,
+            proposed,
+            none,
+            np.zeros(len(states), dtype=np.bool_),
+            np.full(len(states), np.inf),
+        )
     decision = shield.decide_batch(states, adapter.shaped(proposed))
-    return Choice(proposed, adapter.columns(decision.executed), decision.rules,
-                  decision.intervened, decision.margin)
+    return Choice(
+        proposed,
+        adapter.columns(decision.executed),
+        decision.rules,
+        decision.intervened,
+        decision.margin,
+    )
 
 
 def check_environment(env_id: str, shield: Shield | None) -> SpaceAdapter:

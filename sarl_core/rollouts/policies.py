@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,9 +214,7 @@ class MlpPolicy:
         """
         logits = self.outputs(observations).astype(np.float64)
         shifted = logits - logits.max(axis=1, keepdims=True)
-        result: NDArray[np.float64] = shifted - np.log(
-            np.exp(shifted).sum(axis=1, keepdims=True)
-        )
+        result: NDArray[np.float64] = shifted - np.log(np.exp(shifted).sum(axis=1, keepdims=True))
         return result
 
     def _labels(
@@ -311,11 +309,16 @@ class MlpPolicy:
             )
         head, activation = str(arrays.get("head")), str(arrays.get("activation"))
         if head not in get_args(Head) or activation not in get_args(Activation):
-            raise InputError(f"{path} names the head {head!r} and activation {activation!r}, "
-                             "of which this version does not know both; export it again")
+            raise InputError(
+                f"{path} names the head {head!r} and activation {activation!r}, "
+                "of which this version does not know both; export it again"
+            )
         try:
-            return cls(activation=activation, head=head,  # type: ignore[arg-type]  # checked above
-                       **_parts(arrays))
+            return cls(
+                activation=cast(Activation, activation),  # both checked above
+                head=cast(Head, head),
+                **_parts(arrays),
+            )
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise InputError(
                 f"{path} lacks a part of its policy ({error}); export the policy again"

@@ -19,7 +19,9 @@ from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.steps import concatenate
 
 SHIPPED = {
-    "CartPole-v1": "cartpole", "LunarLander-v3": "lunar_lander", "Pendulum-v1": "pendulum",
+    "CartPole-v1": "cartpole",
+    "LunarLander-v3": "lunar_lander",
+    "Pendulum-v1": "pendulum",
 }
 SHIPPED_STEPS = 15_000  # the paper's amount
 
@@ -65,8 +67,9 @@ def record(
         count = 1 if not episodes else min(_BATCH, 1 + (steps - done) * episodes // done)
         seeds = np.arange(seed + episodes, seed + episodes + count, dtype=np.int64)
         # One step more than is kept, so that this limit never shows in the recording.
-        outcomes.append(play(env_id, actor, None, seeds, batch=count, max_steps=steps + 1,
-                             keep_steps=True))
+        outcomes.append(
+            play(env_id, actor, None, seeds, batch=count, max_steps=steps + 1, keep_steps=True)
+        )
         episodes += count
         done += int(outcomes[-1].lengths.sum())
         report(progress, min(done, steps), steps)
@@ -139,23 +142,27 @@ def ship_demonstrations(
             f"no demonstrations are shipped for {env_id!r}; choose from {', '.join(SHIPPED)}"
         )
     path = folder / f"{SHIPPED[env_id]}.parquet"
-    demos = record(env_id, "expert", steps=SHIPPED_STEPS, seed=0, stochastic=True,
-                   progress=progress)
+    demos = record(
+        env_id, "expert", steps=SHIPPED_STEPS, seed=0, stochastic=True, progress=progress
+    )
     save_demonstrations(demos, path)
     summary, finished = demos.summary(), demos.episode_finished
     card = {
         "what": f"{SHIPPED_STEPS:,} steps of the shipped expert in {env_id}, actions sampled",
         "from": f"data/experts/{SHIPPED[env_id]}.npz",
         "command": f"python -m sarl_core record --env {env_id} --agent expert --stochastic "
-                   f"--steps {SHIPPED_STEPS} --seed 0 --out data/demonstrations/{path.name}",
+        f"--steps {SHIPPED_STEPS} --seed 0 --out data/demonstrations/{path.name}",
         "env_id": env_id,
         "steps": summary.steps,
         "episodes": summary.episodes,
         "episodes_finished": 0 if finished is None else int(finished.sum()),
         "mean_return": None if summary.return_mean is None else round(summary.return_mean, 2),
         "digest": demos.digest,
-        "versions": {"python": platform.python_version(), "numpy": np.__version__,
-                     "gymnasium": gymnasium.__version__},
+        "versions": {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "gymnasium": gymnasium.__version__,
+        },
         "made": datetime.now(UTC).date().isoformat(),
     }
     write_card(path.with_suffix(".json"), card)

@@ -89,8 +89,11 @@ class Replay:
         """
         if "_gif" not in self.__dict__:
             self.__dict__["_gif"] = gif_bytes(
-                len(self), lambda number: side_by_side_picture(self.panels, number, held=True),
-                self._colours, self.fps, progress=progress,
+                len(self),
+                lambda number: side_by_side_picture(self.panels, number, held=True),
+                self._colours,
+                self.fps,
+                progress=progress,
             )
         content: bytes = self.__dict__["_gif"]
         return content
@@ -197,8 +200,13 @@ def side_by_side(
 
 
 def _replay(
-    env_id: str, agent: str | Path | Agent, shields: tuple[Shield | None, ...], seed: int,
-    stochastic: bool, describe_rule: DescribeRule | None, progress: Progress | None,
+    env_id: str,
+    agent: str | Path | Agent,
+    shields: tuple[Shield | None, ...],
+    seed: int,
+    stochastic: bool,
+    describe_rule: DescribeRule | None,
+    progress: Progress | None,
 ) -> Replay:
     if seed < 0:
         raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
@@ -208,6 +216,7 @@ def _replay(
     episodes: list[Episodes] = []
     panels: list[Panel] = []
     for part, shield in enumerate(shields):
+
         def told(done: int, total: int, part: int = part) -> None:
             report(progress, done + part * total, total * len(shields))
 
@@ -218,14 +227,23 @@ def _replay(
         describe = describe_rule
         if describe is None and shield is not None:
             describe = plain_descriptions(shield.rule_set)
-        ending = "" if len(shields) == 1 and shield is None else (
-            ", shielded" if shield is not None else ", unshielded")
-        panels.append(Panel(
-            title=f"{actor.name}{ending}",
-            subtitle=f"{env_id.rsplit(':', 1)[-1]} · seed {seed}",
-            film=film, steps=episode.steps, shielded=shield is not None,
-            describe_rule=describe or str, description=describe_environment(env_id), fps=fps,
-        ))
+        ending = (
+            ""
+            if len(shields) == 1 and shield is None
+            else (", shielded" if shield is not None else ", unshielded")
+        )
+        panels.append(
+            Panel(
+                title=f"{actor.name}{ending}",
+                subtitle=f"{env_id.rsplit(':', 1)[-1]} · seed {seed}",
+                film=film,
+                steps=episode.steps,
+                shielded=shield is not None,
+                describe_rule=describe or str,
+                description=describe_environment(env_id),
+                fps=fps,
+            )
+        )
     return Replay(tuple(episodes), tuple(panels), fps)
 
 
@@ -238,6 +256,7 @@ def plain_descriptions(rule_set: RuleSet) -> DescribeRule:
     Returns:
         A function from the index of a rule to "If angle ≤ 0.1: fire main engine".
     """
+
     def describe(index: int) -> str:
         rule = rule_set.rules[index]
         parts = []

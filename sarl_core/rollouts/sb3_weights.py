@@ -96,8 +96,10 @@ def _network(state: Weights, *, discrete: bool) -> _Network:
         hidden = _layers(state, _sequence(state, "actor.latent_pi"))
         ends = _layers(state, ["actor.mu", "actor.log_std"])
         # Mean and log standard deviation side by side, as one layer.
-        last = (np.concatenate([weight for weight, _ in ends], axis=1),
-                np.concatenate([bias for _, bias in ends]))
+        last = (
+            np.concatenate([weight for weight, _ in ends], axis=1),
+            np.concatenate([bias for _, bias in ends]),
+        )
         found = _Network([*hidden, last], "squashed_gaussian", "relu")
     else:
         because = "" if other is None else f" (they hold {other!r})"
@@ -106,7 +108,8 @@ def _network(state: Weights, *, discrete: bool) -> _Network:
             "give such a .zip, or an .npz policy"
         )
     has_labels = found.head == "greedy" or (
-        found.head in ("categorical", "gaussian") and "log_std" not in state)
+        found.head in ("categorical", "gaussian") and "log_std" not in state
+    )
     if discrete != has_labels:
         raise InputError(
             "the weights are of a policy for "

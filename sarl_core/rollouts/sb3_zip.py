@@ -83,8 +83,17 @@ def _state(data: bytes, path: Path) -> dict[str, NDArray[np.float32]]:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             check_unpacked_size(archive, path)
         loaded = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
-    except (zipfile.BadZipFile, pickle.UnpicklingError, RuntimeError, EOFError, ValueError,
-            KeyError, IndexError, AttributeError, TypeError) as error:
+    except (
+        zipfile.BadZipFile,
+        pickle.UnpicklingError,
+        RuntimeError,
+        EOFError,
+        ValueError,
+        KeyError,
+        IndexError,
+        AttributeError,
+        TypeError,
+    ) as error:
         raise InputError(
             "its policy.pth holds something else than weights, and is not opened; "
             "give a file that model.save() wrote"

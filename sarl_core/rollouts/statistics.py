@@ -68,7 +68,8 @@ def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
     array = np.asarray(values, dtype=np.float64).reshape(-1)
     if len(array) == 0 or not np.isfinite(array).all():
         raise InputError(
-            "there is nothing to summarise; run at least one episode" if len(array) == 0
+            "there is nothing to summarise; run at least one episode"
+            if len(array) == 0
             else "an episode's value is NaN or infinite; check the environment's rewards"
         )
     if (array == array[0]).all():
@@ -88,7 +89,11 @@ def _bootstrap(array: NDArray[np.float64], seed: int) -> tuple[float, float]:
     from scipy.stats import bootstrap
 
     found: Any = bootstrap(
-        (array,), interquartile_mean, n_resamples=_RESAMPLES, method="percentile",
-        batch=max(1, _NUMBERS_AT_ONCE // len(array)), rng=np.random.default_rng(seed),
+        (array,),
+        interquartile_mean,
+        n_resamples=_RESAMPLES,
+        method="percentile",
+        batch=max(1, _NUMBERS_AT_ONCE // len(array)),
+        rng=np.random.default_rng(seed),
     )
     return float(found.confidence_interval.low), float(found.confidence_interval.high)

@@ -114,8 +114,11 @@ class StepTable:
         names = feature_names or [str(index) for index in range(self.observation.shape[1])]
         for index, name in enumerate(names):
             columns[f"obs_{name}"] = self.observation[:, index]
-        for title, values in (("proposed", self.proposed), ("executed", self.executed),
-                              ("rule", self.rules)):
+        for title, values in (
+            ("proposed", self.proposed),
+            ("executed", self.executed),
+            ("rule", self.rules),
+        ):
             for index in range(values.shape[1]):
                 key = title if values.shape[1] == 1 else f"{title}_{index}"
                 columns[key] = values[:, index]
@@ -133,6 +136,8 @@ def concatenate(tables: Sequence[StepTable]) -> StepTable:
         All their steps.
     """
     return StepTable(
-        **{c.name: np.concatenate([getattr(table, c.name) for table in tables])
-           for c in fields(StepTable)}
+        **{
+            c.name: np.concatenate([getattr(table, c.name) for table in tables])
+            for c in fields(StepTable)
+        }
     )

@@ -57,19 +57,43 @@ class Recipe:
 # Values after the algorithms' own papers and defaults, moved by hand until the returns were there.
 RECIPES: dict[str, Recipe] = {
     "CartPole-v1": Recipe(
-        algorithm="PPO", steps=150_000, n_envs=8, normalise=False, validation_every=10_000,
+        algorithm="PPO",
+        steps=150_000,
+        n_envs=8,
+        normalise=False,
+        validation_every=10_000,
         gamma=0.98,
-        parameters={"n_steps": 128, "batch_size": 256, "n_epochs": 10, "gae_lambda": 0.9,
-                    "learning_rate": "linear:0.001", "clip_range": 0.2},
+        parameters={
+            "n_steps": 128,
+            "batch_size": 256,
+            "n_epochs": 10,
+            "gae_lambda": 0.9,
+            "learning_rate": "linear:0.001",
+            "clip_range": 0.2,
+        },
     ),
     "LunarLander-v3": Recipe(
-        algorithm="PPO", steps=2_000_000, n_envs=16, normalise=False, validation_every=100_000,
+        algorithm="PPO",
+        steps=2_000_000,
+        n_envs=16,
+        normalise=False,
+        validation_every=100_000,
         gamma=0.999,
-        parameters={"n_steps": 1024, "batch_size": 256, "n_epochs": 6, "gae_lambda": 0.98,
-                    "learning_rate": "linear:0.0006", "clip_range": 0.2},
+        parameters={
+            "n_steps": 1024,
+            "batch_size": 256,
+            "n_epochs": 6,
+            "gae_lambda": 0.98,
+            "learning_rate": "linear:0.0006",
+            "clip_range": 0.2,
+        },
     ),
     "Pendulum-v1": Recipe(
-        algorithm="SAC", steps=20_000, n_envs=1, normalise=False, validation_every=2_500,
+        algorithm="SAC",
+        steps=20_000,
+        n_envs=1,
+        normalise=False,
+        validation_every=2_500,
         parameters={"learning_rate": 0.001, "policy_kwargs": {"net_arch": [64, 64]}},
     ),
 }
@@ -113,8 +137,9 @@ def train_expert(
     policy.save(out)
     returns = _returns(env_id, recipe, policy, episodes=100, seed=_REPORT_SEED)
     sampled = _returns(env_id, recipe, policy, episodes=100, seed=_REPORT_SEED, stochastic=True)
-    card = _card(env_id, recipe, seed, total, best_steps, returns, sampled,
-                 time.monotonic() - started, out)
+    card = _card(
+        env_id, recipe, seed, total, best_steps, returns, sampled, time.monotonic() - started, out
+    )
     write_card(out.with_suffix(".json"), card)
     return card
 
@@ -135,8 +160,10 @@ def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
     from sarl_core.rollouts.sb3_weights import policy_from_state
     from sarl_core.rollouts.spaces import label_counts
 
-    state = {name: value.detach().cpu().numpy().copy()
-             for name, value in model.policy.state_dict().items()}
+    state = {
+        name: value.detach().cpu().numpy().copy()
+        for name, value in model.policy.state_dict().items()
+    }
     normalisation = None
     env = model.get_env()
     if isinstance(env, VecNormalize) and env.norm_obs:
@@ -180,9 +207,7 @@ def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm
         start = float(rate.removeprefix("linear:"))
         parameters["learning_rate"] = lambda remaining: start * max(remaining, 0.02)
     algorithm = getattr(stable_baselines3, recipe.algorithm)
-    model = algorithm(
-        "MlpPolicy", env, seed=seed, gamma=recipe.gamma, device="cpu", **parameters
-    )
+    model = algorithm("MlpPolicy", env, seed=seed, gamma=recipe.gamma, device="cpu", **parameters)
     return model, env
 
 
@@ -222,13 +247,20 @@ def _keep_best(
 
 
 def _returns(
-    env_id: str, recipe: Recipe, policy: MlpPolicy, *, episodes: int, seed: int,
+    env_id: str,
+    recipe: Recipe,
+    policy: MlpPolicy,
+    *,
+    episodes: int,
+    seed: int,
     stochastic: bool = False,
 ) -> NDArray[np.float64]:
     import gymnasium
 
-    envs = [gymnasium.make(env_id, disable_env_checker=True, **recipe.env_parameters)
-            for _ in range(episodes)]
+    envs = [
+        gymnasium.make(env_id, disable_env_checker=True, **recipe.env_parameters)
+        for _ in range(episodes)
+    ]
     observations = np.array([env.reset(seed=seed + i)[0] for i, env in enumerate(envs)])
     generators = [np.random.default_rng(seed + i) for i in range(episodes)]
     returns = np.zeros(episodes)
@@ -250,32 +282,54 @@ def _returns(
 
 
 def _card(
-    env_id: str, recipe: Recipe, seed: int, steps: int, best_steps: int,
-    returns: NDArray[np.float64], sampled: NDArray[np.float64], seconds: float, out: Path,
+    env_id: str,
+    recipe: Recipe,
+    seed: int,
+    steps: int,
+    best_steps: int,
+    returns: NDArray[np.float64],
+    sampled: NDArray[np.float64],
+    seconds: float,
+    out: Path,
 ) -> dict[str, Any]:
     import gymnasium
     import stable_baselines3
     import torch
 
     def summary(values: NDArray[np.float64]) -> dict[str, float | int]:
-        return {"episodes": len(values), "mean": round(float(values.mean()), 2),
-                "std": round(float(values.std(ddof=1)), 2),
-                "min": round(float(values.min()), 2), "max": round(float(values.max()), 2)}
+        return {
+            "episodes": len(values),
+            "mean": round(float(values.mean()), 2),
+            "std": round(float(values.std(ddof=1)), 2),
+            "min": round(float(values.min()), 2),
+            "max": round(float(values.max()), 2),
+        }
 
     return {
         "what": f"expert for {env_id}",
         "command": f"python -m sarl_core train-expert --env {env_id} --seed {seed} --steps {steps}"
-                   f" --out data/experts/{out.name}",
-        "algorithm": recipe.algorithm, "policy": "MlpPolicy", "seed": seed, "steps": steps,
+        f" --out data/experts/{out.name}",
+        "algorithm": recipe.algorithm,
+        "policy": "MlpPolicy",
+        "seed": seed,
+        "steps": steps,
         "kept_after_steps": best_steps,
         "kept_by": f"mean of 50 episodes, seeds {_VALIDATION_SEED} and up",
-        "n_envs": recipe.n_envs, "normalised": recipe.normalise, "gamma": recipe.gamma,
+        "n_envs": recipe.n_envs,
+        "normalised": recipe.normalise,
+        "gamma": recipe.gamma,
         "parameters": dict(recipe.parameters),
         "environment_parameters": dict(recipe.env_parameters),
         "report_seeds": f"{_REPORT_SEED} and up",
-        "returns_deterministic": summary(returns), "returns_sampled": summary(sampled),
-        "versions": {"python": platform.python_version(), "numpy": np.__version__,
-                     "gymnasium": gymnasium.__version__, "torch": torch.__version__,
-                     "stable_baselines3": stable_baselines3.__version__},
-        "seconds": round(seconds), "made": datetime.now(UTC).date().isoformat(),
+        "returns_deterministic": summary(returns),
+        "returns_sampled": summary(sampled),
+        "versions": {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "gymnasium": gymnasium.__version__,
+            "torch": torch.__version__,
+            "stable_baselines3": stable_baselines3.__version__,
+        },
+        "seconds": round(seconds),
+        "made": datetime.now(UTC).date().isoformat(),
     }

@@ -74,8 +74,9 @@ def replacements(rule_set: RuleSet, projection: Projection) -> Replacements:
     Raises:
         InputError: If ``expert`` is asked of rules that hold no demonstrated values.
     """
-    entries = [_of_rule(rule, rule_set.actions[rule.dimension], projection)
-               for rule in rule_set.rules]
+    entries = [
+        _of_rule(rule, rule_set.actions[rule.dimension], projection) for rule in rule_set.rules
+    ]
     target, low, high = np.array(entries, dtype=np.float64).reshape(-1, 3).T
     return Replacements(target.copy(), low.copy(), high.copy())
 

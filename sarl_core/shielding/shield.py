@@ -89,8 +89,11 @@ class Shield:
         self._n_features = len(rule_set.source.features)
         self._matchers = tuple(
             Matcher.of(
-                [(index, rule) for index, rule in enumerate(rule_set.rules)
-                 if rule.dimension == dimension and rule.enabled]
+                [
+                    (index, rule)
+                    for index, rule in enumerate(rule_set.rules)
+                    if rule.dimension == dimension and rule.enabled
+                ]
             )
             for dimension in range(len(rule_set.actions))
         )
@@ -188,9 +191,7 @@ class Shield:
                     rules[broken, dimension], column[broken]
                 )
                 intervened[broken] = True
-        return BatchDecision(
-            executed.reshape(proposed.shape), proposed, rules, intervened, margin
-        )
+        return BatchDecision(executed.reshape(proposed.shape), proposed, rules, intervened, margin)
 
     def _wrong_width(self, got: int) -> InputError:
         env_id = self.rule_set.source.env_id or "another environment"

@@ -65,10 +65,14 @@ class ShieldedVecEnv(VecEnvWrapper):
         assert decision is not None
         for i, info in enumerate(infos):
             info["shield"] = StepRecord(
-                int(self._episodes[i]), int(self._steps[i]), self._states[i],
-                decision.proposed[i], decision.executed[i],
+                int(self._episodes[i]),
+                int(self._steps[i]),
+                self._states[i],
+                decision.proposed[i],
+                decision.executed[i],
                 tuple(int(rule) if rule >= 0 else None for rule in decision.rules[i]),
-                bool(decision.intervened[i]), float(decision.margin[i]),
+                bool(decision.intervened[i]),
+                float(decision.margin[i]),
             )
         if self.penalty:
             rewards = rewards - self.penalty * decision.intervened.astype(rewards.dtype)
@@ -82,9 +86,7 @@ class ShieldedVecEnv(VecEnvWrapper):
         if is_flat(space):
             self._states = np.array(observations, dtype=np.float32)
             return
-        rows = [
-            flatten(space, _row(observations, i)) for i in range(self.num_envs)
-        ]
+        rows = [flatten(space, _row(observations, i)) for i in range(self.num_envs)]
         self._states = np.array(rows, dtype=np.float32)
 
 

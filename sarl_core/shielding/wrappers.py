@@ -37,9 +37,7 @@ class StepRecord(NamedTuple):
     margin: float
 
 
-class ShieldedEnv(
-    gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs
-):
+class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
     """An environment whose every action passes through a shield.
 
     Whoever acts in it, a learner, an evaluation or a renderer, cannot do otherwise. The record
@@ -87,8 +85,14 @@ class ShieldedEnv(
         decision = self.shield.decide(state, action)
         observation, reward, terminated, truncated, info = self.env.step(decision.executed)
         info["shield"] = StepRecord(
-            self._episode, self._step, state, decision.proposed, decision.executed,
-            decision.rules, decision.intervened, decision.margin,
+            self._episode,
+            self._step,
+            state,
+            decision.proposed,
+            decision.executed,
+            decision.rules,
+            decision.intervened,
+            decision.margin,
         )
         if decision.intervened and self.penalty:
             reward = float(reward) - self.penalty
@@ -147,9 +151,14 @@ def check_fit(
         counts = None
     wanted = None if actions[0].is_interval else [action.n_labels for action in actions]
     dimensions = spaces.utils.flatdim(action_space) if counts is None else len(counts)
-    if dimensions != len(actions) or (counts is None) != (wanted is None) or (
-        counts is not None and wanted is not None
-        and any(have < need for have, need in zip(counts, wanted, strict=True))
+    if (
+        dimensions != len(actions)
+        or (counts is None) != (wanted is None)
+        or (
+            counts is not None
+            and wanted is not None
+            and any(have < need for have, need in zip(counts, wanted, strict=True))
+        )
     ):
         raise InputError(
             f"{rules_of} prescribe {_actions_in_words(wanted, len(actions))} and the environment "

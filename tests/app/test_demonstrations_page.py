@@ -18,8 +18,8 @@ def upload(app: AppTest, *files: tuple[str, bytes]) -> AppTest:
 
 
 @pytest.mark.parametrize(
-    ("data", "features", "actions"), [("lunar_lander", "8", "4"), ("cartpole", "4", "2"),
-                                      ("pendulum", "3", "1")],
+    ("data", "features", "actions"),
+    [("lunar_lander", "8", "4"), ("cartpole", "4", "2"), ("pendulum", "3", "1")],
 )
 def test_a_shipped_set_is_told_in_numbers_and_figures(
     data: str, features: str, actions: str
@@ -47,7 +47,8 @@ def test_an_upload_is_chosen_and_counted() -> None:
 def test_the_pair_of_files_is_read() -> None:
     app = upload(
         open_page("demonstrations"),
-        ("obs.csv", b"0.5;1.5\n0.25;1.0\n0.1;0.2\n"), ("actions.csv", b"0\n1\n0\n"),
+        ("obs.csv", b"0.5;1.5\n0.25;1.0\n0.1;0.2\n"),
+        ("actions.csv", b"0\n1\n0\n"),
     )
     assert not errors(app)
     assert metrics(app)["Steps"] == "3"
@@ -57,9 +58,7 @@ def test_the_pair_of_files_is_read() -> None:
 def test_three_files_are_refused() -> None:
     file = csv_bytes(*ROWS)
     app = upload(open_page("demonstrations"), ("a.csv", file), ("b.csv", file), ("c.csv", file))
-    assert errors(app) == [
-        "3 files were given; give one, or the pair of observations and actions."
-    ]
+    assert errors(app) == ["3 files were given; give one, or the pair of observations and actions."]
 
 
 @pytest.mark.parametrize("name", BAD_INPUTS)
@@ -161,13 +160,15 @@ def test_several_action_dimensions_are_coloured_by_one_of_them() -> None:
 def test_the_chosen_set_is_offered_for_download() -> None:
     app = open_page("demonstrations", data="cartpole")
     assert [button.label for button in app.download_button] == [
-        "Download as Parquet", "Download as CSV"
+        "Download as Parquet",
+        "Download as CSV",
     ]
 
 
 def test_markdown_in_names_is_text() -> None:
-    frame = pd.DataFrame({"episode": 0, "obs_*x*": [0.0, 1.0, 2.0], "obs_$y$": [1.0, 0.5, 0.1],
-                          "action": [0, 1, 0]})
+    frame = pd.DataFrame(
+        {"episode": 0, "obs_*x*": [0.0, 1.0, 2.0], "obs_$y$": [1.0, 0.5, 0.1], "action": [0, 1, 0]}
+    )
     app = upload(open_page("demonstrations"), ("odd.csv", frame.to_csv(index=False).encode()))
     assert not errors(app)
     assert any("\\*x\\*" in part.value for part in app.markdown)

@@ -26,17 +26,23 @@ def test_before_a_run_the_page_says_what_to_do() -> None:
 
 @pytest.mark.parametrize(
     ("data", "agent", "rules"),
-    [("cartpole", "novice", "at the thresholds"), ("cartpole", "expert", "filtered"),
-     ("cartpole", "untrained", "unfiltered"), ("lunar_lander", "novice", "unfiltered"),
-     ("pendulum", "novice", "at the thresholds")],
+    [
+        ("cartpole", "novice", "at the thresholds"),
+        ("cartpole", "expert", "filtered"),
+        ("cartpole", "untrained", "unfiltered"),
+        ("lunar_lander", "novice", "unfiltered"),
+        ("pendulum", "novice", "at the thresholds"),
+    ],
 )
-def test_an_agent_is_replayed_with_the_rules_and_without(
-    data: str, agent: str, rules: str
-) -> None:
+def test_an_agent_is_replayed_with_the_rules_and_without(data: str, agent: str, rules: str) -> None:
     app = run(open_page("replay", data=data, agent=agent, rules=rules, seed="3"))
     assert not errors(app)
     assert set(metrics(app)) == {
-        "Return with rules", "Return without", "Length with rules", "Length without", "Changed",
+        "Return with rules",
+        "Return without",
+        "Length with rules",
+        "Length without",
+        "Changed",
         "Covered",
     }
     assert "settings have changed" not in texts(app)
@@ -110,13 +116,15 @@ def test_twenty_episodes_are_compared() -> None:
 
 @pytest.mark.parametrize(
     ("query", "fragment"),
-    [({"env": "Nowhere-v9"}, "Nowhere-v9"),
-     ({"env": "MountainCar-v0", "agent": "expert", "rules": "none"}, "no shipped expert"),
-     ({"env": "Pendulum-v1"}, "rules"),
-     ({"data": "upload"}, "demonstrations do not say"),
-     ({"data": "upload", "env": "CartPole-v1"}, "no demonstrations to mine"),
-     ({"agent": "own file"}, "policy has been uploaded"),
-     ({"rules": "own file"}, "rule file has been uploaded")],
+    [
+        ({"env": "Nowhere-v9"}, "Nowhere-v9"),
+        ({"env": "MountainCar-v0", "agent": "expert", "rules": "none"}, "no shipped expert"),
+        ({"env": "Pendulum-v1"}, "rules"),
+        ({"data": "upload"}, "demonstrations do not say"),
+        ({"data": "upload", "env": "CartPole-v1"}, "no demonstrations to mine"),
+        ({"agent": "own file"}, "policy has been uploaded"),
+        ({"rules": "own file"}, "rule file has been uploaded"),
+    ],
 )
 def test_what_cannot_be_run_is_said_in_a_sentence(query: dict[str, str], fragment: str) -> None:
     app = run(open_page("replay", **{"data": "cartpole", **query}))
@@ -146,8 +154,13 @@ def test_an_uploaded_policy_acts() -> None:
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [("mine.npz", b"no policy"), ("mine.zip", b"PK\x03\x04"), ("mine.txt", b"?"), ("mine", b""),
-     ("lander.npz", (DATA / "experts" / "lunar_lander.npz").read_bytes())],
+    [
+        ("mine.npz", b"no policy"),
+        ("mine.zip", b"PK\x03\x04"),
+        ("mine.txt", b"?"),
+        ("mine", b""),
+        ("lander.npz", (DATA / "experts" / "lunar_lander.npz").read_bytes()),
+    ],
 )
 def test_a_bad_policy_is_refused_by_its_own_name(name: str, content: bytes) -> None:
     app = open_page("replay", data="cartpole", agent="own file")
@@ -160,7 +173,8 @@ def test_a_bad_policy_is_refused_by_its_own_name(name: str, content: bytes) -> N
 
 def test_an_uploaded_rule_file_is_in_force() -> None:
     rules = mine_rules(
-        load_demonstrations(DATA / "demonstrations" / "cartpole.parquet"), supp_min=0.0,
+        load_demonstrations(DATA / "demonstrations" / "cartpole.parquet"),
+        supp_min=0.0,
         conf_min=1.0,
     )
     app = open_page("replay", data="lunar_lander", env="CartPole-v1", rules="own file")

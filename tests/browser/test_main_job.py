@@ -161,10 +161,16 @@ def test_a_clicked_step_is_shown(screen: Page) -> None:
 
 
 def test_a_link_brings_every_choice_back(screen: Page) -> None:
-    visit(screen, "/replay?data=pendulum&divider=3&agent=expert&rules=filtered&seed=7"
-                  "&projection=clip&env=Pendulum-v1", "Replay")
+    visit(
+        screen,
+        "/replay?data=pendulum&divider=3&agent=expert&rules=filtered&seed=7"
+        "&projection=clip&env=Pendulum-v1",
+        "Replay",
+    )
     for value in ("Pendulum-v1", "expert", "filtered", "clip"):
-        assert screen.get_by_test_id("stSelectbox").filter(has_text=value).count() or \
-            screen.locator(f"input[value='{value}']").count(), value
+        assert (
+            screen.get_by_test_id("stSelectbox").filter(has_text=value).count()
+            or screen.locator(f"input[value='{value}']").count()
+        ), value
     assert screen.get_by_role("spinbutton", name="Seed").input_value() == "7"
     no_trace(screen)

@@ -10,8 +10,15 @@ from hypothesis.extra import numpy as hnp
 
 from sarl_core.demonstrations.dataset import Demonstrations
 
-SPACES = ("discrete", "discrete from 3", "multi-discrete", "one label in a vector", "continuous",
-          "continuous vector", "whole continuous")
+SPACES = (
+    "discrete",
+    "discrete from 3",
+    "multi-discrete",
+    "one label in a vector",
+    "continuous",
+    "continuous vector",
+    "whole continuous",
+)
 
 _finite = st.floats(allow_nan=False, allow_infinity=False, width=32)
 _letters = st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zs", "Zl", "Zp"))
@@ -52,7 +59,9 @@ def demonstrations(draw: st.DrawFn, space: str) -> Demonstrations:
         if draw(st.booleans()):
             fields[name] = draw(strategy)
     return Demonstrations(
-        draw(hnp.arrays(np.float32, (n, d), elements=_finite)), actions, episodes,
+        draw(hnp.arrays(np.float32, (n, d), elements=_finite)),
+        actions,
+        episodes,
         feature_names=tuple(draw(st.lists(names, min_size=d, max_size=d, unique=True))),
         feature_units=tuple(draw(st.lists(st.text(_letters, max_size=3), min_size=d, max_size=d))),
         action_names=tuple(draw(st.lists(names, min_size=m, max_size=m, unique=True))),

@@ -15,8 +15,10 @@ from tests.demonstrations.strategies import SPACES, demonstrations
 
 def example(**changes: Any) -> Demonstrations:
     fields: dict[str, Any] = {
-        "observations": np.arange(10).reshape(5, 2), "actions": np.array([0, 1, 0, 2, 0]),
-        "episodes": np.array([4, 4, 7, 7, 7]), "rewards": np.array([1.0, 2, 3, 4, 5]),
+        "observations": np.arange(10).reshape(5, 2),
+        "actions": np.array([0, 1, 0, 2, 0]),
+        "episodes": np.array([4, 4, 7, 7, 7]),
+        "rewards": np.array([1.0, 2, 3, 4, 5]),
     }
     return Demonstrations(**fields | changes)
 
@@ -28,9 +30,7 @@ def test_what_is_not_given_is_filled_in() -> None:
     assert got.steps is not None
     assert got.steps.tolist() == [0, 1, 0, 1, 2]
     assert got.features == (Feature("feature 0"), Feature("feature 1"))
-    assert got.action_dimensions == (
-        ActionDimension("action", "discrete", labels=("0", "1", "2")),
-    )
+    assert got.action_dimensions == (ActionDimension("action", "discrete", labels=("0", "1", "2")),)
     assert (got.env_id, got.agent, got.seed, got.notes) == ("", "", None, ())
     assert len(got) == 5
 
@@ -54,14 +54,20 @@ def test_whole_numbers_with_bounds_are_continuous() -> None:
 
 
 def test_unbounded_dimensions_take_the_demonstrated_values() -> None:
-    got = example(actions=np.array([[0.5, 3]] * 4 + [[1, 4]]), action_low=(-np.inf, -9),
-                  action_high=(np.inf, 9))
+    got = example(
+        actions=np.array([[0.5, 3]] * 4 + [[1, 4]]),
+        action_low=(-np.inf, -9),
+        action_high=(np.inf, 9),
+    )
     assert got.action_low == (0.5, -9)
     assert got.action_high == (1, 9)
     assert got.bounds_from == "demonstrated values"
     with pytest.raises(InputError, match=r"'action 1' is 4\.0 in row 5"):
-        example(actions=np.array([[0.5, 3]] * 4 + [[1, 4]]), action_low=(-np.inf, 0),
-                action_high=(np.inf, 3))
+        example(
+            actions=np.array([[0.5, 3]] * 4 + [[1, 4]]),
+            action_low=(-np.inf, 0),
+            action_high=(np.inf, 3),
+        )
 
 
 def test_nothing_can_be_changed() -> None:
@@ -86,52 +92,61 @@ def test_a_read_only_view_of_a_changing_array_is_copied() -> None:
     assert got.observations[4, 1] == 9
 
 
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"observations": np.zeros((0, 2))}, "no steps"),
-    ({"observations": np.zeros((5, 0))}, "no features"),
-    ({"observations": np.zeros((1, 2))}, "one observation only"),
-    ({"observations": np.zeros(5)}, "a table"),
-    ({"observations": np.zeros((5, 4, 4))}, "4x4 look like images"),
-    ({"observations": np.zeros((5, 5000))}, "5,000 features"),
-    ({"observations": np.array([["a", "b"]] * 5)}, "observations must be numbers"),
-    ({"observations": [[1, 2], [3]]}, "observations must have the same length"),
-    ({"observations": np.diag([1, 1, np.nan, 1, 1])}, "'feature 2' is not a number .* row 3"),
-    ({"observations": np.diag([1, 1, 1, 1e300, 1])}, "'feature 3' is infinite in row 4"),
-    ({"actions": np.zeros(0)}, "0 actions for 5 observations"),
-    ({"actions": np.zeros(4, int)}, "4 actions for 5 observations"),
-    ({"actions": np.zeros((5, 0))}, "no action columns"),
-    ({"actions": np.zeros((5, 1, 1))}, "one number or one vector"),
-    ({"actions": np.zeros(5, bool)}, "true or false"),
-    ({"actions": np.array(["a"] * 5)}, "actions must be numbers"),
-    ({"actions": np.array([0, 1, -1, 0, 0])}, "'action' is -1 in row 3"),
-    ({"actions": np.array([0, 1, 10_000, 0, 0])}, "'action' is 10000 in row 3"),
-    ({"actions": np.full(5, 2**64 - 1, np.uint64)}, "too large for a label"),
-    ({"actions": np.array([0, np.nan, 0, 0, 0])}, "'action' is not a number .* row 2"),
-    ({"actions": np.zeros(5), "label_names": (("a",),)}, "whole numbers of an integer type"),
-    ({"label_names": (("a", "b"),)}, "'action' is 2 in row 4, .* 0 to 1"),
-    ({"label_names": (("a", "b", "c"),) * 2}, "2 lists of label names for 1 action"),
-    ({"label_first": (0, 0)}, "2 first labels for 1 action"),
-    ({"actions": np.ones(5), "action_low": (0,)}, "one bound"),
-    ({"actions": np.ones(5), "action_low": (3,), "action_high": (2,)}, "no interval"),
-    ({"actions": np.ones(5), "action_low": (0, 0), "action_high": (2, 2)}, "2 lower bounds"),
-    ({"actions": np.ones(5), "action_low": (2,), "action_high": (3,)}, "'action' is 1.0 in row 1"),
-    ({"episodes": np.zeros(4, int)}, "4 values in column 'episode' for 5"),
-    ({"episodes": np.array([0, 0, 1, 1, 0])}, "'episode' comes back to 0 in row 5"),
-    ({"episodes": np.array([0, 0, 1, 1, -1])}, "'episode' is -1 in row 5"),
-    ({"episodes": np.array([0, 0.5, 1, 1, 2])}, "'episode' is 0.5 in row 2"),
-    ({"episodes": np.array([0, 0, 1, 1, 2**63], np.uint64)}, "'episode' is 9223372036854775808"),
-    ({"episodes": np.zeros((5, 1))}, "'episode' must hold one number"),
-    ({"steps": np.array([0, 1, 0, 0, 1])}, "'step' goes from 0 to 0 in row 4 within episode 7"),
-    ({"rewards": np.array([0, 1, np.inf, 0, 0])}, "'reward' is infinite in row 3"),
-    ({"rewards": np.zeros(2)}, "2 values in column 'reward'"),
-    ({"terminated": np.array([0, 1, 2, 0, 0])}, "'terminated' is 2 in row 3"),
-    ({"truncated": np.array([0, 1, np.nan, 0, 0])}, "'truncated' is not a number .* row 3"),
-    ({"feature_names": ("x",)}, "1 feature names for 2 features"),
-    ({"feature_names": ("x", "x")}, "'x' stands twice"),
-    ({"feature_names": ("x", "")}, "feature 1 has an empty name"),
-    ({"feature_units": ("m",)}, "1 feature units for 2 features"),
-    ({"action_names": ("a", "b")}, "2 action names for 1 actions"),
-])
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"observations": np.zeros((0, 2))}, "no steps"),
+        ({"observations": np.zeros((5, 0))}, "no features"),
+        ({"observations": np.zeros((1, 2))}, "one observation only"),
+        ({"observations": np.zeros(5)}, "a table"),
+        ({"observations": np.zeros((5, 4, 4))}, "4x4 look like images"),
+        ({"observations": np.zeros((5, 5000))}, "5,000 features"),
+        ({"observations": np.array([["a", "b"]] * 5)}, "observations must be numbers"),
+        ({"observations": [[1, 2], [3]]}, "observations must have the same length"),
+        ({"observations": np.diag([1, 1, np.nan, 1, 1])}, "'feature 2' is not a number .* row 3"),
+        ({"observations": np.diag([1, 1, 1, 1e300, 1])}, "'feature 3' is infinite in row 4"),
+        ({"actions": np.zeros(0)}, "0 actions for 5 observations"),
+        ({"actions": np.zeros(4, int)}, "4 actions for 5 observations"),
+        ({"actions": np.zeros((5, 0))}, "no action columns"),
+        ({"actions": np.zeros((5, 1, 1))}, "one number or one vector"),
+        ({"actions": np.zeros(5, bool)}, "true or false"),
+        ({"actions": np.array(["a"] * 5)}, "actions must be numbers"),
+        ({"actions": np.array([0, 1, -1, 0, 0])}, "'action' is -1 in row 3"),
+        ({"actions": np.array([0, 1, 10_000, 0, 0])}, "'action' is 10000 in row 3"),
+        ({"actions": np.full(5, 2**64 - 1, np.uint64)}, "too large for a label"),
+        ({"actions": np.array([0, np.nan, 0, 0, 0])}, "'action' is not a number .* row 2"),
+        ({"actions": np.zeros(5), "label_names": (("a",),)}, "whole numbers of an integer type"),
+        ({"label_names": (("a", "b"),)}, "'action' is 2 in row 4, .* 0 to 1"),
+        ({"label_names": (("a", "b", "c"),) * 2}, "2 lists of label names for 1 action"),
+        ({"label_first": (0, 0)}, "2 first labels for 1 action"),
+        ({"actions": np.ones(5), "action_low": (0,)}, "one bound"),
+        ({"actions": np.ones(5), "action_low": (3,), "action_high": (2,)}, "no interval"),
+        ({"actions": np.ones(5), "action_low": (0, 0), "action_high": (2, 2)}, "2 lower bounds"),
+        (
+            {"actions": np.ones(5), "action_low": (2,), "action_high": (3,)},
+            "'action' is 1.0 in row 1",
+        ),
+        ({"episodes": np.zeros(4, int)}, "4 values in column 'episode' for 5"),
+        ({"episodes": np.array([0, 0, 1, 1, 0])}, "'episode' comes back to 0 in row 5"),
+        ({"episodes": np.array([0, 0, 1, 1, -1])}, "'episode' is -1 in row 5"),
+        ({"episodes": np.array([0, 0.5, 1, 1, 2])}, "'episode' is 0.5 in row 2"),
+        (
+            {"episodes": np.array([0, 0, 1, 1, 2**63], np.uint64)},
+            "'episode' is 9223372036854775808",
+        ),
+        ({"episodes": np.zeros((5, 1))}, "'episode' must hold one number"),
+        ({"steps": np.array([0, 1, 0, 0, 1])}, "'step' goes from 0 to 0 in row 4 within episode 7"),
+        ({"rewards": np.array([0, 1, np.inf, 0, 0])}, "'reward' is infinite in row 3"),
+        ({"rewards": np.zeros(2)}, "2 values in column 'reward'"),
+        ({"terminated": np.array([0, 1, 2, 0, 0])}, "'terminated' is 2 in row 3"),
+        ({"truncated": np.array([0, 1, np.nan, 0, 0])}, "'truncated' is not a number .* row 3"),
+        ({"feature_names": ("x",)}, "1 feature names for 2 features"),
+        ({"feature_names": ("x", "x")}, "'x' stands twice"),
+        ({"feature_names": ("x", "")}, "feature 1 has an empty name"),
+        ({"feature_units": ("m",)}, "1 feature units for 2 features"),
+        ({"action_names": ("a", "b")}, "2 action names for 1 actions"),
+    ],
+)
 def test_what_is_inconsistent_is_refused_in_one_sentence(
     changes: dict[str, Any], message: str
 ) -> None:
@@ -187,14 +202,27 @@ def test_select_what_there_is(wanted: list[int], message: str) -> None:
         example().select(wanted)
 
 
-@pytest.mark.parametrize("changes", [
-    {"observations": np.arange(1, 11).reshape(5, 2)}, {"actions": np.array([0, 1, 0, 2, 1])},
-    {"episodes": np.array([4, 4, 4, 7, 7])}, {"steps": np.array([0, 1, 0, 1, 3])},
-    {"rewards": None}, {"rewards": np.zeros(5)}, {"terminated": np.zeros(5)},
-    {"feature_names": ("a", "b")}, {"feature_units": ("m", "")}, {"action_names": ("a",)},
-    {"label_names": (("a", "b", "c"),)}, {"env_id": "X-v0"}, {"agent": "x"}, {"seed": 1},
-    {"notes": ("read",)}, {"actions": np.array([[0], [1], [0], [2], [0]])},
-])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"observations": np.arange(1, 11).reshape(5, 2)},
+        {"actions": np.array([0, 1, 0, 2, 1])},
+        {"episodes": np.array([4, 4, 4, 7, 7])},
+        {"steps": np.array([0, 1, 0, 1, 3])},
+        {"rewards": None},
+        {"rewards": np.zeros(5)},
+        {"terminated": np.zeros(5)},
+        {"feature_names": ("a", "b")},
+        {"feature_units": ("m", "")},
+        {"action_names": ("a",)},
+        {"label_names": (("a", "b", "c"),)},
+        {"env_id": "X-v0"},
+        {"agent": "x"},
+        {"seed": 1},
+        {"notes": ("read",)},
+        {"actions": np.array([[0], [1], [0], [2], [0]])},
+    ],
+)
 def test_digest_tells_everything_apart(changes: dict[str, Any]) -> None:
     assert example().digest == example().digest
     assert example(**changes).digest != example().digest
@@ -208,8 +236,13 @@ def test_flags_of_two_kinds_are_told_apart() -> None:
 
 def test_repr_shows_shapes() -> None:
     text = repr(example(env_id="CartPole-v1"))
-    for part in ("CartPole-v1", "observations=float32[5, 2]", "actions=int64[5]",
-                 "n_episodes=2", example(env_id="CartPole-v1").digest[:12]):
+    for part in (
+        "CartPole-v1",
+        "observations=float32[5, 2]",
+        "actions=int64[5]",
+        "n_episodes=2",
+        example(env_id="CartPole-v1").digest[:12],
+    ):
         assert part in text
     assert "truncated" not in text
 

@@ -15,8 +15,9 @@ VECTOR = spaces.Box(-1, 1, (3,), np.float32)
 
 
 class Thing(gymnasium.Env[Any, Any]):
-    def __init__(self, observation_space: Any = VECTOR, action_space: Any = None,
-                 fails: bool = False) -> None:
+    def __init__(
+        self, observation_space: Any = VECTOR, action_space: Any = None, fails: bool = False
+    ) -> None:
         if fails:
             raise RuntimeError("no licence\nsecond line")
         self.observation_space = observation_space
@@ -41,10 +42,15 @@ def register() -> Iterator[Register]:
     describe_environment.cache_clear()
 
 
-@pytest.mark.parametrize(("env_id", "features", "labels"), [
-    ("CartPole-v1", 4, 2), ("LunarLander-v3", 8, 4), ("MountainCar-v0", 2, 3),
-    ("Acrobot-v1", 6, 3),
-])
+@pytest.mark.parametrize(
+    ("env_id", "features", "labels"),
+    [
+        ("CartPole-v1", 4, 2),
+        ("LunarLander-v3", 8, 4),
+        ("MountainCar-v0", 2, 3),
+        ("Acrobot-v1", 6, 3),
+    ],
+)
 def test_discrete_environments_have_names(env_id: str, features: int, labels: int) -> None:
     got = describe_environment(env_id)
     assert len(got.feature_names) == len(got.feature_units) == features
@@ -55,11 +61,16 @@ def test_discrete_environments_have_names(env_id: str, features: int, labels: in
     assert (got.label_first, got.action_shape, got.action_low) == ((0,), (), None)
 
 
-@pytest.mark.parametrize(("env_id", "features", "high"), [
-    ("Pendulum-v1", 3, (2.0,)), ("MountainCarContinuous-v0", 2, (1.0,)),
-    ("LunarLanderContinuous-v3", 8, (1.0, 1.0)), ("BipedalWalker-v3", 24, (1.0,) * 4),
-    ("BipedalWalkerHardcore-v3", 24, (1.0,) * 4),
-])
+@pytest.mark.parametrize(
+    ("env_id", "features", "high"),
+    [
+        ("Pendulum-v1", 3, (2.0,)),
+        ("MountainCarContinuous-v0", 2, (1.0,)),
+        ("LunarLanderContinuous-v3", 8, (1.0, 1.0)),
+        ("BipedalWalker-v3", 24, (1.0,) * 4),
+        ("BipedalWalkerHardcore-v3", 24, (1.0,) * 4),
+    ],
+)
 def test_continuous_environments_have_names_and_bounds(
     env_id: str, features: int, high: tuple[float, ...]
 ) -> None:
@@ -75,17 +86,19 @@ def test_continuous_environments_have_names_and_bounds(
 
 def test_names_and_units_of_cart_pole() -> None:
     got = describe_environment("CartPole-v1")
-    assert got.feature_names == ("cart position", "cart velocity", "pole angle",
-                                 "pole angular velocity")
+    assert got.feature_names == (
+        "cart position",
+        "cart velocity",
+        "pole angle",
+        "pole angular velocity",
+    )
     assert got.feature_units == ("m", "m/s", "rad", "rad/s")
     assert got.label_names == (("push left", "push right"),)
     assert got.max_steps == 500
 
 
 def test_multi_discrete_with_starts(register: Register) -> None:
-    got = describe_environment(
-        register(action_space=spaces.MultiDiscrete([2, 3], start=[0, 5]))
-    )
+    got = describe_environment(register(action_space=spaces.MultiDiscrete([2, 3], start=[0, 5])))
     assert got.label_names == (("0", "1"), ("5", "6", "7"))
     assert got.label_first == (0, 5)
     assert got.action_names == ("action 0", "action 1")
@@ -106,13 +119,16 @@ def test_observations_are_flattened(register: Register) -> None:
     assert len(describe_environment(register(observation_space=space)).feature_names) == 7
 
 
-@pytest.mark.parametrize(("parameters", "message"), [
-    ({"observation_space": spaces.Box(0, 255, (8, 8, 3), np.uint8)}, "images"),
-    ({"observation_space": spaces.Sequence(VECTOR)}, "no fixed length"),
-    ({"observation_space": spaces.Box(-1, 1, (9999,))}, "9,999 features"),
-    ({"action_space": spaces.Tuple([spaces.Discrete(2)])}, "Tuple"),
-    ({"fails": True}, "cannot be made .no licence."),
-])
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"observation_space": spaces.Box(0, 255, (8, 8, 3), np.uint8)}, "images"),
+        ({"observation_space": spaces.Sequence(VECTOR)}, "no fixed length"),
+        ({"observation_space": spaces.Box(-1, 1, (9999,))}, "9,999 features"),
+        ({"action_space": spaces.Tuple([spaces.Discrete(2)])}, "Tuple"),
+        ({"fails": True}, "cannot be made .no licence."),
+    ],
+)
 def test_what_rules_cannot_be_mined_from(
     parameters: dict[str, Any], message: str, register: Register
 ) -> None:

@@ -55,8 +55,11 @@ def test_refused_in_one_sentence_from_disk_and_from_upload(name: str, tmp_path: 
 
 
 def test_the_good_files_that_the_bad_ones_are_made_from_are_read() -> None:
-    for name, content in (("demo.csv", csv_bytes(*ROWS)), ("demo.parquet", parquet_bytes()),
-                          ("demo.npz", npz_bytes(**good_arrays()))):
+    for name, content in (
+        ("demo.csv", csv_bytes(*ROWS)),
+        ("demo.parquet", parquet_bytes()),
+        ("demo.npz", npz_bytes(**good_arrays())),
+    ):
         demonstrations = read_demonstrations(content, name)
         assert demonstrations.n_episodes == 2
         assert demonstrations.actions.tolist() == [0, 1, 0, 1, 1]
@@ -124,11 +127,18 @@ def test_continuous_action_outside_the_action_space() -> None:
     assert "column 'action' is -2.25 in row 2, outside the action space [-2, 2]" in sentence(error)
 
 
-@pytest.mark.parametrize(("content", "fragment"), [
-    (csv_bytes("1,0,1", "1,0,0", header="obs_0,obs_1,action"), "2 observation columns"),
-    (csv_bytes("0,0,0,1,1,1", "1,1,1,1,1,0", header="obs_0,obs_1,obs_2,obs_3,action_0,action_1"),
-     "2 action columns"),
-])
+@pytest.mark.parametrize(
+    ("content", "fragment"),
+    [
+        (csv_bytes("1,0,1", "1,0,0", header="obs_0,obs_1,action"), "2 observation columns"),
+        (
+            csv_bytes(
+                "0,0,0,1,1,1", "1,1,1,1,1,0", header="obs_0,obs_1,obs_2,obs_3,action_0,action_1"
+            ),
+            "2 action columns",
+        ),
+    ],
+)
 def test_width_that_is_not_the_environments(content: bytes, fragment: str) -> None:
     with pytest.raises(InputError) as error:
         read_demonstrations(content, "demo.csv", env_id="CartPole-v1")
@@ -160,13 +170,16 @@ def test_rows_count_as_in_the_file_where_ends_of_episodes_are_dropped() -> None:
     assert "'action' is -4.0 in row 3" in sentence(error) or "is -4 in row 3" in sentence(error)
 
 
-@pytest.mark.parametrize(("columns", "fragment"), [
-    (ColumnMap(("obs_x", "wrong"), ("action",)), "no column 'wrong'"),
-    (ColumnMap(("obs_x", "obs_x"), ("action",)), "'obs_x' is mapped twice"),
-    (ColumnMap(("obs_x", "action"), ("action",)), "'action' is mapped twice"),
-    (ColumnMap((), ("action",)), "names no observations"),
-    (ColumnMap(("obs_x",), ()), "names no observations or no actions"),
-])
+@pytest.mark.parametrize(
+    ("columns", "fragment"),
+    [
+        (ColumnMap(("obs_x", "wrong"), ("action",)), "no column 'wrong'"),
+        (ColumnMap(("obs_x", "obs_x"), ("action",)), "'obs_x' is mapped twice"),
+        (ColumnMap(("obs_x", "action"), ("action",)), "'action' is mapped twice"),
+        (ColumnMap((), ("action",)), "names no observations"),
+        (ColumnMap(("obs_x",), ()), "names no observations or no actions"),
+    ],
+)
 def test_bad_column_map(columns: ColumnMap, fragment: str) -> None:
     with pytest.raises(InputError) as error:
         read_demonstrations(csv_bytes(*ROWS), "demo.csv", columns=columns)
@@ -206,8 +219,9 @@ def test_error_far_down_a_large_file() -> None:
         read_demonstrations(csv_bytes(*rows), "demo.csv")
 
 
-def test_environment_in_metadata_does_not_import_a_module(tmp_path: Path,
-                                                           monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_in_metadata_does_not_import_a_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "planted.py").write_text("open(__file__ + '.ran', 'w').close()")
     monkeypatch.syspath_prepend(tmp_path)
     content = parquet_bytes(metadata='{"env_id": "planted:CartPole-v1"}')

@@ -25,7 +25,11 @@ def test_delimiters_line_ends_and_byte_order_marks(
     text = newline.join((HEADER, *ROWS)).replace(",", delimiter)
     demonstrations = read_demonstrations(mark + text.encode(), "demo.csv")
     assert demonstrations.observations.tolist() == [
-        [0.5, 1.5], [0.25, 1.25], [0.125, 1.0], [0.75, 0.5], [0.0, 0.25]
+        [0.5, 1.5],
+        [0.25, 1.25],
+        [0.125, 1.0],
+        [0.75, 0.5],
+        [0.0, 0.25],
     ]
     assert demonstrations.feature_names == ("x", "y")
     assert demonstrations.episode_lengths.tolist() == [3, 2]
@@ -58,9 +62,7 @@ def test_header_of_numpy_savetxt_blank_lines_and_spaces() -> None:
 
 
 def test_no_episode_column_is_one_episode_and_said_so() -> None:
-    demonstrations = read_demonstrations(
-        csv_bytes("1,0", "2,1", header="obs_x,action"), "demo.csv"
-    )
+    demonstrations = read_demonstrations(csv_bytes("1,0", "2,1", header="obs_x,action"), "demo.csv")
     assert demonstrations.n_episodes == 1
     assert demonstrations.notes == (
         "there is no episode column, so every step belongs to one episode",
@@ -69,8 +71,15 @@ def test_no_episode_column_is_one_episode_and_said_so() -> None:
 
 def test_episodes_from_marks_or_from_step_numbers() -> None:
     marked = read_demonstrations(
-        csv_bytes("1,0,0,0", "2,1,1,0", "3,0,0,0", "4,0,0,1", "5,1,0,0",
-                  header="obs_x,action,done,timeout"), "demo.csv"
+        csv_bytes(
+            "1,0,0,0",
+            "2,1,1,0",
+            "3,0,0,0",
+            "4,0,0,1",
+            "5,1,0,0",
+            header="obs_x,action,done,timeout",
+        ),
+        "demo.csv",
     )
     assert marked.episodes.tolist() == [0, 0, 1, 1, 2]
     assert marked.terminated is not None
@@ -88,8 +97,12 @@ def test_episodes_from_marks_or_from_step_numbers() -> None:
 
 def test_names_that_differ_a_little() -> None:
     demonstrations = read_demonstrations(
-        csv_bytes("0,0,1,2,0,1.5,False,0", "0,1,3,4,1,2.5,True,1",
-                  header="Traj_ID,Timestep,x,speed,A,Rew,Dones,timeouts"), "demo.csv"
+        csv_bytes(
+            "0,0,1,2,0,1.5,False,0",
+            "0,1,3,4,1,2.5,True,1",
+            header="Traj_ID,Timestep,x,speed,A,Rew,Dones,timeouts",
+        ),
+        "demo.csv",
     )
     assert demonstrations.feature_names == ("x", "speed")
     assert demonstrations.actions.tolist() == [0, 1]
@@ -115,18 +128,14 @@ def test_row_numbers_of_a_data_frame_are_left_out() -> None:
 
 
 def test_whole_numbers_with_a_point_as_actions() -> None:
-    labels = read_demonstrations(
-        csv_bytes("1,0.0", "2,1.0", header="obs_x,action"), "demo.csv"
-    )
+    labels = read_demonstrations(csv_bytes("1,0.0", "2,1.0", header="obs_x,action"), "demo.csv")
     assert labels.is_discrete
     assert any("taken as labels" in note for note in labels.notes)
     named = read_demonstrations(
         csv_bytes("1,0.0", "2,1.0", header="obs_x,action_torque"), "demo.csv"
     )
     assert not named.is_discrete
-    negative = read_demonstrations(
-        csv_bytes("1,-1.0", "2,1.0", header="obs_x,action"), "demo.csv"
-    )
+    negative = read_demonstrations(csv_bytes("1,-1.0", "2,1.0", header="obs_x,action"), "demo.csv")
     assert not negative.is_discrete
     many = read_demonstrations(
         csv_bytes(*[f"1,{i}.0" for i in range(40)], header="obs_x,action"), "demo.csv"
@@ -141,14 +150,18 @@ def test_the_environments_space_decides() -> None:
     assert not continuous.is_discrete
     assert continuous.action_low == (-2.0,)
     assert continuous.bounds_from == "action space"
-    assert continuous.feature_names == ("cosine of the angle", "sine of the angle",
-                                        "angular velocity")
+    assert continuous.feature_names == (
+        "cosine of the angle",
+        "sine of the angle",
+        "angular velocity",
+    )
     assert continuous.feature_units == ("", "", "rad/s")
     assert continuous.action_names == ("torque",)
     assert continuous.env_id == "Pendulum-v1"
     cart = read_demonstrations(
         csv_bytes("0,0,0,0,1.0", "0,0,0,1,0.0", header="obs_0,obs_1,obs_2,obs_3,action"),
-        "demo.csv", env_id="CartPole-v1",
+        "demo.csv",
+        env_id="CartPole-v1",
     )
     assert cart.actions.tolist() == [1, 0]
     assert cart.actions.shape == (2,)
@@ -168,7 +181,8 @@ def test_columns_in_another_order_than_the_environments() -> None:
     names = ("pole angle", "cart position", "pole angular velocity", "cart velocity")
     header = ",".join([*(f"obs_{name}" for name in names), "action"])
     demonstrations = read_demonstrations(
-        csv_bytes("0.3,0.1,0.4,0.2,0", "0,0,0,0,1", header=header), "demo.csv",
+        csv_bytes("0.3,0.1,0.4,0.2,0", "0,0,0,0,1", header=header),
+        "demo.csv",
         env_id="CartPole-v1",
     )
     assert np.allclose(demonstrations.observations[0], [0.1, 0.2, 0.3, 0.4])
@@ -178,7 +192,8 @@ def test_columns_in_another_order_than_the_environments() -> None:
 
 def test_no_header_is_clear_with_the_environment() -> None:
     demonstrations = read_demonstrations(
-        csv_bytes("0.1,0.2,0.3,0.4,0", "0,0,0,0,1", header=None), "demo.csv",
+        csv_bytes("0.1,0.2,0.3,0.4,0", "0,0,0,0,1", header=None),
+        "demo.csv",
         env_id="CartPole-v1",
     )
     assert demonstrations.actions.tolist() == [0, 1]
@@ -198,8 +213,14 @@ def test_row_after_the_last_action_of_each_episode_is_dropped() -> None:
 
 def test_column_map() -> None:
     content = csv_bytes("9,1,2,0,7", "9,3,4,1,8", header="who,alpha,beta,button,seed")
-    columns = ColumnMap(("beta", "alpha"), ("button",), episode="who", reward="seed",
-                        feature_names=("b", "a"), action_names=("press",))
+    columns = ColumnMap(
+        ("beta", "alpha"),
+        ("button",),
+        episode="who",
+        reward="seed",
+        feature_names=("b", "a"),
+        action_names=("press",),
+    )
     demonstrations = read_demonstrations(content, "demo.csv", columns=columns)
     assert demonstrations.observations.tolist() == [[2, 1], [4, 3]]
     assert demonstrations.feature_names == ("b", "a")
@@ -237,7 +258,8 @@ def test_values_are_rounded_once() -> None:
 
 def test_header_of_numbers_from_a_data_frame() -> None:
     demonstrations = read_demonstrations(
-        csv_bytes("0.5,1.5,1", "0.25,2.5,0", header="0,1,2"), "demo.csv",
+        csv_bytes("0.5,1.5,1", "0.25,2.5,0", header="0,1,2"),
+        "demo.csv",
         columns=ColumnMap(("0", "1"), ("2",)),
     )
     assert demonstrations.observations.tolist() == [[0.5, 1.5], [0.25, 2.5]]

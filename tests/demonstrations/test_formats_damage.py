@@ -18,10 +18,11 @@ from sarl_core.errors import InputError
 from tests.bad_inputs import ROWS, csv_bytes, good_arrays, npz_bytes, parquet_bytes
 
 FILES = {
-    "demo.csv": csv_bytes(*ROWS), "demo.parquet": parquet_bytes(),
+    "demo.csv": csv_bytes(*ROWS),
+    "demo.parquet": parquet_bytes(),
     "demo.npz": npz_bytes(**good_arrays()),
 }
-SIGNS = b',;\n"0-.eE \t|\'xNa\r\xff\x00'
+SIGNS = b",;\n\"0-.eE \t|'xNa\r\xff\x00"
 
 
 def read_or_refused(content: bytes, name: str, env_id: str | None = None) -> None:
@@ -67,10 +68,18 @@ def test_damaged_files(name: str) -> None:
 def test_damaged_files_of_our_own(extension: str, tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     path = tmp_path / f"demo.{extension}"
-    save_demonstrations(Demonstrations(
-        rng.normal(size=(6, 3)), np.array([0, 1, 2, 0, 1, 2]), np.array([0, 0, 0, 1, 1, 1]),
-        np.ones(6), terminated=np.zeros(6), env_id="X-v0", notes=("read",),
-    ), path)
+    save_demonstrations(
+        Demonstrations(
+            rng.normal(size=(6, 3)),
+            np.array([0, 1, 2, 0, 1, 2]),
+            np.array([0, 0, 0, 1, 1, 1]),
+            np.ones(6),
+            terminated=np.zeros(6),
+            env_id="X-v0",
+            notes=("read",),
+        ),
+        path,
+    )
     content = path.read_bytes()
     for _ in range(400):
         read_or_refused(damaged(content, rng), path.name)
@@ -78,22 +87,29 @@ def test_damaged_files_of_our_own(extension: str, tmp_path: Path) -> None:
 
 _values: st.SearchStrategy[Any] = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.sampled_from(["", "x", "y", "a"]),
-    lambda inner: st.lists(inner, max_size=3)
-    | st.dictionaries(st.sampled_from(["name", "unit", "x"]), inner, max_size=2),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(["name", "unit", "x"]), inner, max_size=2)
+    ),
     max_leaves=6,
 )
-_metadata = st.fixed_dictionaries({}, optional={
-    "env_id": st.sampled_from(["", "CartPole-v1", "Pendulum-v1", "x:y", "No-v0"]) | _values,
-    "agent": _values, "seed": _values, "version": st.just(1) | _values,
-    "features": st.just([{"name": "x"}, {"name": "y", "unit": "m"}]) | _values,
-    "action_names": st.sampled_from([["push"], ["a", "b"], [], ["push", "push"]]) | _values,
-    "label_names": st.sampled_from([[["l", "r"]], [[]], [["l"], ["r"]], [["l"]]]) | _values,
-    "label_first": st.sampled_from([[0], [1], [0, 0], [10**30]]) | _values,
-    "action_low": st.sampled_from([[0], [-1.0, 0], [2], [10**400]]) | _values,
-    "action_high": st.sampled_from([[1], [1.0, 3], [0]]) | _values,
-    "bounds_from": st.sampled_from(["action space", "demonstrated values"]) | _values,
-    "notes": st.just(["read"]) | _values,
-})
+_metadata = st.fixed_dictionaries(
+    {},
+    optional={
+        "env_id": st.sampled_from(["", "CartPole-v1", "Pendulum-v1", "x:y", "No-v0"]) | _values,
+        "agent": _values,
+        "seed": _values,
+        "version": st.just(1) | _values,
+        "features": st.just([{"name": "x"}, {"name": "y", "unit": "m"}]) | _values,
+        "action_names": st.sampled_from([["push"], ["a", "b"], [], ["push", "push"]]) | _values,
+        "label_names": st.sampled_from([[["l", "r"]], [[]], [["l"], ["r"]], [["l"]]]) | _values,
+        "label_first": st.sampled_from([[0], [1], [0, 0], [10**30]]) | _values,
+        "action_low": st.sampled_from([[0], [-1.0, 0], [2], [10**400]]) | _values,
+        "action_high": st.sampled_from([[1], [1.0, 3], [0]]) | _values,
+        "bounds_from": st.sampled_from(["action space", "demonstrated values"]) | _values,
+        "notes": st.just(["read"]) | _values,
+    },
+)
 
 
 def test_labels_without_their_first_start_at_zero() -> None:
@@ -126,13 +142,33 @@ def test_any_metadata(metadata: dict[str, Any], env_id: str | None) -> None:
 
 
 _field = st.sampled_from(["0", "1", "2.5", "-1", "", "nan", "x", "0,5", "true", '"', "1e39", " 3 "])
-_name = st.sampled_from(["obs_0", "obs_1", "obs_2", "x", "action", "action_a", "episode", "step",
-                         "done", "", "0", "next_obs", "reward", "#"])
+_name = st.sampled_from(
+    [
+        "obs_0",
+        "obs_1",
+        "obs_2",
+        "x",
+        "action",
+        "action_a",
+        "episode",
+        "step",
+        "done",
+        "",
+        "0",
+        "next_obs",
+        "reward",
+        "#",
+    ]
+)
 
 
 @settings(max_examples=400, deadline=None)
-@given(names=st.lists(_name, max_size=5), rows=st.lists(st.lists(_field, max_size=5), max_size=5),
-       sign=st.sampled_from([",", ";", "\t"]), name=st.sampled_from(["demo.csv", "obs.csv"]))
+@given(
+    names=st.lists(_name, max_size=5),
+    rows=st.lists(st.lists(_field, max_size=5), max_size=5),
+    sign=st.sampled_from([",", ";", "\t"]),
+    name=st.sampled_from(["demo.csv", "obs.csv"]),
+)
 def test_any_table(names: list[str], rows: list[list[str]], sign: str, name: str) -> None:
     text = "\n".join(sign.join(fields) for fields in [names, *rows])
     read_or_refused(text.encode(), name)

@@ -13,9 +13,9 @@ from tests.bad_inputs import good_arrays, npz_bytes
 def lengths_and_steps() -> tuple[list[int], np.ndarray[Any, Any], np.ndarray[Any, Any]]:
     """Three episodes, their observations (one more than actions each) and actions."""
     lengths = [3, 1, 4]
-    observations = np.concatenate([
-        100 * episode + np.arange(length + 1) for episode, length in enumerate(lengths)
-    ])[:, None].astype(np.float32)
+    observations = np.concatenate(
+        [100 * episode + np.arange(length + 1) for episode, length in enumerate(lengths)]
+    )[:, None].astype(np.float32)
     return lengths, observations, np.array([0, 1, 0, 1, 1, 0, 1, 0])
 
 
@@ -24,11 +24,17 @@ EXPECTED = [0, 1, 2, 100, 200, 201, 202, 203]
 
 def test_layout_of_imitation() -> None:
     lengths, observations, actions = lengths_and_steps()
-    demonstrations = read_demonstrations(npz_bytes(
-        obs=observations, acts=actions, indices=np.cumsum(lengths)[:-1],
-        terminal=np.array([True, False, True]), rews=np.arange(8.0),
-        infos=np.array([{}] * 8, dtype=object),
-    ), "demo.npz")
+    demonstrations = read_demonstrations(
+        npz_bytes(
+            obs=observations,
+            acts=actions,
+            indices=np.cumsum(lengths)[:-1],
+            terminal=np.array([True, False, True]),
+            rews=np.arange(8.0),
+            infos=np.array([{}] * 8, dtype=object),
+        ),
+        "demo.npz",
+    )
     assert demonstrations.observations[:, 0].tolist() == EXPECTED
     assert demonstrations.actions.tolist() == actions.tolist()
     assert demonstrations.episode_lengths.tolist() == lengths
@@ -41,10 +47,16 @@ def test_layout_of_imitation() -> None:
 
 def test_layout_of_stable_baselines() -> None:
     starts = np.array([1, 0, 0, 1, 1, 0, 0, 0], bool)
-    demonstrations = read_demonstrations(npz_bytes(
-        obs=np.array(EXPECTED, float)[:, None], actions=np.array([[0, 1, 0, 1, 1, 0, 1, 0]]).T,
-        rewards=np.ones((8, 1)), episode_returns=np.array([3.0, 1, 4]), episode_starts=starts,
-    ), "demo.npz")
+    demonstrations = read_demonstrations(
+        npz_bytes(
+            obs=np.array(EXPECTED, float)[:, None],
+            actions=np.array([[0, 1, 0, 1, 1, 0, 1, 0]]).T,
+            rewards=np.ones((8, 1)),
+            episode_returns=np.array([3.0, 1, 4]),
+            episode_starts=starts,
+        ),
+        "demo.npz",
+    )
     assert demonstrations.actions.shape == (8,)
     assert demonstrations.episode_lengths.tolist() == [3, 1, 4]
     assert demonstrations.episode_returns is not None
@@ -56,10 +68,15 @@ def test_layout_of_d4rl(extra: bool) -> None:
     _, observations, _ = lengths_and_steps()
     ends = np.array([0, 0, 1, 0, 0, 0, 0, 1])
     timeouts = np.array([0, 0, 0, 1, 0, 0, 0, 0], bool)
-    demonstrations = read_demonstrations(npz_bytes(
-        observations=observations if extra else np.array(EXPECTED, float)[:, None],
-        actions=np.linspace(-1, 1, 16).reshape(8, 2), terminals=ends, timeouts=timeouts,
-    ), "demo.npz")
+    demonstrations = read_demonstrations(
+        npz_bytes(
+            observations=observations if extra else np.array(EXPECTED, float)[:, None],
+            actions=np.linspace(-1, 1, 16).reshape(8, 2),
+            terminals=ends,
+            timeouts=timeouts,
+        ),
+        "demo.npz",
+    )
     assert demonstrations.observations[:, 0].tolist() == EXPECTED
     assert demonstrations.episode_lengths.tolist() == [3, 1, 4]
     assert demonstrations.actions.dtype == np.float32
@@ -78,7 +95,8 @@ def test_one_episode_with_its_last_observation() -> None:
 
 def test_environment_decides_and_names() -> None:
     demonstrations = read_demonstrations(
-        npz_bytes(obs=np.zeros((3, 4)), acts=np.array([[0.0], [1.0], [1.0]])), "demo.npz",
+        npz_bytes(obs=np.zeros((3, 4)), acts=np.array([[0.0], [1.0], [1.0]])),
+        "demo.npz",
         env_id="CartPole-v1",
     )
     assert demonstrations.actions.tolist() == [0, 1, 1]
@@ -95,21 +113,24 @@ def test_floats_are_continuous() -> None:
     assert demonstrations.bounds_from == "demonstrated values"
 
 
-@pytest.mark.parametrize(("arrays", "fragment"), [
-    ({"indices": np.array([2, 2])}, "'indices'"),
-    ({"indices": np.array([9])}, "'indices'"),
-    ({"indices": np.array([0.5])}, "'indices'"),
-    ({"indices": np.array([1], np.uint8)}, ""),
-    ({"episode_starts": np.array([1, 0])}, "'episode_starts'"),
-    ({"episode_starts": np.full(5, 7)}, "'episode_starts'"),
-    ({"terminals": np.zeros(3)}, "'terminals'"),
-    ({"rewards": np.zeros((5, 2))}, "'rewards'"),
-    ({"rewards": np.array([0, 0, np.inf, 0, 0])}, "'rewards' is infinite in row 3"),
-    ({"actions": np.array(3)}, "single number"),
-    ({"actions": np.zeros((5, 0))}, "no steps"),
-    ({"observations": np.zeros((5, 0))}, "no steps"),
-    ({"observations": np.zeros(5, complex)}, "no numbers"),
-])
+@pytest.mark.parametrize(
+    ("arrays", "fragment"),
+    [
+        ({"indices": np.array([2, 2])}, "'indices'"),
+        ({"indices": np.array([9])}, "'indices'"),
+        ({"indices": np.array([0.5])}, "'indices'"),
+        ({"indices": np.array([1], np.uint8)}, ""),
+        ({"episode_starts": np.array([1, 0])}, "'episode_starts'"),
+        ({"episode_starts": np.full(5, 7)}, "'episode_starts'"),
+        ({"terminals": np.zeros(3)}, "'terminals'"),
+        ({"rewards": np.zeros((5, 2))}, "'rewards'"),
+        ({"rewards": np.array([0, 0, np.inf, 0, 0])}, "'rewards' is infinite in row 3"),
+        ({"actions": np.array(3)}, "single number"),
+        ({"actions": np.zeros((5, 0))}, "no steps"),
+        ({"observations": np.zeros((5, 0))}, "no steps"),
+        ({"observations": np.zeros(5, complex)}, "no numbers"),
+    ],
+)
 def test_bad_layouts(arrays: dict[str, Any], fragment: str) -> None:
     given = {key: value for key, value in good_arrays().items() if key != "episodes"}
     content = npz_bytes(**given | arrays)

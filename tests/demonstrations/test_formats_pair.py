@@ -17,17 +17,25 @@ OBSERVATIONS = b"0.5;1.5;-1e-3;2\n0.25;1.25;0;3\n0.125;1;0;4\n"
 ACTIONS = b"0\n1\n1\n"
 
 
-def write(folder: Path, observations: bytes = OBSERVATIONS, actions: bytes = ACTIONS,
-          names: tuple[str, str] = ("obs.csv", "actions.csv")) -> Path:
+def write(
+    folder: Path,
+    observations: bytes = OBSERVATIONS,
+    actions: bytes = ACTIONS,
+    names: tuple[str, str] = ("obs.csv", "actions.csv"),
+) -> Path:
     (folder / names[0]).write_bytes(observations)
     (folder / names[1]).write_bytes(actions)
     return folder
 
 
-@pytest.mark.parametrize("names", [
-    ("obs.csv", "actions.csv"), ("obs_train.csv", "actions_train.csv"),
-    ("cart-observations.csv", "cart-actions.csv"),
-])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("obs.csv", "actions.csv"),
+        ("obs_train.csv", "actions_train.csv"),
+        ("cart-observations.csv", "cart-actions.csv"),
+    ],
+)
 def test_from_either_file_from_the_folder_and_from_uploads(
     names: tuple[str, str], tmp_path: Path
 ) -> None:
@@ -35,7 +43,8 @@ def test_from_either_file_from_the_folder_and_from_uploads(
     expected = np.array([[0.5, 1.5, -1e-3, 2], [0.25, 1.25, 0, 3], [0.125, 1, 0, 4]], np.float32)
     contents = [(OBSERVATIONS, names[0]), (ACTIONS, names[1])]
     loaded = [
-        load_demonstrations(tmp_path / names[0]), load_demonstrations(tmp_path / names[1]),
+        load_demonstrations(tmp_path / names[0]),
+        load_demonstrations(tmp_path / names[1]),
         load_demonstrations(tmp_path),
         read_demonstrations(*contents[0], companion=contents[1]),
         read_demonstrations(*contents[1], companion=contents[0]),
@@ -76,21 +85,25 @@ def test_one_observation_more_than_actions(tmp_path: Path) -> None:
     assert any("dropped" in note for note in demonstrations.notes)
 
 
-@pytest.mark.parametrize(("observations", "actions", "fragments"), [
-    (OBSERVATIONS, b"0\n", ("1 actions for 3 observations", "obs.csv", "actions.csv")),
-    (OBSERVATIONS, b"0\n1\n1\n1\n", ("4 actions for 3 observations",)),
-    (OBSERVATIONS, b"", ("actions.csv: it is empty",)),
-    (b"", ACTIONS, ("obs.csv: it is empty",)),
-    (b"1;2\n3\n4;5\n", ACTIONS, ("obs.csv: row 2 (line 2) has 1 fields in place of 2",)),
-    (b"1;2\n3;x\n4;5\n", ACTIONS, ("obs.csv: column 'column 2' holds 'x' in row 2",)),
-    (b"1;2\n3;nan\n4;5\n", ACTIONS, ("'column 2' of", "obs.csv is not a number", "row 2")),
-    (OBSERVATIONS, b"0\n1\nleft\n", ("actions.csv: column 'column 1' holds 'left' in row 3",)),
-    (OBSERVATIONS, b"0\n-1\n0\n", ("'column 1' of", "actions.csv is -1 in row 2")),
-    (b"\xff\xfe1\0", ACTIONS, ("obs.csv: it is text in UTF-16",)),
-    (b"PAR1....", ACTIONS, ("obs.csv: it is named .csv, but its content is Parquet",)),
-])
-def test_bad_pairs(observations: bytes, actions: bytes, fragments: tuple[str, ...],
-                   tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("observations", "actions", "fragments"),
+    [
+        (OBSERVATIONS, b"0\n", ("1 actions for 3 observations", "obs.csv", "actions.csv")),
+        (OBSERVATIONS, b"0\n1\n1\n1\n", ("4 actions for 3 observations",)),
+        (OBSERVATIONS, b"", ("actions.csv: it is empty",)),
+        (b"", ACTIONS, ("obs.csv: it is empty",)),
+        (b"1;2\n3\n4;5\n", ACTIONS, ("obs.csv: row 2 (line 2) has 1 fields in place of 2",)),
+        (b"1;2\n3;x\n4;5\n", ACTIONS, ("obs.csv: column 'column 2' holds 'x' in row 2",)),
+        (b"1;2\n3;nan\n4;5\n", ACTIONS, ("'column 2' of", "obs.csv is not a number", "row 2")),
+        (OBSERVATIONS, b"0\n1\nleft\n", ("actions.csv: column 'column 1' holds 'left' in row 3",)),
+        (OBSERVATIONS, b"0\n-1\n0\n", ("'column 1' of", "actions.csv is -1 in row 2")),
+        (b"\xff\xfe1\0", ACTIONS, ("obs.csv: it is text in UTF-16",)),
+        (b"PAR1....", ACTIONS, ("obs.csv: it is named .csv, but its content is Parquet",)),
+    ],
+)
+def test_bad_pairs(
+    observations: bytes, actions: bytes, fragments: tuple[str, ...], tmp_path: Path
+) -> None:
     write(tmp_path, observations, actions)
     with pytest.raises(InputError) as error:
         load_demonstrations(tmp_path)
@@ -123,7 +136,11 @@ def test_a_whole_table_may_be_called_obs() -> None:
 
 def test_no_column_map_and_no_other_formats_in_a_pair() -> None:
     with pytest.raises(InputError, match="not in a pair"):
-        read_demonstrations(OBSERVATIONS, "obs.csv", companion=(ACTIONS, "actions.csv"),
-                            columns=ColumnMap(("a",), ("b",)))
+        read_demonstrations(
+            OBSERVATIONS,
+            "obs.csv",
+            companion=(ACTIONS, "actions.csv"),
+            columns=ColumnMap(("a",), ("b",)),
+        )
     with pytest.raises(InputError, match=r"obs\.npz: .*two \.csv files"):
         read_demonstrations(OBSERVATIONS, "obs.npz", companion=(ACTIONS, "actions.csv"))

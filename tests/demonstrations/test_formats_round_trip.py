@@ -68,8 +68,11 @@ def test_columns_survive_csv(space: str, data: st.DataObject) -> None:
 @pytest.mark.parametrize("extension", ["parquet", "npz"])
 def test_names_that_are_numbers_keep_their_order(extension: str) -> None:
     original = Demonstrations(
-        np.arange(6).reshape(2, 3), np.array([[0], [1]]), np.zeros(2, int),
-        feature_names=("10", "9", "0"), action_names=("0",),
+        np.arange(6).reshape(2, 3),
+        np.array([[0], [1]]),
+        np.zeros(2, int),
+        feature_names=("10", "9", "0"),
+        action_names=("0",),
     )
     assert saved(original, f"demo.{extension}").digest == original.digest
 
@@ -99,14 +102,30 @@ def test_parquet_layout_is_the_documented_one(tmp_path: Path) -> None:
     import pyarrow.parquet as pq
 
     original = Demonstrations(
-        np.eye(2, dtype=np.float32), np.array([0, 1]), np.zeros(2, int), np.zeros(2),
-        terminated=np.zeros(2, bool), truncated=np.ones(2, bool), env_id="X-v0",
-        feature_names=("pole angle", "speed"), feature_units=("rad", ""), agent="expert", seed=3,
+        np.eye(2, dtype=np.float32),
+        np.array([0, 1]),
+        np.zeros(2, int),
+        np.zeros(2),
+        terminated=np.zeros(2, bool),
+        truncated=np.ones(2, bool),
+        env_id="X-v0",
+        feature_names=("pole angle", "speed"),
+        feature_units=("rad", ""),
+        agent="expert",
+        seed=3,
     )
     save_demonstrations(original, tmp_path / "demo.parquet")
     schema = pq.read_schema(tmp_path / "demo.parquet")
-    assert schema.names == ["episode", "step", "obs_pole angle", "obs_speed", "action", "reward",
-                            "terminated", "truncated"]
+    assert schema.names == [
+        "episode",
+        "step",
+        "obs_pole angle",
+        "obs_speed",
+        "action",
+        "reward",
+        "terminated",
+        "truncated",
+    ]
     assert schema.field("obs_pole angle").type == pa.float32()
     metadata = json.loads(schema.metadata[b"sarl"])
     assert metadata["env_id"] == "X-v0"

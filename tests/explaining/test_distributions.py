@@ -59,12 +59,19 @@ def test_no_bin_crosses_the_edge_of_an_interval() -> None:
 
 def test_a_feature_is_told_in_three_numbers() -> None:
     demonstrations = Demonstrations(
-        np.array([[1.0, 5.0], [2.0, 5.0], [9.0, 5.0]]), np.array([0, 1, 0]), np.zeros(3),
-        feature_names=("height", "mass"), feature_units=("m", "kg"),
+        np.array([[1.0, 5.0], [2.0, 5.0], [9.0, 5.0]]),
+        np.array([0, 1, 0]),
+        np.zeros(3),
+        feature_names=("height", "mass"),
+        feature_units=("m", "kg"),
     )
     height, mass = feature_rows(demonstrations)
     assert (height.name, height.unit, height.low, height.median, height.high) == (
-        "height", "m", 1.0, 2.0, 9.0
+        "height",
+        "m",
+        1.0,
+        2.0,
+        9.0,
     )
     assert (mass.low, mass.median, mass.high) == (5.0, 5.0, 5.0)
 

@@ -73,9 +73,7 @@ def test_the_strip_marks_exactly_the_interventions(replayed: tuple[RuleSet, Step
     assert [row.name for row in rows] == ["wanted", "done", "changed"]
     assert (~np.isnan(rows[-1].labels) == steps.intervened).all()
     assert ((rows[0].labels != rows[1].labels) == steps.intervened).all()
-    figure = intervention_strip(
-        rows, step_texts(steps, rules.actions, rules), current=0
-    )
+    figure = intervention_strip(rows, step_texts(steps, rules.actions, rules), current=0)
     points = figure.data[-1]
     assert points.customdata[:, 0].tolist() == list(range(len(steps))) * 3
     assert figure.layout.hoverdistance == -1
@@ -110,8 +108,10 @@ def test_a_margin_is_told_in_words() -> None:
 
 
 def test_returns_are_drawn_for_each_run() -> None:
-    lines = [ReturnLine("with", np.array([1.0, 2.0, 3.0]), "#000000"),
-             ReturnLine("without", np.array([1.0]), "#111111")]
+    lines = [
+        ReturnLine("with", np.array([1.0, 2.0, 3.0]), "#000000"),
+        ReturnLine("without", np.array([1.0]), "#111111"),
+    ]
     figure = return_figure(lines, current=1)
     assert figure.data[0].y.tolist() == [1.0, 2.0, 3.0]
     assert figure.layout.showlegend

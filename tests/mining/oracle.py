@@ -28,7 +28,9 @@ def paths_of(learner, observations, labels):
         feature, threshold = int(tree.feature[node]), float(tree.threshold[node])
         below = observations[rows, feature] <= threshold
         descend(tree.children_left[node], (*queries, (feature, "<=", threshold)), rows[below], path)
-        descend(tree.children_right[node], (*queries, (feature, ">", threshold)), rows[~below], path)
+        descend(
+            tree.children_right[node], (*queries, (feature, ">", threshold)), rows[~below], path
+        )
 
     descend(0, (), np.arange(len(observations)), [])
     return found

@@ -67,23 +67,28 @@ def expect_cell(landscape, i, j, rules, steps):
 
 
 @settings(max_examples=120, deadline=None)
-@given(labelled_states(), THRESHOLDS, THRESHOLDS, st.sampled_from([0.0, 0.9, 1.2, 2.0]),
-       st.sampled_from([None, 0, 1, 3]))
+@given(
+    labelled_states(),
+    THRESHOLDS,
+    THRESHOLDS,
+    st.sampled_from([0.0, 0.9, 1.2, 2.0]),
+    st.sampled_from([None, 0, 1, 3]),
+)
 def test_random_trees_give_the_oracles_rules(demonstrations, supp, conf, lift, depth):
-    paths = paths_of(fit(demonstrations.observations, demonstrations.actions),
-                     demonstrations.observations, demonstrations.actions)
+    paths = paths_of(
+        fit(demonstrations.observations, demonstrations.actions),
+        demonstrations.observations,
+        demonstrations.actions,
+    )
     wanted = algorithm_1(paths, demonstrations.actions, supp, conf, lift, depth)
-    mined = mine_rules(demonstrations, supp_min=supp, conf_min=conf, lift_min=lift,
-                       max_depth=depth)
+    mined = mine_rules(demonstrations, supp_min=supp, conf_min=conf, lift_min=lift, max_depth=depth)
     assert as_set(mined.rules) == wanted
     assert len(mined.rules) == len(wanted)
 
 
 @settings(max_examples=40, deadline=None)
 @given(labelled_states(max_steps=30), st.sampled_from([0.0, 1.1]), st.sampled_from([None, 2]))
-def test_random_landscapes_are_the_oracle_in_every_cell_edges_included(
-    demonstrations, lift, depth
-):
+def test_random_landscapes_are_the_oracle_in_every_cell_edges_included(demonstrations, lift, depth):
     trees = grow_policy_trees(demonstrations)
     tree = trees[0]
     supports = _edges(tree.support)
@@ -162,6 +167,7 @@ def test_nothing_changes_before_the_next_change_and_something_at_it(demonstratio
         (0, changes.support_below, changes.support_above),
         (1, changes.confidence_below, changes.confidence_above),
     ):
+
         def at(value, axis=axis):
             return rules(value, conf) if axis == 0 else rules(supp, value)
 
@@ -192,7 +198,8 @@ def test_the_pareto_front_is_what_trying_everything_finds(demonstrations):
             if len(rules):
                 tried.add((len(rules), rules.coverage, rules.fidelity))
     best = {
-        one for one in tried
+        one
+        for one in tried
         if not any(
             other != one and other[0] <= one[0] and other[1] >= one[1] and other[2] >= one[2]
             for other in tried

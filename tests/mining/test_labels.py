@@ -29,9 +29,7 @@ def test_values_outside_are_clipped():
     assert dimension.labels_of(np.array([-7.0, 7.0])).tolist() == [0, 1]
 
 
-@pytest.mark.parametrize(
-    "bounds", [{}, {"action_low": (-np.inf,), "action_high": (np.inf,)}]
-)
+@pytest.mark.parametrize("bounds", [{}, {"action_low": (-np.inf,), "action_high": (np.inf,)}])
 def test_an_unbounded_space_is_divided_over_what_was_shown(bounds):
     (dimension,) = label_dimensions(continuous([0, 3, 9], **bounds), 3)
     assert dimension.edges == (0.0, 3.0, 6.0, 9.0)
@@ -45,8 +43,11 @@ def test_a_single_shown_value_still_gives_intervals():
 
 def test_a_discrete_space_that_starts_elsewhere_counts_from_zero():
     demonstrations = Demonstrations(
-        np.zeros((3, 1)) + [[1], [2], [3]], np.array([-1, 0, 1]), np.zeros(3, dtype=int),
-        label_names=(("left", "stay", "right"),), label_first=(-1,),
+        np.array([[1.0], [2.0], [3.0]]),
+        np.array([-1, 0, 1]),
+        np.zeros(3, dtype=int),
+        label_names=(("left", "stay", "right"),),
+        label_first=(-1,),
     )
     (dimension,) = label_dimensions(demonstrations)
     assert dimension.labels_of(demonstrations.actions).tolist() == [0, 1, 2]

@@ -35,14 +35,17 @@ def test_measures_are_those_of_the_rows(demonstrations):
         assert one.support == applies.mean()
         assert one.confidence == right.mean()
         assert one.correct == right.sum()
-        assert one.lift == pytest.approx(right.mean() / (demonstrations.actions == one.action).mean())
+        assert one.lift == pytest.approx(
+            right.mean() / (demonstrations.actions == one.action).mean()
+        )
 
 
 def test_a_continuous_rule_remembers_the_median_shown():
     observations = np.arange(8, dtype=np.float32)[:, None]
     actions = np.array([-1, -0.5, -0.25, -0.25, 0.5, 1, 1, 0.75], dtype=np.float32)[:, None]
-    demonstrations = Demonstrations(observations, actions, np.zeros(8, dtype=int),
-                                    action_low=(-1.0,), action_high=(1.0,))
+    demonstrations = Demonstrations(
+        observations, actions, np.zeros(8, dtype=int), action_low=(-1.0,), action_high=(1.0,)
+    )
     low, high = mine_rules(demonstrations, supp_min=0.0, conf_min=1.0).rules
     assert (low.demonstrated_value, high.demonstrated_value) == (-0.375, 0.875)
 
@@ -55,10 +58,13 @@ def test_a_mined_rule_knows_its_node(lander_like):
 
 @pytest.mark.parametrize(
     ("bad", "names"),
-    [({"supp_min": -0.1, "conf_min": 1}, "support"), ({"supp_min": 0, "conf_min": 1.1}, "confidence"),
-     ({"supp_min": float("nan"), "conf_min": 1}, "support"),
-     ({"supp_min": 0, "conf_min": 1, "lift_min": -1}, "lift"),
-     ({"supp_min": 0, "conf_min": 1, "max_depth": -1}, "maximum depth")],
+    [
+        ({"supp_min": -0.1, "conf_min": 1}, "support"),
+        ({"supp_min": 0, "conf_min": 1.1}, "confidence"),
+        ({"supp_min": float("nan"), "conf_min": 1}, "support"),
+        ({"supp_min": 0, "conf_min": 1, "lift_min": -1}, "lift"),
+        ({"supp_min": 0, "conf_min": 1, "max_depth": -1}, "maximum depth"),
+    ],
 )
 def test_impossible_thresholds_are_refused(lander_like, bad, names):
     with pytest.raises(InputError, match=names):

@@ -14,8 +14,9 @@ from tests.mining.strategies import labelled_states
 def test_the_arrays_say_what_scikit_learn_says(demonstrations):
     (tree,) = grow_policy_trees(demonstrations)
     learner = fit(demonstrations.observations, demonstrations.actions)
-    assert np.array_equal(tree.apply(demonstrations.observations),
-                          learner.apply(demonstrations.observations))
+    assert np.array_equal(
+        tree.apply(demonstrations.observations), learner.apply(demonstrations.observations)
+    )
     assert np.array_equal(tree.samples, learner.tree_.n_node_samples)
     # An argmax of fractions and one of counts agree: ties go to the lower label in both.
     expected = learner.classes_[learner.tree_.value[:, 0, :].argmax(axis=1)]

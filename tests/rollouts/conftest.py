@@ -39,20 +39,32 @@ TOYS = {
         spaces.MultiDiscrete([3, 2]),
     ),
     "toy/MultiBinary-v0": (
-        spaces.Tuple((spaces.Discrete(2), spaces.Box(0, 1, (1,)))), spaces.MultiBinary(3)
+        spaces.Tuple((spaces.Discrete(2), spaces.Box(0, 1, (1,)))),
+        spaces.MultiBinary(3),
     ),
     "toy/Matrix-v0": (spaces.Box(-1, 1, (3,)), spaces.Box(-2, 2, (2, 2))),
     "toy/Precise-v0": (
-        spaces.Box(-1, 1, (3,), np.float64), spaces.Box(-0.1, 0.1, (2,), np.float64)
+        spaces.Box(-1, 1, (3,), np.float64),
+        spaces.Box(-0.1, 0.1, (2,), np.float64),
     ),
-    "toy/Open-v0": (spaces.Box(-1, 1, (3,)), spaces.Box(
-        np.array([-np.inf, 1, -np.inf], np.float32), np.array([np.inf, np.inf, 2], np.float32))),
+    "toy/Open-v0": (
+        spaces.Box(-1, 1, (3,)),
+        spaces.Box(
+            np.array([-np.inf, 1, -np.inf], np.float32), np.array([np.inf, np.inf, 2], np.float32)
+        ),
+    ),
 }
 for name, (observations, actions) in TOYS.items():
-    gymnasium.register(name, entry_point=Toy, kwargs={
-        "observations": observations, "actions": actions, "steps": 40})
-gymnasium.register("toy/Endless-v0", entry_point=Toy, kwargs={
-    "observations": spaces.Box(-1, 1, (1,)), "actions": spaces.Discrete(2), "steps": 10**9})
+    gymnasium.register(
+        name,
+        entry_point=Toy,
+        kwargs={"observations": observations, "actions": actions, "steps": 40},
+    )
+gymnasium.register(
+    "toy/Endless-v0",
+    entry_point=Toy,
+    kwargs={"observations": spaces.Box(-1, 1, (1,)), "actions": spaces.Discrete(2), "steps": 10**9},
+)
 
 
 @pytest.fixture(params=sorted(TOYS))

@@ -61,7 +61,8 @@ def test_untrained_depends_on_its_seed_only() -> None:
     observations = states("LunarLander-v3", 20)
     first, again, other = (
         make_agent("untrained", "LunarLander-v3", seed=seed).policy.outputs(observations)  # type: ignore[attr-defined]
-        for seed in (5, 5, 6))
+        for seed in (5, 5, 6)
+    )
     assert (first == again).all()
     assert (first != other).any()
     assert torch.equal(before, torch.random.get_rng_state())
@@ -97,33 +98,44 @@ def test_the_expert_is_found_by_environment() -> None:
         make_agent("expert", "Acrobot-v1")
 
 
-@pytest.mark.parametrize(("spec", "sentence"), [
-    ("exprt", "there is no agent 'exprt'; give novice"),
-    ("missing.npz", "missing.npz does not exist"),
-    ("missing.zip", "missing.zip does not exist"),
-])
+@pytest.mark.parametrize(
+    ("spec", "sentence"),
+    [
+        ("exprt", "there is no agent 'exprt'; give novice"),
+        ("missing.npz", "missing.npz does not exist"),
+        ("missing.zip", "missing.zip does not exist"),
+    ],
+)
 def test_what_is_no_agent_is_named(spec: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         make_agent(spec, "CartPole-v1")
 
 
-@pytest.mark.parametrize(("env_id", "sentence"), [
-    ("Acrobot-v1", "takes 4 features and Acrobot-v1 gives 6"),
-    ("Pendulum-v1", "takes 4 features and Pendulum-v1 gives 3"),
-    ("toy/Wide-v0", "gives discrete actions and toy/Wide-v0 takes continuous ones"),
-    ("toy/Three-v0", "chooses among 2 actions and toy/Three-v0 offers 3 actions"),
-])
+@pytest.mark.parametrize(
+    ("env_id", "sentence"),
+    [
+        ("Acrobot-v1", "takes 4 features and Acrobot-v1 gives 6"),
+        ("Pendulum-v1", "takes 4 features and Pendulum-v1 gives 3"),
+        ("toy/Wide-v0", "gives discrete actions and toy/Wide-v0 takes continuous ones"),
+        ("toy/Three-v0", "chooses among 2 actions and toy/Three-v0 offers 3 actions"),
+    ],
+)
 def test_a_policy_of_another_environment_is_refused(env_id: str, sentence: str) -> None:
     from gymnasium import spaces
 
     from sarl_core.rollouts.agents import EXPERT_FOLDER
 
-    for name, actions in (("toy/Wide-v0", spaces.Box(-1, 1, (1,))),
-                          ("toy/Three-v0", spaces.Discrete(3))):
+    for name, actions in (
+        ("toy/Wide-v0", spaces.Box(-1, 1, (1,))),
+        ("toy/Three-v0", spaces.Discrete(3)),
+    ):
         if name not in gymnasium.registry:
             toy = gymnasium.spec("toy/Matrix-v0")
-            gymnasium.register(name, entry_point=toy.entry_point, kwargs={
-                "observations": spaces.Box(-1, 1, (4,)), "actions": actions, "steps": 3})
+            gymnasium.register(
+                name,
+                entry_point=toy.entry_point,
+                kwargs={"observations": spaces.Box(-1, 1, (4,)), "actions": actions, "steps": 3},
+            )
     with pytest.raises(InputError, match=sentence):
         make_agent(EXPERT_FOLDER / "cartpole.npz", env_id)
 
@@ -132,9 +144,14 @@ def test_continuous_policies_must_have_as_many_dimensions(tmp_path: object) -> N
     from pathlib import Path
 
     policy = MlpPolicy(
-        weights=(np.zeros((3, 2), np.float32),), biases=(np.zeros(2, np.float32),),
-        activation="tanh", head="gaussian", log_std=np.zeros(2, np.float32),
-        action_low=-np.ones(2, np.float32), action_high=np.ones(2, np.float32))
+        weights=(np.zeros((3, 2), np.float32),),
+        biases=(np.zeros(2, np.float32),),
+        activation="tanh",
+        head="gaussian",
+        log_std=np.zeros(2, np.float32),
+        action_low=-np.ones(2, np.float32),
+        action_high=np.ones(2, np.float32),
+    )
     path = Path(str(tmp_path)) / "two.npz"
     policy.save(path)
     with pytest.raises(InputError, match="gives 2 action dimensions and Pendulum-v1 takes 1"):

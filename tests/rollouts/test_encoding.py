@@ -22,8 +22,10 @@ def scene(number: int, size: tuple[int, int] = (41, 61)) -> np.ndarray:
 
 def read_gif(content: bytes) -> tuple[list[np.ndarray], list[int]]:
     with Image.open(io.BytesIO(content)) as image:
-        pairs = [(np.asarray(frame.convert("RGB")), int(frame.info["duration"]))
-                 for frame in ImageSequence.Iterator(image)]
+        pairs = [
+            (np.asarray(frame.convert("RGB")), int(frame.info["duration"]))
+            for frame in ImageSequence.Iterator(image)
+        ]
     return [picture for picture, _ in pairs], [duration for _, duration in pairs]
 
 
@@ -110,8 +112,14 @@ def test_an_mp4_can_be_read(tmp_path: Path) -> None:
 
 def test_many_colours_are_reduced_without_dithering() -> None:
     ramp = np.linspace(0, 255, 300).astype(np.uint8)
-    frame = np.stack([np.repeat(ramp[None], 200, axis=0), np.repeat(ramp[:200, None], 300, axis=1),
-                      np.full((200, 300), 90, np.uint8)], axis=2)
+    frame = np.stack(
+        [
+            np.repeat(ramp[None], 200, axis=0),
+            np.repeat(ramp[:200, None], 300, axis=1),
+            np.full((200, 300), 90, np.uint8),
+        ],
+        axis=2,
+    )
     palette = Palette()
     indexes = palette.indexes(frame)
     shown = palette.colours[indexes].astype(int)

@@ -15,15 +15,27 @@ from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Shield
 from sarl_core.shielding.wrappers import ShieldedEnv
 
-COLUMNS = ("episode", "step", "observation", "proposed", "executed", "rules", "intervened",
-           "margin", "reward")
+COLUMNS = (
+    "episode",
+    "step",
+    "observation",
+    "proposed",
+    "executed",
+    "rules",
+    "intervened",
+    "margin",
+    "reward",
+)
 
 
 @pytest.fixture(scope="module")
 def shields() -> dict[str, Shield]:
     return {
-        env_id: Shield(mine_rules(
-            record(env_id, "expert", steps=3_000, stochastic=True), supp_min=0.005, conf_min=0.9))
+        env_id: Shield(
+            mine_rules(
+                record(env_id, "expert", steps=3_000, stochastic=True), supp_min=0.005, conf_min=0.9
+            )
+        )
         for env_id in ("LunarLander-v3", "Pendulum-v1", "CartPole-v1")
     }
 
@@ -40,12 +52,15 @@ def same(first: Episodes, second: Episodes) -> bool:
     )
 
 
-@pytest.mark.parametrize(("env_id", "agent", "stochastic"), [
-    ("LunarLander-v3", "novice", False),
-    ("LunarLander-v3", "expert", True),
-    ("Pendulum-v1", "untrained", False),
-    ("CartPole-v1", "expert", False),
-])
+@pytest.mark.parametrize(
+    ("env_id", "agent", "stochastic"),
+    [
+        ("LunarLander-v3", "novice", False),
+        ("LunarLander-v3", "expert", True),
+        ("Pendulum-v1", "untrained", False),
+        ("CartPole-v1", "expert", False),
+    ],
+)
 def test_neither_batch_nor_processes_change_the_result(
     env_id: str, agent: str, stochastic: bool, shields: dict[str, Shield]
 ) -> None:
@@ -54,7 +69,12 @@ def test_neither_batch_nor_processes_change_the_result(
     whole = rollout(env_id, actor, **arguments)
     assert whole.interventions.sum() > 0 or agent == "expert"
     others: list[dict[str, Any]] = [
-        {"batch": 1}, {"batch": 3}, {"batch": 100}, {"jobs": 2}, {"jobs": 2, "batch": 2}]
+        {"batch": 1},
+        {"batch": 3},
+        {"batch": 100},
+        {"jobs": 2},
+        {"jobs": 2, "batch": 2},
+    ]
     for other in others:
         assert same(whole, rollout(env_id, actor, **arguments, **other)), other
 
@@ -70,9 +90,7 @@ def test_an_episode_depends_on_its_own_seed_only() -> None:
 
 
 @pytest.mark.parametrize("env_id", ["LunarLander-v3", "Pendulum-v1"])
-def test_equals_a_plain_loop_through_the_wrapper(
-    env_id: str, shields: dict[str, Shield]
-) -> None:
+def test_equals_a_plain_loop_through_the_wrapper(env_id: str, shields: dict[str, Shield]) -> None:
     """The same episode, one environment, one state at a time, in `ShieldedEnv`."""
     import gymnasium
 
@@ -105,8 +123,10 @@ def test_equals_a_plain_loop_through_the_wrapper(
         assert found.covered[index] == steps.covered.sum()
 
 
-@pytest.mark.parametrize(("env_id", "least"), [
-    ("CartPole-v1", 500.0), ("LunarLander-v3", 240.0), ("Pendulum-v1", -250.0)])
+@pytest.mark.parametrize(
+    ("env_id", "least"),
+    [("CartPole-v1", 500.0), ("LunarLander-v3", 240.0), ("Pendulum-v1", -250.0)],
+)
 def test_the_shipped_experts_are_as_good_as_their_cards(env_id: str, least: float) -> None:
     from sarl_core.rollouts.agents import shipped_experts
 
@@ -128,8 +148,15 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
     assert [row["seed"] for row in document["episodes"]] == [1, 2, 3, 4, 5]
     assert set(document["episodes"][0]) == {"seed", "return", "length", "interventions", "covered"}
     summary = document["summary"]
-    assert list(summary) == ["mean", "std", "iqm", "iqm_low", "iqm_high", "intervention_rate",
-                             "coverage"]
+    assert list(summary) == [
+        "mean",
+        "std",
+        "iqm",
+        "iqm_low",
+        "iqm_high",
+        "intervention_rate",
+        "coverage",
+    ]
     assert summary["mean"] == found.returns.mean()
     assert found.steps is not None
     assert summary["intervention_rate"] == found.steps.intervened.mean()
@@ -144,8 +171,19 @@ def test_frames(shields: dict[str, Shield]) -> None:
     assert frame["truncated"].all()
     assert found.steps is not None
     steps = found.steps.to_frame(("cos", "sin", "speed"))
-    assert list(steps.columns) == ["episode", "step", "obs_cos", "obs_sin", "obs_speed", "proposed",
-                                   "executed", "rule", "intervened", "margin", "reward"]
+    assert list(steps.columns) == [
+        "episode",
+        "step",
+        "obs_cos",
+        "obs_sin",
+        "obs_speed",
+        "proposed",
+        "executed",
+        "rule",
+        "intervened",
+        "margin",
+        "reward",
+    ]
     assert len(steps) == 600
     assert "StepTable(episode=int64[600]" in repr(found.steps)
     assert "env_id='Pendulum-v1'" in repr(found)
@@ -177,8 +215,13 @@ def test_arrays_are_read_only() -> None:
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_progress_counts_episodes_and_can_stop(jobs: int) -> None:
     calls: list[tuple[int, int]] = []
-    rollout("CartPole-v1", "novice", episodes=9, jobs=jobs,
-            progress=lambda done, total: calls.append((done, total)))
+    rollout(
+        "CartPole-v1",
+        "novice",
+        episodes=9,
+        jobs=jobs,
+        progress=lambda done, total: calls.append((done, total)),
+    )
     assert calls[-1] == (9, 9)
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
 
@@ -200,8 +243,7 @@ def test_an_endless_environment_is_truncated(monkeypatch: pytest.MonkeyPatch) ->
     assert not found.terminated.any()
 
 
-@pytest.mark.parametrize("arguments", [
-    {"episodes": 0}, {"seed": -1}, {"batch": 0}, {"jobs": 0}])
+@pytest.mark.parametrize("arguments", [{"episodes": 0}, {"seed": -1}, {"batch": 0}, {"jobs": 0}])
 def test_numbers_out_of_range_are_named(arguments: dict[str, int]) -> None:
     with pytest.raises(InputError, match=next(iter(arguments))):
         rollout("CartPole-v1", "novice", **arguments)  # type: ignore[arg-type]

@@ -33,8 +33,11 @@ def _toys() -> None:
     for name in ("MultiBinary", "MultiDiscrete"):
         if f"toy/Vector{name}-v0" not in gymnasium.registry:
             toy = gymnasium.spec(f"toy/{name}-v0")
-            gymnasium.register(f"toy/Vector{name}-v0", entry_point=toy.entry_point, kwargs={
-                **toy.kwargs, "observations": spaces.Box(-1, 1, (3,))})
+            gymnasium.register(
+                f"toy/Vector{name}-v0",
+                entry_point=toy.entry_point,
+                kwargs={**toy.kwargs, "observations": spaces.Box(-1, 1, (3,))},
+            )
 
 
 torch.set_num_threads(1)  # networks this small lose time to more
@@ -42,7 +45,8 @@ torch.set_num_threads(1)  # networks this small lose time to more
 
 def learner(algorithm: str, env_id: str, parameters: dict[str, Any], steps: int) -> Any:
     model = getattr(stable_baselines3, algorithm)(
-        "MlpPolicy", gymnasium.make(env_id), seed=1, device="cpu", **parameters)
+        "MlpPolicy", gymnasium.make(env_id), seed=1, device="cpu", **parameters
+    )
     return model.learn(steps)
 
 
@@ -117,42 +121,51 @@ def test_a_row_does_not_depend_on_the_batch(stochastic: bool) -> None:
         part = None if uniforms is None else uniforms[start:end]
         assert (agent.act(observations[start:end], part) == whole[start:end]).all()
     outputs = agent.policy.outputs(observations)  # type: ignore[attr-defined]
-    alone = np.concatenate(
-        [agent.policy.outputs(row[None]) for row in observations])  # type: ignore[attr-defined]
+    alone = np.concatenate([agent.policy.outputs(row[None]) for row in observations])  # type: ignore[attr-defined]
     assert outputs.tobytes() == alone.tobytes()
 
 
 def test_samples_with_the_policys_probabilities() -> None:
     policy = make_agent("expert", "LunarLander-v3").policy  # type: ignore[attr-defined]
     state = np.zeros((1, 8), dtype=np.float32)
-    drawn = policy.act(np.repeat(state, 50_000, axis=0),
-                       np.random.default_rng(0).random((50_000, 1)))
+    drawn = policy.act(
+        np.repeat(state, 50_000, axis=0), np.random.default_rng(0).random((50_000, 1))
+    )
     shares = np.bincount(drawn[:, 0], minlength=4) / 50_000
     assert shares == pytest.approx(np.exp(policy.log_probabilities(state)[0]), abs=0.01)
 
 
 def gaussian() -> MlpPolicy:
     return MlpPolicy(
-        weights=(np.zeros((2, 1), np.float32),), biases=(np.full(1, 0.5, np.float32),),
-        activation="tanh", head="gaussian", log_std=np.log(np.full(1, 0.25, np.float32)),
-        action_low=np.full(1, -10, np.float32), action_high=np.full(1, 10, np.float32))
+        weights=(np.zeros((2, 1), np.float32),),
+        biases=(np.full(1, 0.5, np.float32),),
+        activation="tanh",
+        head="gaussian",
+        log_std=np.log(np.full(1, 0.25, np.float32)),
+        action_low=np.full(1, -10, np.float32),
+        action_high=np.full(1, 10, np.float32),
+    )
 
 
 def test_samples_a_normal_distribution() -> None:
-    drawn = gaussian().act(np.zeros((50_000, 2), np.float32),
-                           np.random.default_rng(0).random((50_000, 1)))
+    drawn = gaussian().act(
+        np.zeros((50_000, 2), np.float32), np.random.default_rng(0).random((50_000, 1))
+    )
     assert drawn.mean() == pytest.approx(0.5, abs=0.01)
     assert drawn.std() == pytest.approx(0.25, abs=0.01)
 
 
-@pytest.mark.parametrize(("change", "sentence"), [
-    ({"weights": (), "biases": ()}, "no layers"),
-    ({"biases": (np.zeros(2, np.float32),)}, "do not fit 2 inputs"),
-    ({"weights": (np.full((2, 1), np.nan, np.float32),)}, "NaN or infinity"),
-    ({"log_std": None}, "log std is not a row of 1"),
-    ({"action_high": np.zeros(3, np.float32)}, "action high is not a row of 1"),
-    ({"head": "squashed_gaussian"}, "1 outputs where its head .* needs 2"),
-])
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"weights": (), "biases": ()}, "no layers"),
+        ({"biases": (np.zeros(2, np.float32),)}, "do not fit 2 inputs"),
+        ({"weights": (np.full((2, 1), np.nan, np.float32),)}, "NaN or infinity"),
+        ({"log_std": None}, "log std is not a row of 1"),
+        ({"action_high": np.zeros(3, np.float32)}, "action high is not a row of 1"),
+        ({"head": "squashed_gaussian"}, "1 outputs where its head .* needs 2"),
+    ],
+)
 def test_weights_that_do_not_fit_are_refused(change: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         replace(gaussian(), **change)
@@ -181,9 +194,12 @@ def test_a_bad_npz_is_one_sentence_and_runs_nothing(
         np.savez(tmp_path / "part.npz", **{k: v for k, v in arrays.items() if k != "bias_0"})
         np.savez(tmp_path / "head.npz", **{**arrays, "head": np.array("other")})
     for name, sentence in (
-        ("pickled", "cannot be read as a policy"), ("foreign", "is not a policy of this program"),
-        ("text", "cannot be read as a policy"), ("bomb", "unpacks to 257 MB"),
-        ("part", "lacks a part"), ("head", "names the head 'other'"),
+        ("pickled", "cannot be read as a policy"),
+        ("foreign", "is not a policy of this program"),
+        ("text", "cannot be read as a policy"),
+        ("bomb", "unpacks to 257 MB"),
+        ("part", "lacks a part"),
+        ("head", "names the head 'other'"),
     ):
         with pytest.raises(InputError, match=sentence):
             MlpPolicy.load(tmp_path / f"{name}.npz")

@@ -18,7 +18,8 @@ def test_records_exactly_as_many_steps_as_asked() -> None:
     assert demos.feature_units is not None
     assert demos.feature_units[4] == "rad"
     assert demos.label_names == (
-        ("do nothing", "fire left engine", "fire main engine", "fire right engine"),)
+        ("do nothing", "fire left engine", "fire main engine", "fire right engine"),
+    )
     assert (demos.env_id, demos.agent, demos.seed) == ("LunarLander-v3", "novice", 3)
 
 
@@ -53,22 +54,26 @@ def test_a_whole_number_of_episodes_is_finished() -> None:
 
 
 def test_the_first_steps_do_not_depend_on_how_many_are_asked_for() -> None:
-    short, long = (record("LunarLander-v3", "expert", steps=steps, stochastic=True)
-                   for steps in (300, 2_000))
+    short, long = (
+        record("LunarLander-v3", "expert", steps=steps, stochastic=True) for steps in (300, 2_000)
+    )
     assert short.observations.tobytes() == long.observations[:300].tobytes()
     assert short.actions.tobytes() == long.actions[:300].tobytes()
 
 
 def test_same_seed_same_digest() -> None:
-    first, again, other = (record("Pendulum-v1", "expert", steps=450, seed=seed, stochastic=True)
-                           for seed in (1, 1, 2))
+    first, again, other = (
+        record("Pendulum-v1", "expert", steps=450, seed=seed, stochastic=True) for seed in (1, 1, 2)
+    )
     assert first.digest == again.digest
     assert first.digest != other.digest
 
 
 def test_a_stochastic_policy_is_sampled() -> None:
-    greedy, sampled = (record("LunarLander-v3", "expert", steps=200, stochastic=stochastic)
-                       for stochastic in (False, True))
+    greedy, sampled = (
+        record("LunarLander-v3", "expert", steps=200, stochastic=stochastic)
+        for stochastic in (False, True)
+    )
     assert (greedy.actions != sampled.actions).any()
     policy = make_agent("expert", "LunarLander-v3")
     assert (policy.act(greedy.observations, None)[:, 0] == greedy.actions).all()
@@ -77,8 +82,9 @@ def test_a_stochastic_policy_is_sampled() -> None:
 def test_every_kind_of_space_is_recorded(toy_id: str) -> None:
     demos = record(toy_id, "novice", steps=60)
     assert len(demos) == 60
-    assert demos.is_discrete == (toy_id in (
-        "toy/Offset-v0", "toy/MultiDiscrete-v0", "toy/MultiBinary-v0"))
+    assert demos.is_discrete == (
+        toy_id in ("toy/Offset-v0", "toy/MultiDiscrete-v0", "toy/MultiBinary-v0")
+    )
     if toy_id == "toy/Offset-v0":
         assert demos.actions.shape == (60,)
         assert demos.actions.min() == -1

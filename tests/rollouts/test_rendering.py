@@ -34,8 +34,11 @@ CHANGED = np.array(OVERLAY_COLOURS[INKS.changed.full])
 @pytest.fixture(scope="module")
 def shields() -> dict[str, Shield]:
     return {
-        env_id: Shield(mine_rules(
-            record(env_id, "expert", steps=3_000, stochastic=True), supp_min=0.0, conf_min=0.9))
+        env_id: Shield(
+            mine_rules(
+                record(env_id, "expert", steps=3_000, stochastic=True), supp_min=0.0, conf_min=0.9
+            )
+        )
         for env_id in ("LunarLander-v3", "Pendulum-v1", "CartPole-v1")
     }
 
@@ -56,8 +59,17 @@ def test_renders_the_episode_that_rollout_plays(
     for name in ("returns", "lengths", "interventions", "covered", "terminated", "truncated"):
         assert getattr(rendered, name).tobytes() == getattr(played, name).tobytes(), name
     assert rendered.steps is not None
-    for name in ("episode", "step", "observation", "proposed", "executed", "rules", "intervened",
-                 "margin", "reward"):
+    for name in (
+        "episode",
+        "step",
+        "observation",
+        "proposed",
+        "executed",
+        "rules",
+        "intervened",
+        "margin",
+        "reward",
+    ):
         assert getattr(rendered.steps, name).tobytes() == getattr(played.steps, name).tobytes()
 
 
@@ -94,14 +106,13 @@ def test_a_gif_is_animated_in_real_time_and_not_blank(pair: Replay) -> None:
     assert (pictures[-1] == pair.frame(len(pair) - 1)).all()
 
 
-def test_same_seed_same_bytes(
-    tmp_path: Path, pair: Replay, shields: dict[str, Shield]
-) -> None:
+def test_same_seed_same_bytes(tmp_path: Path, pair: Replay, shields: dict[str, Shield]) -> None:
     again = side_by_side("LunarLander-v3", "novice", shields["LunarLander-v3"], seed=1)
     again.save(tmp_path / "again.gif")
     assert (tmp_path / "again.gif").read_bytes() == pair.gif()
-    first, second, other = (render_episode("CartPole-v1", "novice", seed=seed)
-                            for seed in (3, 3, 4))
+    first, second, other = (
+        render_episode("CartPole-v1", "novice", seed=seed) for seed in (3, 3, 4)
+    )
     first.save(tmp_path / "first.mp4")
     second.save(tmp_path / "second.mp4")
     assert (tmp_path / "first.mp4").read_bytes() == (tmp_path / "second.mp4").read_bytes()
@@ -138,7 +149,8 @@ def test_captions_say_what_the_step_was(pair: Replay) -> None:
     caption = shielded.caption(step)
     assert caption.mark == "CHANGED"
     assert caption.action == (
-        f"{names[steps.proposed[step, 0]]} → {names[steps.executed[step, 0]]}")
+        f"{names[steps.proposed[step, 0]]} → {names[steps.executed[step, 0]]}"
+    )
     assert caption.reason == shielded.describe_rule(int(steps.rules[step, 0]))
     assert names[steps.executed[step, 0]] in caption.reason
     agreeing = int(np.flatnonzero(steps.covered & ~steps.intervened)[0])
@@ -172,7 +184,8 @@ def test_the_sides_are_the_two_episodes(pair: Replay, shields: dict[str, Shield]
     assert [panel.title for panel in pair.panels] == ["novice, shielded", "novice, unshielded"]
     with_rules, without = (
         rollout("LunarLander-v3", "novice", shield=shield, episodes=1, seed=1).returns[0]
-        for shield in (shields["LunarLander-v3"], None))
+        for shield in (shields["LunarLander-v3"], None)
+    )
     assert [episode.returns[0] for episode in pair.episodes] == [with_rules, without]
 
 
@@ -183,8 +196,9 @@ def test_the_rules_can_be_described_otherwise(shields: dict[str, Shield]) -> Non
         asked.append(rule)
         return f"rule number {rule}"
 
-    replay = render_episode("CartPole-v1", "novice", shield=shields["CartPole-v1"],
-                            describe_rule=describe)
+    replay = render_episode(
+        "CartPole-v1", "novice", shield=shields["CartPole-v1"], describe_rule=describe
+    )
     replay.frame(0)
     assert replay.episodes[0].steps is not None
     assert asked == [int(replay.episodes[0].steps.rules[0, 0])]
@@ -214,8 +228,9 @@ def test_an_environment_without_pictures_is_one_sentence() -> None:
         render_episode("toy/Matrix-v0", "novice")
 
 
-@pytest.mark.parametrize(("name", "sentence"), [
-    ("x.png", "neither a .gif nor a .mp4"), ("no/x.gif", "does not exist")])
+@pytest.mark.parametrize(
+    ("name", "sentence"), [("x.png", "neither a .gif nor a .mp4"), ("no/x.gif", "does not exist")]
+)
 def test_a_bad_file_name_is_one_sentence(tmp_path: Path, name: str, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         check_picture_path(tmp_path / name)
@@ -230,10 +245,14 @@ def test_works_without_a_display_and_leaves_the_environment_alone() -> None:
         "assert len(render_episode('LunarLander-v3', 'novice').gif()) > 10_000\n"
         "assert found() == before\n"
     )
-    clean = {name: value for name, value in os.environ.items()
-             if not name.startswith(("SDL_", "PYGAME_", "DISPLAY", "WAYLAND"))}
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, env=clean,
-                          text=True)
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("SDL_", "PYGAME_", "DISPLAY", "WAYLAND"))
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, env=clean, text=True
+    )
     assert done.stdout == done.stderr == ""
 
 

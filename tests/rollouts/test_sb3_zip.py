@@ -56,16 +56,23 @@ def test_nothing_in_a_malicious_zip_runs(
     pickled = base64.b64encode(pickle.dumps(Boom("from_data"))).decode()
     for key in ("policy_class", "policy_kwargs", "observation_space", "lr_schedule"):
         data[key] = {":type:": "<class 'dict'>", ":serialized:": pickled}
-    in_data = rewrite(model_zip, tmp_path / "in_data.zip", data=json.dumps(data).encode(),
-                      pytorch_variables_pth=pickle.dumps(Boom("from_variables")))
+    in_data = rewrite(
+        model_zip,
+        tmp_path / "in_data.zip",
+        data=json.dumps(data).encode(),
+        pytorch_variables_pth=pickle.dumps(Boom("from_variables")),
+    )
     # Its weights are good, and its pickles stay closed: it can be used.
     observations = np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
     actions = make_agent(in_data, "CartPole-v1").act(observations, None)
     assert (actions == make_agent(model_zip, "CartPole-v1").act(observations, None)).all()
-    for number, bad in enumerate((
-        saved(Boom("from_torch_zip")), saved({"action_net.weight": Boom("from_state")}),
-        pickle.dumps(Boom("from_pickle")),
-    )):
+    for number, bad in enumerate(
+        (
+            saved(Boom("from_torch_zip")),
+            saved({"action_net.weight": Boom("from_state")}),
+            pickle.dumps(Boom("from_pickle")),
+        )
+    ):
         path = rewrite(model_zip, tmp_path / f"{number}.zip", policy_pth=bad)
         with pytest.raises(InputError, match="holds something else than weights"):
             make_agent(path, "CartPole-v1")
@@ -99,17 +106,31 @@ def test_zip_bombs_are_refused(model_zip: Path, tmp_path: Path) -> None:
         make_agent(claimed, "CartPole-v1")
 
 
-@pytest.mark.parametrize(("entries", "sentence"), [
-    ({"data": b"not json"}, "'data' is no JSON"),
-    ({"data": b"[" * 100_000}, "'data' is no JSON"),
-    ({"data": b'{"policy_kwargs": {"activation_fn": "<class \'torch.nn.ELU\'>"}}'},
-     "uses the activation ELU"),
-    ({"policy_pth": saved([1, 2])}, "holds no weights by name"),
-    ({"policy_pth": saved({"x": torch.zeros(2)})}, "not those of an MlpPolicy"),
-    ({"policy_pth": saved({"features_extractor.cnn.0.weight": torch.zeros(2),
-                           "action_net.weight": torch.zeros(2, 2)})}, "features_extractor.cnn"),
-    ({"policy_pth": saved({"action_net.weight": torch.zeros(2, 2)})}, "lack 'action_net.bias'"),
-])
+@pytest.mark.parametrize(
+    ("entries", "sentence"),
+    [
+        ({"data": b"not json"}, "'data' is no JSON"),
+        ({"data": b"[" * 100_000}, "'data' is no JSON"),
+        (
+            {"data": b'{"policy_kwargs": {"activation_fn": "<class \'torch.nn.ELU\'>"}}'},
+            "uses the activation ELU",
+        ),
+        ({"policy_pth": saved([1, 2])}, "holds no weights by name"),
+        ({"policy_pth": saved({"x": torch.zeros(2)})}, "not those of an MlpPolicy"),
+        (
+            {
+                "policy_pth": saved(
+                    {
+                        "features_extractor.cnn.0.weight": torch.zeros(2),
+                        "action_net.weight": torch.zeros(2, 2),
+                    }
+                )
+            },
+            "features_extractor.cnn",
+        ),
+        ({"policy_pth": saved({"action_net.weight": torch.zeros(2, 2)})}, "lack 'action_net.bias'"),
+    ],
+)
 def test_other_zips_are_one_sentence(
     model_zip: Path, tmp_path: Path, entries: dict[str, bytes], sentence: str
 ) -> None:
@@ -134,8 +155,9 @@ def test_what_is_no_model_is_refused(tmp_path: Path) -> None:
 def test_a_model_of_another_environment_is_refused(model_zip: Path) -> None:
     with pytest.raises(InputError, match="takes 4 features and Acrobot-v1 gives 6"):
         make_agent(model_zip, "Acrobot-v1")
-    with pytest.raises(InputError, match="a policy for discrete actions and the environment "
-                                         "takes continuous ones"):
+    with pytest.raises(
+        InputError, match="a policy for discrete actions and the environment takes continuous ones"
+    ):
         make_agent(model_zip, "Pendulum-v1")
     with pytest.raises(InputError, match="2 outputs where the environment's actions need 5"):
         make_agent(model_zip, "toy/MultiDiscrete-v0")

@@ -23,7 +23,12 @@ def test_interquartile_mean_along_an_axis() -> None:
 def test_without_spread_the_interval_is_the_value(values: list[float]) -> None:
     found = summarise(values)
     assert (found.mean, found.std, found.iqm, found.low, found.high) == (
-        values[0], 0.0, values[0], values[0], values[0])
+        values[0],
+        0.0,
+        values[0],
+        values[0],
+        values[0],
+    )
 
 
 def test_nearly_equal_values_are_no_trouble() -> None:

@@ -20,8 +20,7 @@ def scan(rules, state, dimension):
         if rule.dimension != dimension or not rule.enabled:
             continue
         if all(
-            (np.float64(state[c.feature]) <= c.threshold) == (c.op == "<=")
-            for c in rule.conditions
+            (np.float64(state[c.feature]) <= c.threshold) == (c.op == "<=") for c in rule.conditions
         ):
             return number
     return None
@@ -77,14 +76,25 @@ def test_the_tree_and_the_shield_agree_bit_for_bit(demonstrations):
     found = Shield(rules).decide_batch(states, np.zeros(len(states), dtype=int)).rules[:, 0]
     leaves = tree.apply(states)
     for leaf, number in zip(leaves, found, strict=True):
-        on_path = [n for n, rule in enumerate(rules.rules)
-                   if int(rule.id.split(".")[1]) in tree.path(leaf)]
+        on_path = [
+            n for n, rule in enumerate(rules.rules) if int(rule.id.split(".")[1]) in tree.path(leaf)
+        ]
         assert on_path == ([] if number < 0 else [number])
 
 
 def manual(name, conditions, action, **kwargs):
-    return Rule(name, 0, tuple(Condition(*c) for c in conditions), action, 0.1, 1.0, 1.0, 5,
-                origin="manual", **kwargs)
+    return Rule(
+        name,
+        0,
+        tuple(Condition(*c) for c in conditions),
+        action,
+        0.1,
+        1.0,
+        1.0,
+        5,
+        origin="manual",
+        **kwargs,
+    )
 
 
 def test_rules_of_a_person_come_first_in_their_order_and_disabled_ones_not_at_all(lander_like):
@@ -138,8 +148,13 @@ def joints():
     rng = np.random.default_rng(3)
     observations = rng.normal(size=(1500, 3)).astype(np.float32)
     actions = np.tanh(observations[:, :2] + 0.1 * rng.normal(size=(1500, 2))).astype(np.float32)
-    return Demonstrations(observations, actions, np.zeros(1500, dtype=int),
-                          action_low=(-1.0, -1.0), action_high=(1.0, 1.0))
+    return Demonstrations(
+        observations,
+        actions,
+        np.zeros(1500, dtype=int),
+        action_low=(-1.0, -1.0),
+        action_high=(1.0, 1.0),
+    )
 
 
 @pytest.mark.parametrize("projection", ["centre", "clip", "expert"])
@@ -177,7 +192,8 @@ def test_a_replaced_action_carries_the_rules_label(joints, projection, divider):
             else:
                 low, high = rules.actions[dimension].edges[rule.action : rule.action + 2]
                 assert abs(after - before) == pytest.approx(
-                    min(abs(before - low), abs(before - high)), abs=1e-6)
+                    min(abs(before - low), abs(before - high)), abs=1e-6
+                )
 
 
 def test_clip_never_lands_on_the_wrong_side_of_an_edge():
@@ -185,7 +201,9 @@ def test_clip_never_lands_on_the_wrong_side_of_an_edge():
     demonstrations = Demonstrations(
         np.arange(6, dtype=np.float32)[:, None],
         np.array([[-0.9], [-0.8], [0.0], [0.1], [0.9], [0.8]], dtype=np.float32),
-        np.zeros(6, dtype=int), action_low=(-1.0,), action_high=(1.0,),
+        np.zeros(6, dtype=int),
+        action_low=(-1.0,),
+        action_high=(1.0,),
     )
     rules = mine_rules(demonstrations, supp_min=0.0, conf_min=1.0, divider=3)
     shield = Shield(rules, projection="clip")

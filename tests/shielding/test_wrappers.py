@@ -111,8 +111,8 @@ def test_our_own_code_never_steps_around_a_wrapper():
 
 
 @pytest.mark.parametrize(
-    ("env_id", "name"), [("CartPole-v1", "cartpole"), ("LunarLander-v3", "lunar_lander"),
-                         ("Pendulum-v1", "pendulum")]
+    ("env_id", "name"),
+    [("CartPole-v1", "cartpole"), ("LunarLander-v3", "lunar_lander"), ("Pendulum-v1", "pendulum")],
 )
 def test_the_checkers_of_gymnasium_and_stable_baselines_pass(env_id, name):
     env = ShieldedEnv(gymnasium.make(env_id, disable_env_checker=True), shield_for(name))
@@ -139,7 +139,8 @@ def test_the_record_says_what_happened(cartpole):
 
 def test_the_vectorised_wrapper_is_the_single_one_side_by_side(cartpole):
     venv = ShieldedVecEnv(
-        DummyVecEnv([lambda: gymnasium.make("CartPole-v1") for _ in range(2)]), cartpole,
+        DummyVecEnv([lambda: gymnasium.make("CartPole-v1") for _ in range(2)]),
+        cartpole,
         penalty=0.5,
     )
     venv.seed(5)
@@ -157,7 +158,12 @@ def test_the_vectorised_wrapper_is_the_single_one_side_by_side(cartpole):
             ours, theirs = info["shield"], infos[i]["shield"]
             assert np.array_equal(ours.observation, theirs.observation)
             assert (ours.episode, ours.step, ours.rules, ours.intervened, ours.margin) == (
-                theirs.episode, theirs.step, theirs.rules, theirs.intervened, theirs.margin)
+                theirs.episode,
+                theirs.step,
+                theirs.rules,
+                theirs.intervened,
+                theirs.margin,
+            )
             assert ours.executed == theirs.executed
             assert rewards[i] == reward
             assert dones[i] == (terminated or truncated)
@@ -186,8 +192,12 @@ def demonstrations_in(env_id, steps=400):
             observation, _ = env.reset()
             episode += 1
     return Demonstrations(
-        np.array(rows, dtype=np.float32), np.array(actions), np.array(episodes),
-        label_names=about.label_names, label_first=about.label_first, env_id=env_id,
+        np.array(rows, dtype=np.float32),
+        np.array(actions),
+        np.array(episodes),
+        label_names=about.label_names,
+        label_first=about.label_first,
+        env_id=env_id,
     )
 
 
@@ -207,7 +217,8 @@ def test_discrete_and_tuple_observations_are_flattened(env_id):
 
 def test_rules_of_another_environment_are_refused(cartpole):
     for env_id, words in (
-        ("LunarLander-v3", "4 features"), ("Acrobot-v1", "4 features"),
+        ("LunarLander-v3", "4 features"),
+        ("Acrobot-v1", "4 features"),
     ):
         with pytest.raises(InputError, match=words):
             ShieldedEnv(gymnasium.make(env_id), cartpole)

@@ -9,12 +9,31 @@ from dataclasses import dataclass
 from sarl_core.errors import InputError
 
 _ROLES = {
-    "episode": ("episode", "episodes", "ep", "episode_id", "episode_index", "episode_number",
-                "eps_id", "traj", "traj_id", "trajectory", "trajectory_id"),
+    "episode": (
+        "episode",
+        "episodes",
+        "ep",
+        "episode_id",
+        "episode_index",
+        "episode_number",
+        "eps_id",
+        "traj",
+        "traj_id",
+        "trajectory",
+        "trajectory_id",
+    ),
     "step": ("step", "steps", "t", "timestep", "time_step", "step_index", "step_id"),
     "reward": ("reward", "rewards", "rew", "rews", "r"),
-    "terminated": ("terminated", "terminateds", "terminal", "terminals", "termination",
-                   "terminations", "done", "dones"),
+    "terminated": (
+        "terminated",
+        "terminateds",
+        "terminal",
+        "terminals",
+        "termination",
+        "terminations",
+        "done",
+        "dones",
+    ),
     "truncated": ("truncated", "truncateds", "truncation", "truncations", "timeout", "timeouts"),
 }
 _OBSERVATIONS = "obs|observations?|states?|features?"
@@ -71,21 +90,31 @@ def guess_columns(names: Sequence[str]) -> ColumnMap:
     roles = {role: _first_alias(names, aliases) for role, aliases in _ROLES.items()}
     singles = {name for name in roles.values() if name is not None}
     actions = _first_alias(names, _SINGLE_ACTION)
-    action_columns = (actions,) if actions is not None else tuple(
-        name for name in names if stripped(name, _ACTIONS) is not None
-    ) or tuple(name for name in names if re.fullmatch(r"a[ _]?\d+", name.strip(), re.I))
+    action_columns = (
+        (actions,)
+        if actions is not None
+        else tuple(name for name in names if stripped(name, _ACTIONS) is not None)
+        or tuple(name for name in names if re.fullmatch(r"a[ _]?\d+", name.strip(), re.I))
+    )
     observations = tuple(name for name in names if stripped(name, _OBSERVATIONS) is not None)
     if not observations:
         observations = tuple(
-            name for name in names
-            if name not in singles and name not in action_columns
-            and not _ROW_NUMBERS.fullmatch(name) and not _DUBIOUS.match(name)
+            name
+            for name in names
+            if name not in singles
+            and name not in action_columns
+            and not _ROW_NUMBERS.fullmatch(name)
+            and not _DUBIOUS.match(name)
             and stripped(name, _ACTIONS) is None
         )
     return ColumnMap(
-        _by_number(observations, _OBSERVATIONS), _by_number(action_columns, _ACTIONS),
-        episode=roles["episode"], step=roles["step"], reward=roles["reward"],
-        terminated=roles["terminated"], truncated=roles["truncated"],
+        _by_number(observations, _OBSERVATIONS),
+        _by_number(action_columns, _ACTIONS),
+        episode=roles["episode"],
+        step=roles["step"],
+        reward=roles["reward"],
+        terminated=roles["terminated"],
+        truncated=roles["truncated"],
     )
 
 
@@ -106,9 +135,7 @@ def choose_columns(names: Sequence[str]) -> tuple[ColumnMap, tuple[str, ...]]:
         raise InputError(
             f"there is no action column among {listed(names)}; name it 'action', or map the columns"
         )
-    left = [
-        name for name in names if name not in guess.used and not _ROW_NUMBERS.fullmatch(name)
-    ]
+    left = [name for name in names if name not in guess.used and not _ROW_NUMBERS.fullmatch(name)]
     if not guess.observations:
         raise InputError(
             f"there is no observation column among {listed(names)}; call them 'obs_' and a name, "
@@ -164,8 +191,10 @@ def check_map(columns: ColumnMap, names: Sequence[str]) -> None:
     if doubled is not None:
         raise InputError(f"the column {doubled!r} is mapped twice; give each column one meaning")
     if not columns.observations or not columns.actions:
-        raise InputError("the column map names no observations or no actions; choose at least one "
-                         f"of each from {listed(names)}")
+        raise InputError(
+            "the column map names no observations or no actions; choose at least one "
+            f"of each from {listed(names)}"
+        )
 
 
 def refuse_doubled(names: Sequence[str]) -> None:
@@ -192,7 +221,7 @@ def stripped(column: str, prefixes: str) -> str | None:
     match = re.match(rf"(?:{prefixes})([ _.\-/\[(])", column, re.I)
     if match is None:
         return None
-    rest = column[match.end():]
+    rest = column[match.end() :]
     return rest[:-1] if match[1] in "[(" and rest[-1:] in ("]", ")") else rest
 
 

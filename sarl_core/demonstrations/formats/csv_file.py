@@ -24,8 +24,10 @@ _DELIMITERS: tuple[Delimiter, ...] = (";", "\t", "|", ",")  # a comma may be a d
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
 _FRACTION = re.compile(r"[+-]?\d*[.,]\d*(e[+-]?\d+)?|[+-]?\d+e[+-]?\d+|[+-]?(nan|inf)", re.I)
 _BOMS = {
-    codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32",
-    codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16",
+    codecs.BOM_UTF32_LE: "UTF-32",
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
 }
 _MAX_LINE = 2**24  # characters of a header
 
@@ -78,10 +80,14 @@ class CsvTable:
             except pa.ArrowInvalid as error:
                 raise self._explained(columns.used) from error
         texts = [
-            name for name in columns.used
-            if not (pa.types.is_floating(kind := table.schema.field(name).type)
-                    or pa.types.is_integer(kind) or pa.types.is_boolean(kind)
-                    or pa.types.is_null(kind))
+            name
+            for name in columns.used
+            if not (
+                pa.types.is_floating(kind := table.schema.field(name).type)
+                or pa.types.is_integer(kind)
+                or pa.types.is_boolean(kind)
+                or pa.types.is_null(kind)
+            )
         ]
         if texts:
             raise self._explained(texts)
@@ -96,8 +102,11 @@ class CsvTable:
             read_options=pyarrow.csv.ReadOptions(column_names=list(self.names)),
             parse_options=pyarrow.csv.ParseOptions(delimiter=self.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
-                null_values=[""], strings_can_be_null=True, decimal_point=self.decimal,
-                include_columns=list(used), column_types=types,
+                null_values=[""],
+                strings_can_be_null=True,
+                decimal_point=self.decimal,
+                include_columns=list(used),
+                column_types=types,
             ),
         )
 
@@ -186,14 +195,14 @@ def write_csv(demonstrations: Demonstrations, out: BinaryIO) -> None:
     columns: dict[str, Any] = columns_of(demonstrations)
     for name, values in columns.items():
         if "\n" in name or "\r" in name:
-            raise InputError(f"the column {name!r} has a line break in its name, which CSV cannot "
-                             "hold; save it as .parquet")
+            raise InputError(
+                f"the column {name!r} has a line break in its name, which CSV cannot "
+                "hold; save it as .parquet"
+            )
         if name.startswith("action") and values.dtype.kind == "f":
             # Their type is found out on reading: as float64, with a point that says it is one.
             columns[name] = _decimals(values.astype(np.float64))
-    pyarrow.csv.write_csv(
-        pa.table(columns), out, pyarrow.csv.WriteOptions(quoting_style="needed")
-    )
+    pyarrow.csv.write_csv(pa.table(columns), out, pyarrow.csv.WriteOptions(quoting_style="needed"))
 
 
 def _decimals(values: Any) -> Any:

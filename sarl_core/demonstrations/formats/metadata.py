@@ -87,9 +87,7 @@ def decode_metadata(text: str | bytes) -> Metadata:
         seed=_seed(raw),
         features=tuple(_feature(entry) for entry in _list(raw, "features")),
         action_names=_strings(_list(raw, "action_names"), "action_names"),
-        label_names=tuple(
-            _strings(entry, "label_names") for entry in _list(raw, "label_names")
-        ),
+        label_names=tuple(_strings(entry, "label_names") for entry in _list(raw, "label_names")),
         label_first=tuple(_label(entry) for entry in _list(raw, "label_first")),
         action_low=tuple(_number(entry, "action_low") for entry in _list(raw, "action_low")),
         action_high=tuple(_number(entry, "action_high") for entry in _list(raw, "action_high")),

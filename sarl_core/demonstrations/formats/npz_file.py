@@ -76,8 +76,10 @@ def read_npz(data: memoryview) -> Recording:
     if actions.ndim == 0:
         raise InputError(f"there is a single number under {keys['actions']!r}; give one a step")
     if actions.dtype.kind == "b":
-        raise InputError(f"the actions under {keys['actions']!r} are true and false; write them as "
-                         "whole numbers 1 and 0")
+        raise InputError(
+            f"the actions under {keys['actions']!r} are true and false; write them as "
+            "whole numbers 1 and 0"
+        )
     # One label wrapped in a vector, as some libraries write it; our own files mean it so.
     if actions.ndim > 2:
         actions = actions.reshape(len(actions), int(np.prod(actions.shape[1:])))
@@ -85,26 +87,38 @@ def read_npz(data: memoryview) -> Recording:
         actions = actions[:, 0]
     d, m = observations.shape[1], 1 if actions.ndim == 1 else actions.shape[1]
     if metadata.features and len(metadata.features) != d:
-        raise InputError(f"its metadata names {len(metadata.features)} features, but there are {d} "
-                         f"columns under {keys['observations']!r}; save the file again")
+        raise InputError(
+            f"its metadata names {len(metadata.features)} features, but there are {d} "
+            f"columns under {keys['observations']!r}; save the file again"
+        )
     if metadata.action_names and len(metadata.action_names) != m:
-        raise InputError(f"its metadata names {len(metadata.action_names)} action dimensions, but "
-                         f"there are {m} columns under {keys['actions']!r}; save the file again")
+        raise InputError(
+            f"its metadata names {len(metadata.action_names)} action dimensions, but "
+            f"there are {m} columns under {keys['actions']!r}; save the file again"
+        )
     episodes, terminated = _episodes(arrays, len(actions))
     return Recording(
-        observations=observations, actions=actions,
+        observations=observations,
+        actions=actions,
         observation_columns=_columns(keys["observations"], d, metadata),
-        action_columns=(f"the action under {keys['actions']!r}",) if m == 1 else tuple(
-            f"column {index} of {keys['actions']!r}" for index in range(m)
-        ),
-        episodes=episodes, steps=_one_a_step(arrays.get("steps")),
-        rewards=_one_a_step(arrays.get("rewards")), terminated=terminated,
+        action_columns=(f"the action under {keys['actions']!r}",)
+        if m == 1
+        else tuple(f"column {index} of {keys['actions']!r}" for index in range(m)),
+        episodes=episodes,
+        steps=_one_a_step(arrays.get("steps")),
+        rewards=_one_a_step(arrays.get("rewards")),
+        terminated=terminated,
         truncated=_one_a_step(arrays.get("truncated")),
         names={
-            role: f"the array {keys[key]!r}" for role, key in (
-                ("episode", "episodes"), ("step", "steps"), ("reward", "rewards"),
-                ("terminated", "terminated"), ("truncated", "truncated"),
-            ) if key in keys
+            role: f"the array {keys[key]!r}"
+            for role, key in (
+                ("episode", "episodes"),
+                ("step", "steps"),
+                ("reward", "rewards"),
+                ("terminated", "terminated"),
+                ("truncated", "truncated"),
+            )
+            if key in keys
         },
         metadata=metadata,
     )
@@ -119,8 +133,15 @@ def write_npz(demonstrations: Demonstrations, out: BinaryIO) -> None:
     """
     arrays: dict[str, NDArray[Any]] = {
         name: values
-        for name in ("observations", "actions", "episodes", "steps", "rewards", "terminated",
-                     "truncated")
+        for name in (
+            "observations",
+            "actions",
+            "episodes",
+            "steps",
+            "rewards",
+            "terminated",
+            "truncated",
+        )
         if (values := getattr(demonstrations, name)) is not None
     }
     np.savez_compressed(
@@ -153,12 +174,19 @@ def _episodes(
         return _one_a_step(arrays["episodes"]), terminated
     if "indices" in arrays:
         indices = arrays["indices"]
-        inside = indices.ndim == 1 and indices.dtype.kind in "iu" and bool(
-            np.all((indices > 0) & (indices < n)) and np.all(np.diff(indices.astype(np.int64)) > 0)
+        inside = (
+            indices.ndim == 1
+            and indices.dtype.kind in "iu"
+            and bool(
+                np.all((indices > 0) & (indices < n))
+                and np.all(np.diff(indices.astype(np.int64)) > 0)
+            )
         )
         if not inside:
-            raise InputError("the array 'indices' must hold the rising rows at which the second "
-                             f"and later episodes start among {n:,} actions")
+            raise InputError(
+                "the array 'indices' must hold the rising rows at which the second "
+                f"and later episodes start among {n:,} actions"
+            )
         starts = np.zeros(n, dtype=np.bool_)
         starts[indices] = True
         if terminated is not None and len(terminated) == len(indices) + 1 != n:
@@ -169,8 +197,9 @@ def _episodes(
         given = _one_a_step(arrays["starts"])
         assert given is not None
         if given.shape != (n,) or not np.isin(given, (0, 1)).all():
-            raise InputError(f"the array 'episode_starts' must say true or false for each of {n:,} "
-                             "actions")
+            raise InputError(
+                f"the array 'episode_starts' must say true or false for each of {n:,} actions"
+            )
         starts = given.astype(np.bool_)
         starts[:1] = False
     return (None if starts is None else np.cumsum(starts)), terminated
@@ -182,11 +211,13 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
         # BytesIO copies nothing that is already bytes.
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             entries = {
-                info.filename.removesuffix(".npy"): info for info in archive.infolist()
+                info.filename.removesuffix(".npy"): info
+                for info in archive.infolist()
                 if info.filename.endswith(".npy")
             }
             wanted = {
-                what: key for what, keys in _KEYS.items()
+                what: key
+                for what, keys in _KEYS.items()
                 if (key := next((key for key in keys if key in entries), None)) is not None
             }
             for what in ("observations", "actions"):
@@ -205,8 +236,18 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
                 left = MAX_UNPACKED - sum(array.nbytes for array in read.values())
                 read[what] = _array(archive, entries[key], key, left)
             return read, wanted
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError,
-            ValueError, struct.error, OverflowError, lzma.LZMAError) as error:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        NotImplementedError,
+        RuntimeError,
+        ValueError,
+        struct.error,
+        OverflowError,
+        lzma.LZMAError,
+    ) as error:
         # All of these come from zipfile: RuntimeError for an encrypted entry, ValueError for
         # offsets that lie outside the file.
         raise InputError(
@@ -214,9 +255,7 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
         ) from error
 
 
-def _array(
-    archive: zipfile.ZipFile, entry: zipfile.ZipInfo, key: str, limit: int
-) -> NDArray[Any]:
+def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, key: str, limit: int) -> NDArray[Any]:
     """One array of the archive, of no more bytes than a limit whatever the archive promises."""
     with archive.open(entry) as file:
         content = file.read(min(entry.file_size, limit) + 1)
@@ -226,7 +265,8 @@ def _array(
         header = io.BytesIO(content)
         version = np.lib.format.read_magic(header)
         read = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0)
+            np.lib.format.read_array_header_1_0
+            if version == (1, 0)
             else np.lib.format.read_array_header_2_0
         )
         shape, _, dtype = read(header)
@@ -243,6 +283,7 @@ def _array(
     except (ValueError, EOFError, SyntaxError, TypeError, MemoryError) as error:
         raise InputError(f"the array {key!r} cannot be read as NumPy's; save it again") from error
     if key != KEY and array.dtype.kind not in "biuf":
-        raise InputError(f"the array {key!r} holds {array.dtype}, which are no numbers; save plain "
-                         "numbers")
+        raise InputError(
+            f"the array {key!r} holds {array.dtype}, which are no numbers; save plain numbers"
+        )
     return array

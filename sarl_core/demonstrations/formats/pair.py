@@ -37,7 +37,7 @@ def partner_names(name: str) -> tuple[str, ...]:
         match = _word(name, words)
         if match is not None:
             return tuple(
-                f"{name[: match.start(1)]}{other}{name[match.end(1):]}" for other in others
+                f"{name[: match.start(1)]}{other}{name[match.end(1) :]}" for other in others
             )
     return ()
 
@@ -62,21 +62,24 @@ def pair_in_folder(folder: Path) -> tuple[Path, Path]:
     names = sorted(path.name for path in folder.iterdir() if path.is_file())
     pairs = [
         (folder / name, folder / other)
-        for name in names if not holds_actions(name)
-        for other in partner_names(name) if other in names
+        for name in names
+        if not holds_actions(name)
+        for other in partner_names(name)
+        if other in names
     ]
     if not pairs:
-        raise InputError("it is a folder without obs.csv and actions.csv; give a file, or a folder "
-                         "with those")
+        raise InputError(
+            "it is a folder without obs.csv and actions.csv; give a file, or a folder with those"
+        )
     if len(pairs) > 1:
-        raise InputError(f"it is a folder with {len(pairs)} pairs of observations and actions; "
-                         "give one of the files")
+        raise InputError(
+            f"it is a folder with {len(pairs)} pairs of observations and actions; "
+            "give one of the files"
+        )
     return pairs[0]
 
 
-def read_pair(
-    observations: memoryview, actions: memoryview, names: tuple[str, str]
-) -> Recording:
+def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, str]) -> Recording:
     """Read a pair of files.
 
     Args:
@@ -101,7 +104,8 @@ def read_pair(
         require_filled(read)
         done = action_block(read, others.names)
     return Recording(
-        observations=seen, actions=done,
+        observations=seen,
+        actions=done,
         observation_columns=tuple(f"{column!r} of {names[0]}" for column in table.names),
         action_columns=tuple(f"{column!r} of {names[1]}" for column in others.names),
         feature_names=feature_names(table.names) if table.named else None,
@@ -111,6 +115,4 @@ def read_pair(
 
 def _word(name: str, words: tuple[str, ...]) -> re.Match[str] | None:
     """Where one of the words stands at an end of a CSV file's name, or between separators."""
-    return re.search(
-        rf"(?:^|[_\-. ])({'|'.join(words)})(?=[_\-. ])(?=.*\.csv$)", name, re.I
-    )
+    return re.search(rf"(?:^|[_\-. ])({'|'.join(words)})(?=[_\-. ])(?=.*\.csv$)", name, re.I)

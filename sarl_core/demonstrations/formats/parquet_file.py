@@ -111,7 +111,8 @@ def write_parquet(demonstrations: Demonstrations, out: BinaryIO) -> None:
 
     table = pa.table(columns_of(demonstrations))
     pq.write_table(
-        table.replace_schema_metadata({KEY: encode_metadata(demonstrations)}), out,
+        table.replace_schema_metadata({KEY: encode_metadata(demonstrations)}),
+        out,
         compression="zstd",
     )
 
@@ -169,5 +170,3 @@ def _require_flat(name: str, kind: Any) -> None:
             f"column {name!r} holds a {str(kind).split('<')[0]} in each row; give each number a "
             "column of its own"
         )
-
-

@@ -94,23 +94,28 @@ def to_demonstrations(
         recording = _fit(recording, described)
     observations = _owned(recording.observations, np.float32)
     require_finite(observations, recording.observation_columns, recording.rows)
-    recording = _without_last_observations(
-        _checked(replace(recording, observations=observations))
-    )
+    recording = _without_last_observations(_checked(replace(recording, observations=observations)))
     discrete, note = _is_discrete(recording, described)
     notes = recording.notes if note is None else (*recording.notes, note)
     features = _features(recording, described)
     fields: dict[str, Any] = features | {
         "action_names": _action_names(recording, described),
         "env_id": metadata.env_id or (described.env_id if described is not None else ""),
-        "agent": metadata.agent, "seed": metadata.seed,
+        "agent": metadata.agent,
+        "seed": metadata.seed,
         "notes": (*metadata.notes, *notes),
     }
     actions, space = (_labels if discrete else _values)(recording, described)
     return Demonstrations(
-        recording.observations, actions, _some(recording.episodes),
-        recording.rewards, terminated=recording.terminated, truncated=recording.truncated,
-        steps=recording.steps, **fields, **space,
+        recording.observations,
+        actions,
+        _some(recording.episodes),
+        recording.rewards,
+        terminated=recording.terminated,
+        truncated=recording.truncated,
+        steps=recording.steps,
+        **fields,
+        **space,
     )
 
 
@@ -166,7 +171,8 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
     if order is not None:
         notes.append(f"the observation columns were put into the order of {described.env_id}")
         recording = replace(
-            recording, observations=recording.observations[:, order],
+            recording,
+            observations=recording.observations[:, order],
             observation_columns=tuple(recording.observation_columns[i] for i in order),
             feature_names=described.feature_names,
         )
@@ -174,7 +180,8 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
     if order is not None:
         notes.append(f"the action columns were put into the order of {described.env_id}")
         recording = replace(
-            recording, actions=recording.actions[:, order],
+            recording,
+            actions=recording.actions[:, order],
             action_columns=tuple(recording.action_columns[i] for i in order),
             action_names=described.action_names,
         )
@@ -193,17 +200,21 @@ def _checked(recording: Recording) -> Recording:
     n = len(recording.actions)
     found: dict[str, Any] = {}
     for attribute, role, check in (
-        ("episodes", "episode", whole_numbers), ("steps", "step", whole_numbers),
+        ("episodes", "episode", whole_numbers),
+        ("steps", "step", whole_numbers),
         ("rewards", "reward", column_of_numbers),
-        ("terminated", "terminated", flags), ("truncated", "truncated", flags),
+        ("terminated", "terminated", flags),
+        ("truncated", "truncated", flags),
     ):
         values = getattr(recording, attribute)
         if values is not None:
             found[attribute] = check(values, n, _called(recording, role), recording.rows)
     recording = _in_episodes(replace(recording, **found))
     require_order(
-        _some(recording.episodes), recording.steps,
-        (_called(recording, "episode"), _called(recording, "step")), recording.rows,
+        _some(recording.episodes),
+        recording.steps,
+        (_called(recording, "episode"), _called(recording, "step")),
+        recording.rows,
     )
     return recording
 
@@ -229,7 +240,8 @@ def _in_episodes(recording: Recording) -> Recording:
         how = "an episode begins where the step number begins again"
     episodes = np.concatenate([[0], np.cumsum(ends)[:-1]]).astype(np.int64)
     note = (
-        f"there is no episode column, so {how}" if episodes[-1]
+        f"there is no episode column, so {how}"
+        if episodes[-1]
         else "there is no episode column, so every step belongs to one episode"
     )
     return replace(recording, episodes=episodes, notes=(*recording.notes, note))
@@ -247,10 +259,13 @@ def _without_last_observations(recording: Recording) -> Recording:
     # The row after the k-th last action (k from 0) lies k rows further on.
     surplus = last + 1 + np.arange(len(last))
     return replace(
-        recording, observations=_owned(np.delete(recording.observations, surplus, axis=0),
-                                       np.float32),
-        notes=(*recording.notes, "the observation after each episode's last action was dropped, "
-               "as nothing was done in it"),
+        recording,
+        observations=_owned(np.delete(recording.observations, surplus, axis=0), np.float32),
+        notes=(
+            *recording.notes,
+            "the observation after each episode's last action was dropped, "
+            "as nothing was done in it",
+        ),
     )
 
 
@@ -284,8 +299,10 @@ def _features(
 ) -> dict[str, tuple[str, ...] | None]:
     metadata, names = recording.metadata, recording.feature_names
     if metadata.features:
-        return {"feature_names": tuple(feature.name for feature in metadata.features),
-                "feature_units": tuple(feature.unit for feature in metadata.features)}
+        return {
+            "feature_names": tuple(feature.name for feature in metadata.features),
+            "feature_units": tuple(feature.unit for feature in metadata.features),
+        }
     if described is not None and (names is None or only_counted(names)):
         names = described.feature_names
     if described is not None and names == described.feature_names:
@@ -337,7 +354,8 @@ def _labels(
     require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
     flat = actions.ndim == 1 if described is None else described.action_shape == ()
     return _owned(whole.reshape(-1) if flat and m == 1 else whole, np.int64), {
-        "label_names": names or None, "label_first": first or None,
+        "label_names": names or None,
+        "label_first": first or None,
     }
 
 

@@ -94,8 +94,9 @@ def load_demonstrations(
             raise InputError("there is no such file; check its name")
         else:
             names = partner_names(path.name) if columns is None else ()
-            partner = next((path.with_name(name) for name in names
-                            if path.with_name(name).is_file()), None)
+            partner = next(
+                (path.with_name(name) for name in names if path.with_name(name).is_file()), None
+            )
             if partner is None:
                 return _read(_content(path), path.name, description, columns, str(path))
             pair = (partner, path) if holds_actions(path.name) else (path, partner)
@@ -104,7 +105,11 @@ def load_demonstrations(
 
 
 def read_demonstrations(
-    data: Content, name: str, *, env_id: str | None = None, columns: ColumnMap | None = None,
+    data: Content,
+    name: str,
+    *,
+    env_id: str | None = None,
+    columns: ColumnMap | None = None,
     companion: tuple[Content, str] | None = None,
 ) -> Demonstrations:
     """Read demonstrations from what was uploaded.
@@ -131,8 +136,9 @@ def read_demonstrations(
     with naming(other_name):
         other_content = _bytes(other)
     if columns is not None:
-        raise InputError(f"{name}: columns are mapped in one table, not in a pair of files; give "
-                         "one of the two")
+        raise InputError(
+            f"{name}: columns are mapped in one table, not in a pair of files; give one of the two"
+        )
     if holds_actions(name) and not holds_actions(other_name):
         return _read_pair((other_content, content), (other_name, name), description)
     return _read_pair((content, other_content), (name, other_name), description)
@@ -188,7 +194,9 @@ def table_columns(source: str | Path | Content, name: str | None = None) -> tupl
 
 
 def _read_named(
-    content: memoryview, name: str, description: EnvironmentDescription | None,
+    content: memoryview,
+    name: str,
+    description: EnvironmentDescription | None,
     columns: ColumnMap | None,
 ) -> Demonstrations:
     with naming(name):
@@ -196,16 +204,20 @@ def _read_named(
 
 
 def _read(
-    content: memoryview, name: str, description: EnvironmentDescription | None,
-    columns: ColumnMap | None, shown: str,
+    content: memoryview,
+    name: str,
+    description: EnvironmentDescription | None,
+    columns: ColumnMap | None,
+    shown: str,
 ) -> Demonstrations:
     form = _format(name)
     _check_signature(content, name)
     if form.open_table is None:
         assert form.read is not None
         if columns is not None:
-            raise InputError(f"columns are mapped in a table, and {form.kind} has none; leave the "
-                             "map out")
+            raise InputError(
+                f"columns are mapped in a table, and {form.kind} has none; leave the map out"
+            )
         return to_demonstrations(form.read(content), description)
     table = form.open_table(content)
     partners = partner_names(PurePath(name).name)
@@ -227,7 +239,8 @@ def _fits(table: Table, description: EnvironmentDescription | None) -> bool:
 
 
 def _read_pair(
-    contents: tuple[memoryview, memoryview], names: tuple[str, str],
+    contents: tuple[memoryview, memoryview],
+    names: tuple[str, str],
     description: EnvironmentDescription | None,
 ) -> Demonstrations:
     for content, name in zip(contents, names, strict=True):
@@ -260,8 +273,9 @@ def _check_signature(content: memoryview, name: str) -> None:
         cure = f"name it {right}" if right is not None else f"save it as {EXTENSIONS[0]} or {kind}"
         raise InputError(f"it is named {extension}, but its content is {what}; {cure}")
     if found is None and extension != ".csv":
-        raise InputError(f"it is named {extension}, but its content is not {kind}; if it is text, "
-                         "name it .csv")
+        raise InputError(
+            f"it is named {extension}, but its content is not {kind}; if it is text, name it .csv"
+        )
 
 
 def _content(path: Path) -> memoryview:

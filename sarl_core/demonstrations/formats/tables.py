@@ -114,11 +114,16 @@ def recording_from_table(
         feature_names=chosen.feature_names
         or (feature_names(chosen.observations) if named else None),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
-        episodes=single["episode"], steps=single["step"], rewards=single["reward"],
-        terminated=single["terminated"], truncated=single["truncated"],
-        rows=kept, guess_labels=not _is_vector(chosen.actions),
+        episodes=single["episode"],
+        steps=single["step"],
+        rewards=single["reward"],
+        terminated=single["terminated"],
+        truncated=single["truncated"],
+        rows=kept,
+        guess_labels=not _is_vector(chosen.actions),
         names={role: f"column {getattr(chosen, role)!r}" for role in _SINGLES},
-        metadata=metadata, notes=(*notes, *dropped),
+        metadata=metadata,
+        notes=(*notes, *dropped),
     )
 
 
@@ -155,8 +160,10 @@ def action_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[An
     columns = [read[name].values for name in names]
     for name, values in zip(names, columns, strict=True):
         if values.dtype.kind == "b":
-            raise InputError(f"column {name!r} holds true and false, which are no actions; write "
-                             "them as whole numbers 1 and 0")
+            raise InputError(
+                f"column {name!r} holds true and false, which are no actions; write "
+                "them as whole numbers 1 and 0"
+            )
     return np.stack(columns, axis=1) if _is_vector(names) else columns[0]
 
 
@@ -164,11 +171,10 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
     """The columns in which demonstrations are saved, in order."""
     assert demonstrations.steps is not None
     columns: dict[str, NDArray[Any]] = {
-        "episode": demonstrations.episodes, "step": demonstrations.steps,
+        "episode": demonstrations.episodes,
+        "step": demonstrations.steps,
     }
-    for feature, values in zip(
-        demonstrations.features, demonstrations.observations.T, strict=True
-    ):
+    for feature, values in zip(demonstrations.features, demonstrations.observations.T, strict=True):
         columns[f"obs_{feature.name}"] = np.ascontiguousarray(values)
     if demonstrations.actions.ndim == 1:
         columns["action"] = demonstrations.actions
@@ -178,7 +184,8 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
         ):
             columns[f"action_{dimension.name}"] = np.ascontiguousarray(values)
     singles = {
-        "reward": demonstrations.rewards, "terminated": demonstrations.terminated,
+        "reward": demonstrations.rewards,
+        "terminated": demonstrations.terminated,
         "truncated": demonstrations.truncated,
     }
     return columns | {name: values for name, values in singles.items() if values is not None}
@@ -187,10 +194,15 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
 def _without_names(metadata: Metadata) -> Metadata:
     """Metadata of a file whose columns a person has mapped: what is left are the spaces."""
     return Metadata(
-        env_id=metadata.env_id, agent=metadata.agent, seed=metadata.seed,
-        label_names=metadata.label_names, label_first=metadata.label_first,
-        action_low=metadata.action_low, action_high=metadata.action_high,
-        bounds_from=metadata.bounds_from, notes=metadata.notes,
+        env_id=metadata.env_id,
+        agent=metadata.agent,
+        seed=metadata.seed,
+        label_names=metadata.label_names,
+        label_first=metadata.label_first,
+        action_low=metadata.action_low,
+        action_high=metadata.action_high,
+        bounds_from=metadata.bounds_from,
+        notes=metadata.notes,
     )
 
 
@@ -202,17 +214,27 @@ def _own_columns(names: tuple[str, ...], metadata: Metadata) -> ColumnMap:
         actions = ("action",)
     for column in (*observations, *actions):
         if column not in names:
-            raise InputError(f"the column {column!r} that its metadata names is missing among "
-                             f"{listed(names)}; save the file again")
-    stray = next((name for name in names if name.startswith("obs_") and name not in observations),
-                 None)
+            raise InputError(
+                f"the column {column!r} that its metadata names is missing among "
+                f"{listed(names)}; save the file again"
+            )
+    stray = next(
+        (name for name in names if name.startswith("obs_") and name not in observations), None
+    )
     if stray is not None:
-        raise InputError(f"its metadata does not know the column {stray!r}; save the file again, "
-                         "or without metadata")
+        raise InputError(
+            f"its metadata does not know the column {stray!r}; save the file again, "
+            "or without metadata"
+        )
     found = {role: role if role in names else None for role in _SINGLES}
     return ColumnMap(
-        observations, actions, episode=found["episode"], step=found["step"],
-        reward=found["reward"], terminated=found["terminated"], truncated=found["truncated"],
+        observations,
+        actions,
+        episode=found["episode"],
+        step=found["step"],
+        reward=found["reward"],
+        terminated=found["terminated"],
+        truncated=found["truncated"],
     )
 
 
@@ -258,14 +280,10 @@ def _without_empty_ends(
         return read, None, ()
     kept = np.flatnonzero(~ends)
     shorter = {
-        name: Column(
-            column.values[kept], None if column.missing is None else column.missing[kept]
-        )
+        name: Column(column.values[kept], None if column.missing is None else column.missing[kept])
         for name, column in read.items()
     }
-    return shorter, kept, (
-        "the last row of each episode has no action and was dropped",
-    )
+    return shorter, kept, ("the last row of each episode has no action and was dropped",)
 
 
 def _empty(column: Column) -> NDArray[np.bool_] | None:
