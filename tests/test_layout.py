@@ -70,7 +70,7 @@ def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
         for path in python_files()
         if path.relative_to(ROOT).parts[0] not in ("tests", "benchmarks")
     ]
-    assert packages_of(imported(files)) | {"kaleido"} == set(pins("requirements.txt"))
+    assert packages_of(imported(files)) | {"kaleido", "imageio-ffmpeg"} == set(pins("requirements.txt"))
 
 
 def test_what_tests_and_benchmarks_import_is_pinned():
