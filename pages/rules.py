@@ -22,6 +22,7 @@ TABLE_ROWS = 8
 FEATURES_SHOWN = 12
 WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
+st.title("Rules")
 demonstrations = state.require_demonstrations()
 grown = state.trees(demonstrations, state.chosen_divider())
 thresholds = state.chosen_thresholds()
@@ -255,7 +256,6 @@ def show_examples(rule: Rule) -> None:
     )
 
 
-st.title("Rules")
 with st.spinner("Mining the rules …"):
     in_force = state.rule_set(grown, thresholds)
 if not in_force.rules:

@@ -1,7 +1,8 @@
 """Thresholds: how many rules, how long and how good, at every pair of thresholds at once.
 
-A moved slider runs the fragments "controls" and "details" and nothing else. The maps are not part
-of them: they hold every pair of thresholds already, and only the mark that lies over them moves.
+A moved slider runs the fragment "controls" and nothing else. The maps are not part of it: they hold
+every pair of thresholds already, and only the mark that lies over them moves. The table is drawn by
+it in a place of its own, since every further fragment would cost a run of its own.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
+from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining import threshold_figures as figures
 from sarl_core.explaining.colours import MARKER_COLOUR
@@ -39,6 +41,7 @@ TABLE_ROWS = 50
 BARE = {"displayModeBar": False, "scrollZoom": False}
 MARK_RADIUS = 9
 
+st.title("Thresholds")
 demonstrations = state.require_demonstrations()
 grown = state.trees(demonstrations, state.chosen_divider())
 
@@ -50,17 +53,25 @@ def follow() -> None:
     """Show what the thresholds of the moment give; for callbacks, and the last thing they do."""
     if st.session_state.get("view") == SURFACES:
         st.rerun()  # the chosen point is part of the surface
-    st.rerun(["controls", "details"])
+    st.rerun(
+        ["controls", "front"] if st.session_state.get("details") == TRADE_OFFS else ["controls"]
+    )
 
 
 def move(**thresholds: float) -> None:
     """Put thresholds in force, by their names in the URL.
 
-    `controls` takes them over just before it draws the sliders: what a callback in a fragment
-    writes to a slider does not reach the browser when other fragments are to run as well.
+    `take_over` writes them where the sliders find them: what a callback in a fragment writes to a
+    slider does not reach the browser when it asks for another run.
     """
     st.session_state["_moved"] = thresholds
     follow()
+
+
+def take_over() -> None:
+    """Hand moved thresholds to the sliders, before these are drawn."""
+    for name, value in st.session_state.pop("_moved", {}).items():
+        st.session_state[name] = value
 
 
 def jump(name: str, value: float) -> None:
@@ -114,11 +125,18 @@ def jump_buttons(name: str, below: float | None, above: float | None) -> None:
 
 
 @st.fragment(key="controls")
-def controls(dimension: int | None, grid: Landscape) -> None:
-    """Sliders, named settings and jumps; the numbers of the rule set; the mark in the maps."""
-    for name, value in st.session_state.pop("_moved", {}).items():
-        st.session_state[name] = value
+def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | None) -> None:
+    """Sliders, named settings and jumps; the numbers of the rule set; the mark; the table.
+
+    Args:
+        dimension: Which action dimension is looked at; None for all.
+        grid: The landscape that the maps show.
+        table: Where the table of rules goes; None where it is not looked at.
+    """
+    take_over()
     thresholds = state.chosen_thresholds()
+    # A callback that asks for more than this fragment costs a run; most moves need none.
+    alone = table is not None and st.session_state.get("view") != SURFACES
     jumps = neat_jumps(grown, thresholds)
     left, middle, right = st.columns([4, 4, 3])
     with left:
@@ -129,7 +147,7 @@ def controls(dimension: int | None, grid: Landscape) -> None:
             value=FILTERED.support,
             format_func=threshold_text,
             bind="query-params",
-            on_change=follow,
+            on_change="rerun" if alone else follow,
             help="Share of all demonstrated states to which a rule must apply.",
         )
         jump_buttons("support", jumps.support_below, jumps.support_above)
@@ -141,7 +159,7 @@ def controls(dimension: int | None, grid: Landscape) -> None:
             value=FILTERED.confidence,
             format_func=threshold_text,
             bind="query-params",
-            on_change=follow,
+            on_change="rerun" if alone else follow,
             help="Share of those states in which the expert did what the rule says.",
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
@@ -158,9 +176,13 @@ def controls(dimension: int | None, grid: Landscape) -> None:
                 help="Number of equal intervals each continuous action is divided into.",
             )
         named_settings(thresholds)
-    metrics(here(thresholds, dimension))
+    point = here(thresholds, dimension)
+    metrics(point)
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+    if table is not None:
+        with table.container():
+            show_largest(thresholds, point, dimension)
 
 
 def named_settings(thresholds: Thresholds) -> None:
@@ -283,7 +305,9 @@ def show_maps(landscape: Landscape, layers: tuple[figures.Layer, figures.Layer])
         f" + (100% - {margin['l'] + margin['r']}px) * var(--mark-x));"
         f" top: calc({margin['t'] - MARK_RADIUS}px"
         f" + {figures.HEIGHT - margin['t'] - margin['b']}px * var(--mark-y));"
-        f" box-sizing: border-box; border: 3px solid {MARKER_COLOUR}; border-radius: 50%;"
+        # In a layer of its own, so that the map beneath is not painted again when it moves.
+        f" will-change: transform; border: 3px solid {MARKER_COLOUR};"
+        " box-sizing: border-box; border-radius: 50%;"
         " box-shadow: 0 0 0 1.5px #ffffff; }"
         "</style>"
     )
@@ -332,22 +356,6 @@ def show_surfaces(
     st.caption("Drag to turn. The dot marks the present thresholds.")
 
 
-@st.fragment(key="details")
-def details(dimension: int | None) -> None:
-    """The rules in force, and the rule sets that no other one beats."""
-    largest, trade_offs = st.tabs(
-        [LARGEST, TRADE_OFFS], key="details", on_change="rerun", bind="query-params"
-    )
-    thresholds = state.chosen_thresholds()
-    point = here(thresholds, dimension)
-    if trade_offs.open:
-        with trade_offs:
-            show_trade_offs(thresholds, point, dimension)
-    else:
-        with largest:
-            show_largest(thresholds, point, dimension)
-
-
 def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
     """The rules with the most support."""
     rules = int(point.rule_count[0, 0])
@@ -372,8 +380,11 @@ def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None
         st.caption(f"The {len(shown)} rules with the most support, of {rules:,}.")
 
 
-def show_trade_offs(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
-    """The Pareto front."""
+@st.fragment(key="front")
+def show_trade_offs(dimension: int | None) -> None:
+    """The rule sets that no other one beats."""
+    thresholds = state.chosen_thresholds()
+    point = here(thresholds, dimension)
     trees = grown if dimension is None else (grown[dimension],)
     with st.spinner("Looking for the best trade-offs …"):
         front = state.pareto(trees, lift=thresholds.lift, depth=thresholds.max_depth)
@@ -411,7 +422,7 @@ def show_trade_offs(thresholds: Thresholds, point: Landscape, dimension: int | N
 
 # --- the page ----------------------------------------------------------------------------------
 
-st.title("Thresholds")
+take_over()
 st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "
     "have done the same in at least a certain share of those (confidence)."
@@ -436,13 +447,21 @@ whole = state.landscape(
     depth=in_force.max_depth,
 )
 landscape = whole if dimension is None else whole.dimensions[dimension]
-with top:
-    controls(dimension, landscape)
 if view == SURFACES:
     show_surfaces(landscape, LAYERS[shown], dimension)
 else:
     show_maps(landscape, LAYERS[shown])
-details(dimension)
+largest, trade_offs = st.tabs(
+    [LARGEST, TRADE_OFFS], key="details", on_change="rerun", bind="query-params"
+)
+table = None
+if trade_offs.open:
+    with trade_offs:
+        show_trade_offs(dimension)
+else:
+    table = largest.empty()
+with top:
+    controls(dimension, landscape, table)
 st.page_link(
     "rules.py", label="All rules, with the evidence behind each", icon=":material/arrow_forward:"
 )
