@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("sarl_core", "pages", "tests", "benchmarks")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
-TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist", "kaleido"}
+TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
 
 
 def python_files() -> list[Path]:
@@ -70,7 +70,9 @@ def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
         for path in python_files()
         if path.relative_to(ROOT).parts[0] not in ("tests", "benchmarks")
     ]
-    assert packages_of(imported(files)) | {"kaleido", "imageio-ffmpeg"} == set(pins("requirements.txt"))
+    assert packages_of(imported(files)) | {"kaleido", "imageio-ffmpeg"} == set(
+        pins("requirements.txt")
+    )
 
 
 def test_what_tests_and_benchmarks_import_is_pinned():

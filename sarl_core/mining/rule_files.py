@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,15 @@ from typing import Any
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
-from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
 VERSION = 1
 _MAX_BYTES = 256 * 2**20
+_LARGEST = sys.float_info.max
+_MOST = 2**53  # whole numbers up to here are exact in floating point too
 
 
 def rules_to_json(rule_set: RuleSet) -> str:
@@ -178,13 +180,25 @@ class _Reader:
         kinds = kind if isinstance(kind, tuple) else (kind,)
         boolean = isinstance(value, bool) and bool not in kinds
         if value is not default and (boolean or not isinstance(value, kinds)):
-            raise self.fail(f"{key!r} is {value!r}, of the wrong kind")
+            raise self.fail(f"{key!r} is {_shown(value)}, of the wrong kind")
         return value
 
-    def number(self, key: str, default: Any = ...) -> float:
-        value = float(self.take(key, (int, float), default))
-        if not math.isfinite(value):
-            raise self.fail(f"{key!r} is {value}, not a finite number")
+    def has(self, key: str) -> bool:
+        return key in self._value
+
+    def number(
+        self, key: str, default: Any = ..., *, low: float = -_LARGEST, high: float = _LARGEST
+    ) -> float:
+        value = self.take(key, (int, float), default)
+        # Compared before it is converted: an integer may be too large for a float.
+        if not low <= value <= high:
+            raise self.fail(f"{key!r} is {_shown(value)}, not a number from {low:g} to {high:g}")
+        return float(value)
+
+    def count(self, key: str, default: Any = ..., *, low: int = 0, high: int = _MOST) -> int:
+        value: int = self.take(key, int, default)
+        if not low <= value <= high:
+            raise self.fail(f"{key!r} is {_shown(value)}, not a whole number from {low} to {high}")
         return value
 
     def parts(self, key: str) -> list[_Reader]:
@@ -209,6 +223,12 @@ class _Reader:
             raise self.fail(f"{next(iter(self._value))!r} is not known to this version")
 
 
+def _shown(value: object) -> str:
+    """A value from a file, short enough for a sentence."""
+    text = repr(value) if not isinstance(value, int) or abs(value) < _MOST else "far too large"
+    return text if len(text) <= 40 else f"{text[:40]}..."
+
+
 def _rule_set(document: _Reader) -> RuleSet:
     document.take("format", str)
     document.take("version", int)
@@ -218,23 +238,26 @@ def _rule_set(document: _Reader) -> RuleSet:
         raise document.fail("there are no features or no actions")
     thresholds = document.part("thresholds")
     demonstrations = document.part("demonstrations")
+    steps = demonstrations.count("steps", low=1)
     rule_set = RuleSet(
-        rules=tuple(_read_rule(part, len(features), actions) for part in document.parts("rules")),
+        rules=tuple(
+            _read_rule(part, len(features), actions, steps) for part in document.parts("rules")
+        ),
         actions=actions,
         source=Source(
             env_id=document.take("env_id", str),
             features=features,
             digest=demonstrations.take("digest", str),
-            steps=demonstrations.take("steps", int),
-            episodes=demonstrations.take("episodes", int),
+            steps=steps,
+            episodes=demonstrations.count("episodes", low=1),
         ),
         thresholds=Thresholds(
-            support=thresholds.number("support"),
-            confidence=thresholds.number("confidence"),
-            lift=thresholds.number("lift", 0.0),
+            support=thresholds.number("support", low=0, high=1),
+            confidence=thresholds.number("confidence", low=0, high=1),
+            lift=thresholds.number("lift", 0.0, low=0),
             max_depth=thresholds.take("max_depth", (int, type(None)), None),
         ),
-        divider=document.take("divider", int),
+        divider=document.count("divider", low=2, high=MAX_DIVIDER),
     )
     for part in (thresholds, demonstrations, document):
         part.finish()
@@ -254,13 +277,17 @@ def _read_feature(part: _Reader) -> Feature:
 def _read_action(part: _Reader) -> LabelledDimension:
     name, kind = part.take("name", str), part.take("kind", str)
     if kind == "discrete":
-        action = LabelledDimension(name, part.texts("labels"), first=part.take("first", int, 0))
+        action = LabelledDimension(
+            name, part.texts("labels"), first=part.count("first", 0, low=-_MOST)
+        )
         if not action.label_names:
             raise part.fail("'labels' is empty")
     elif kind == "interval":
         edges = part.take("edges", list)
         numeric = all(
-            isinstance(edge, (int, float)) and not isinstance(edge, bool) and math.isfinite(edge)
+            isinstance(edge, (int, float))
+            and not isinstance(edge, bool)
+            and -_LARGEST <= edge <= _LARGEST
             for edge in edges
         )
         if not numeric or len(edges) < 3 or sorted(set(edges)) != edges:
@@ -274,7 +301,9 @@ def _read_action(part: _Reader) -> LabelledDimension:
     return action
 
 
-def _read_rule(part: _Reader, n_features: int, actions: tuple[LabelledDimension, ...]) -> Rule:
+def _read_rule(
+    part: _Reader, n_features: int, actions: tuple[LabelledDimension, ...], steps: int
+) -> Rule:
     conditions = []
     for entry in part.parts("conditions"):
         feature, op = entry.take("feature", int), entry.take("op", str)
@@ -294,19 +323,19 @@ def _read_rule(part: _Reader, n_features: int, actions: tuple[LabelledDimension,
         raise part.fail(f"the origin {origin!r} is neither 'mined' nor 'manual'")
     if part.take("length", int, len(conditions)) != len(conditions):
         raise part.fail(f"'length' does not match its {len(conditions)} conditions")
-    value = part.take("demonstrated_value", (int, float), None)
+    value = part.number("demonstrated_value") if part.has("demonstrated_value") else None
     rule = Rule(
         id=part.take("id", str),
         dimension=dimension,
         conditions=tuple(conditions),
         action=action,
-        support=part.number("support"),
-        confidence=part.number("confidence"),
-        lift=part.number("lift"),
-        samples=part.take("samples", int),
+        support=part.number("support", low=0, high=1),
+        confidence=part.number("confidence", low=0, high=1),
+        lift=part.number("lift", low=0),
+        samples=part.count("samples", high=steps),
         enabled=part.take("enabled", bool, True),
         origin=origin,
-        demonstrated_value=None if value is None else float(value),
+        demonstrated_value=value,
     )
     part.finish()
     return rule

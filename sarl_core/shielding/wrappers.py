@@ -141,32 +141,38 @@ def check_fit(
             f"{rules_of} ask about {len(source.features)} features and the environment's "
             f"observations have {features}; use rules of this environment"
         )
-    if isinstance(action_space, spaces.Discrete):
-        counts: list[int] | None = [int(action_space.n)]
-    elif isinstance(action_space, spaces.MultiDiscrete):
-        counts = [int(n) for n in action_space.nvec.reshape(-1)]
-    elif isinstance(action_space, spaces.MultiBinary):
-        counts = [2] * spaces.utils.flatdim(action_space)
-    else:
-        counts = None
-    wanted = None if actions[0].is_interval else [action.n_labels for action in actions]
-    dimensions = spaces.utils.flatdim(action_space) if counts is None else len(counts)
-    if (
-        dimensions != len(actions)
-        or (counts is None) != (wanted is None)
-        or (
-            counts is not None
-            and wanted is not None
-            and any(have < need for have, need in zip(counts, wanted, strict=True))
+    labels = _labels_of(action_space)
+    wanted = None if actions[0].is_interval else [(a.first, a.n_labels) for a in actions]
+    dimensions = spaces.utils.flatdim(action_space) if labels is None else len(labels)
+    fits = dimensions == len(actions) and (labels is None) == (wanted is None)
+    if fits and labels is not None and wanted is not None:
+        fits = all(
+            first <= least and least + need <= first + have
+            for (first, have), (least, need) in zip(labels, wanted, strict=True)
         )
-    ):
+    if not fits:
         raise InputError(
             f"{rules_of} prescribe {_actions_in_words(wanted, len(actions))} and the environment "
-            f"takes {_actions_in_words(counts, dimensions)}; use rules of this environment"
+            f"takes {_actions_in_words(labels, dimensions)}; use rules of this environment"
         )
 
 
-def _actions_in_words(counts: list[int] | None, dimensions: int) -> str:
-    if counts is None:
+def _labels_of(space: gymnasium.Space[Any]) -> list[tuple[int, int]] | None:
+    """First action and number of actions of each discrete dimension; None if continuous."""
+    spaces = gymnasium.spaces
+    if isinstance(space, spaces.Discrete):
+        return [(int(space.start), int(space.n))]
+    if isinstance(space, spaces.MultiDiscrete):
+        starts = np.asarray(space.start).reshape(-1).tolist()
+        return list(zip(starts, space.nvec.reshape(-1).tolist(), strict=True))
+    if isinstance(space, spaces.MultiBinary):
+        return [(0, 2)] * spaces.utils.flatdim(space)
+    return None
+
+
+def _actions_in_words(labels: list[tuple[int, int]] | None, dimensions: int) -> str:
+    if labels is None:
         return f"{dimensions} continuous action dimension{'s' if dimensions > 1 else ''}"
-    return "discrete actions with " + ", ".join(str(count) for count in counts) + " labels"
+    return "the discrete actions " + ", ".join(
+        f"{first} to {first + count - 1}" for first, count in labels
+    )

@@ -96,11 +96,19 @@ BAD = {
     "a truth value for a number": (lambda d: d["rules"][0].update(samples=True), "'samples'"),
     "a threshold that is no number": (
         lambda d: d["rules"][0]["conditions"][0].update(threshold=float("nan")),
-        "finite",
+        "not a number from",
     ),
+    "a threshold beyond every float": (
+        lambda d: d["rules"][0]["conditions"][0].update(threshold=10**400),
+        "far too large",
+    ),
+    "no steps": (lambda d: d["demonstrations"].update(steps=0), "'steps' is 0"),
+    "a confidence of 7": (lambda d: d["rules"][0].update(confidence=7), "'confidence' is 7"),
+    "more samples than steps": (lambda d: d["rules"][0].update(samples=10**9), "'samples'"),
+    "a divider of 0": (lambda d: d.update(divider=0), "'divider' is 0"),
     "a doubled id": (lambda d: d["rules"].append(d["rules"][0]), "stands twice"),
     "no features": (lambda d: d.update(features=[]), "features"),
-    "an impossible threshold": (lambda d: d["thresholds"].update(support=3.0), "support is 3"),
+    "an impossible threshold": (lambda d: d["thresholds"].update(support=3.0), "'support' is 3"),
     "a rule that is a number": (lambda d: d["rules"].append(5), "not an object"),
 }
 
@@ -129,3 +137,50 @@ def test_a_missing_file_and_a_missing_folder_are_said(tmp_path, lander_like):
         RuleSet.load(tmp_path / "none.json")
     with pytest.raises(InputError, match="does not exist"):
         mine_rules(lander_like, supp_min=0.1, conf_min=0.5).save(tmp_path / "no" / "rules.json")
+
+
+ODD = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.just(10**400),
+    st.just(-(10**30)),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.integers(), max_size=3),
+    st.just({}),
+    st.just([[]]),
+)
+
+
+def places(value, path=()):
+    """Where a document holds anything, however deep."""
+    if isinstance(value, dict):
+        for key in value:
+            yield (*path, key)
+            yield from places(value[key], (*path, key))
+    elif isinstance(value, list):
+        for index, entry in enumerate(value[:2]):
+            yield (*path, index)
+            yield from places(entry, (*path, index))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_whatever_stands_in_a_file_is_read_or_refused_in_a_sentence(document, data):
+    copy = json.loads(json.dumps(document))
+    *path, last = data.draw(st.sampled_from(list(places(copy))))
+    target = copy
+    for key in path:
+        target = target[key]
+    target[last] = data.draw(ODD)
+    try:
+        rules = read(copy)
+    except InputError as caught:
+        said = str(caught)
+    else:
+        said = ""
+        assert 0 <= rules.coverage <= len(rules)
+        assert rules_from_json(rules_to_json(rules)) == rules
+    assert "\n" not in said
+    assert len(said) < 400

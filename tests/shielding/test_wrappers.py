@@ -225,3 +225,10 @@ def test_rules_of_another_environment_are_refused(cartpole):
     lander = shield_for("lunar_lander")
     with pytest.raises(InputError, match="continuous"):
         ShieldedEnv(gymnasium.make("LunarLander-v3", continuous=True), lander)
+
+
+def test_labels_that_start_elsewhere_are_refused():
+    env = gymnasium.make("CartPole-v1")
+    env.action_space = gymnasium.spaces.Discrete(2, start=5)
+    with pytest.raises(InputError, match=r"0 to 1 and the environment takes .* 5 to 6"):
+        ShieldedEnv(env, shield_for("cartpole"))
