@@ -101,7 +101,7 @@ class Panel:
             self._write_end(canvas)
         else:
             spoken = self.spoken_of(number) if held else number
-            self._write_step(canvas, spoken, aside=f"step {spoken}" if held else "")
+            self._write_step(canvas, spoken, aside=f"at step {spoken}" if held else "")
         self._draw_bar(canvas, number)
         return canvas.pixels
 
@@ -119,7 +119,7 @@ class Panel:
         right = width - _MARGIN
         if aside:
             canvas.text_right(right, top + 14, aside, 13, INKS.quiet)
-            right -= 82
+            right -= 100
         caption = self.caption(step)
         ink, on_ink = {
             "CHANGED": (INKS.changed, INKS.on_changed),
