@@ -9,7 +9,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import PolicyAgent
+from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.files import write_card
 from sarl_core.rollouts.policies import MlpPolicy, Normalisation
 
@@ -40,7 +42,6 @@ class Recipe:
         normalise: Whether observations and rewards are normalised while learning.
         parameters: Handed to the algorithm; a ``"linear:x"`` learning rate falls from x to 0.
         validation_every: Steps between validations.
-        env_parameters: Handed to ``gymnasium.make``.
         gamma: Discount factor.
     """
 
@@ -50,7 +51,6 @@ class Recipe:
     normalise: bool
     parameters: Mapping[str, Any]
     validation_every: int
-    env_parameters: Mapping[str, Any] = field(default_factory=dict)
     gamma: float = 0.99
 
 
@@ -135,8 +135,8 @@ def train_expert(
     env.close()
     _, policy, best_steps = best
     policy.save(out)
-    returns = _returns(env_id, recipe, policy, episodes=100, seed=_REPORT_SEED)
-    sampled = _returns(env_id, recipe, policy, episodes=100, seed=_REPORT_SEED, stochastic=True)
+    returns = _returns(env_id, policy, episodes=100, seed=_REPORT_SEED)
+    sampled = _returns(env_id, policy, episodes=100, seed=_REPORT_SEED, stochastic=True)
     card = _card(
         env_id, recipe, seed, total, best_steps, returns, sampled, time.monotonic() - started, out
     )
@@ -196,9 +196,7 @@ def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm
     from stable_baselines3.common.vec_env import VecNormalize
 
     torch.set_num_threads(1)  # the networks are too small to gain from more
-    env: VecEnv = make_vec_env(
-        env_id, n_envs=recipe.n_envs, seed=seed, env_kwargs=dict(recipe.env_parameters)
-    )
+    env: VecEnv = make_vec_env(env_id, n_envs=recipe.n_envs, seed=seed)
     if recipe.normalise:
         env = VecNormalize(env, gamma=recipe.gamma)
     parameters = dict(recipe.parameters)
@@ -231,7 +229,7 @@ def _keep_best(
 
         def validate(self) -> None:
             policy = export_policy(self.model, env_id=env_id)
-            returns = _returns(env_id, recipe, policy, episodes=50, seed=_VALIDATION_SEED)
+            returns = _returns(env_id, policy, episodes=50, seed=_VALIDATION_SEED)
             score = float(np.mean(returns))
             if self.best is None or score >= self.best[0]:
                 self.best = (score, policy, self.num_timesteps)
@@ -247,38 +245,12 @@ def _keep_best(
 
 
 def _returns(
-    env_id: str,
-    recipe: Recipe,
-    policy: MlpPolicy,
-    *,
-    episodes: int,
-    seed: int,
-    stochastic: bool = False,
+    env_id: str, policy: MlpPolicy, *, episodes: int, seed: int, stochastic: bool = False
 ) -> NDArray[np.float64]:
-    import gymnasium
-
-    envs = [
-        gymnasium.make(env_id, disable_env_checker=True, **recipe.env_parameters)
-        for _ in range(episodes)
-    ]
-    observations = np.array([env.reset(seed=seed + i)[0] for i, env in enumerate(envs)])
-    generators = [np.random.default_rng(seed + i) for i in range(episodes)]
-    returns = np.zeros(episodes)
-    active = np.arange(episodes)
-    while len(active):
-        uniforms = None
-        if stochastic:
-            uniforms = np.array([generators[i].random(policy.n_dimensions) for i in active])
-        actions = policy.act(observations[active].astype(np.float32), uniforms)
-        going = []
-        for i, action in zip(active, actions, strict=True):
-            step = envs[i].step(int(action[0]) if policy.is_discrete else action)
-            observations[i] = step[0]
-            returns[i] += float(step[1])
-            if not (step[2] or step[3]):
-                going.append(i)
-        active = np.array(going, dtype=int)
-    return returns
+    """Returns of a policy, episode by episode."""
+    first = np.zeros(policy.n_dimensions, dtype=np.int64)
+    agent = PolicyAgent("expert", policy, stochastic, first)
+    return rollout(env_id, agent, episodes=episodes, seed=seed, keep_steps=False).returns
 
 
 def _card(
@@ -319,7 +291,6 @@ def _card(
         "normalised": recipe.normalise,
         "gamma": recipe.gamma,
         "parameters": dict(recipe.parameters),
-        "environment_parameters": dict(recipe.env_parameters),
         "report_seeds": f"{_REPORT_SEED} and up",
         "returns_deterministic": summary(returns),
         "returns_sampled": summary(sampled),
