@@ -16,7 +16,11 @@ ROW_HEIGHT = 33  # pixels, at the theme's font size
 
 
 def column_config(rule_set: RuleSet) -> dict[str, Any]:
-    """What the columns look like; all have help that says what they mean."""
+    """What the columns look like; all have help that says what they mean.
+
+    The widths sum to what is left of a window 1440 pixels wide; on a phone the action and the
+    beginning of the conditions are seen.
+    """
     column = st.column_config
     colours = {
         action_text(label, dimension): label_colour(label)
@@ -24,17 +28,18 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         for label in range(dimension.n_labels)
     }
     return {
-        "If": column.TextColumn(width="large", help="When the rule applies"),
-        "Then": column.MultiselectColumn(
-            width="medium",
+        "Action": column.MultiselectColumn(
+            width=150,
             help="What the expert does there",
             options=list(colours),
             color=list(colours.values()),
         ),
+        "When": column.TextColumn(width=322, help="The conditions under which the rule applies"),
         "Support": column.NumberColumn(
-            format="%.4f", help="Share of all states to which the rule applies"
+            width=80, format="%.4f", help="Share of all states to which the rule applies"
         ),
         "Confidence": column.ProgressColumn(
+            width=112,
             min_value=0.0,
             max_value=1.0,
             format="%.3f",
@@ -42,16 +47,17 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             help="Share of those in which the expert did what the rule says",
         ),
         "Lift": column.NumberColumn(
-            format="%.2f", help="Confidence over the action's share of all states"
+            width=58, format="%.2f", help="Confidence over the action's share of all states"
         ),
         "Joint support": column.NumberColumn(
+            width=100,
             format="%.4f",
             help="Share of all states to which the rule applies and in which it is right",
         ),
         "States": column.NumberColumn(
-            format="localized", help="Demonstrated states to which the rule applies"
+            width=72, format="localized", help="Demonstrated states to which the rule applies"
         ),
-        "Length": column.NumberColumn(help="Number of queries on the way to the rule"),
+        "Length": column.NumberColumn(width=68, help="Number of conditions on the way to the rule"),
     }
 
 
@@ -61,7 +67,7 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
 
     columns = rule_columns(rules, rule_set)
     # A list of one, which the table shows in the action's colour.
-    columns["Then"] = [[action] for action in columns["Then"]]
+    columns["Action"] = [[action] for action in columns["Action"]]
     return pd.DataFrame(columns)
 
 

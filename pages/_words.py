@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
+_SIGNS = r"\`*_{}[]<>#$~|:&!^+-"
+# What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
+_JOINER = "\u2060"
+_BREAKS = re.compile(r"(?<=:)(?=//|[\w+-]+:)|(?<=@)|(?<=www)(?=\.)", re.IGNORECASE)
+
 
 def in_full(text: str) -> str:
     """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
@@ -10,5 +17,6 @@ def in_full(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text that Markdown leaves alone."""
-    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>#$~|:" else sign for sign in text)
+    """Text that Markdown leaves alone: names come from files."""
+    broken = _BREAKS.sub(_JOINER, text)
+    return "".join(f"\\{sign}" if sign in _SIGNS else sign for sign in broken)

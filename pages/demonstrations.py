@@ -169,8 +169,8 @@ def overview(demonstrations: Demonstrations, found: Contents) -> None:
             else "There are no rewards in these data.",
         )
     parts = [
-        f"Environment **{demonstrations.env_id or 'not given'}**",
-        f"shown by **{demonstrations.agent}**" if demonstrations.agent else "",
+        f"Environment **{escaped(demonstrations.env_id or 'not given')}**",
+        f"shown by **{escaped(demonstrations.agent)}**" if demonstrations.agent else "",
         f"seed {demonstrations.seed}" if demonstrations.seed is not None else "",
         f"fingerprint `{demonstrations.digest[:12]}`",
     ]
@@ -254,7 +254,9 @@ def features_section(demonstrations: Demonstrations, found: Contents, divider: i
         for index, figure in zip(shown, figures, strict=True):
             with grid.cell():
                 unit = found.rows[index].unit
-                st.markdown(f"**{escaped(names[index])}**" + (f" :gray[{unit}]" if unit else ""))
+                st.markdown(
+                    f"**{escaped(names[index])}**" + (f" :gray[{escaped(unit)}]" if unit else "")
+                )
                 st.plotly_chart(
                     figure,
                     config=PLAIN,

@@ -8,18 +8,35 @@ from typing import Any
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
+from _words import escaped
 
 from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import action_text, conditions_text, sentence, share_text
+from sarl_core.explaining.language import (
+    action_text,
+    conditions_text,
+    counted,
+    sentence,
+    share_text,
+)
 from sarl_core.explaining.path_table import path_table
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
 
 TABLE_ROWS = 8
 FEATURES_SHOWN = 12
+MEASURES = """
+**Support**: share of all states to which the rule applies.
+
+**Confidence**: share of those in which the expert did what the rule says.
+
+**Lift**: confidence over the action's share of all states; above 1, the conditions make the action
+more frequent than it is overall.
+
+**Joint support**: share of all states to which the rule applies and in which it is right.
+"""
 WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
 st.title("Rules")
@@ -150,12 +167,13 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     tree = grown[rule.dimension]
     node = node_of(rule)
     with st.container(border=True, key="sentence"):
-        st.markdown(f"#### {escape_markdown(sentence(rule, rule_set))}")
+        st.markdown(f"#### {escaped(sentence(rule, rule_set))}")
         st.caption(
             f"Rule {rule.id} · support {share_text(rule.support)} · confidence "
             f"{share_text(rule.confidence)} · lift {rule.lift:.2f} · joint support "
-            f"{share_text(rule.joint_support)} · {rule.length} queries on "
-            f"{rule.merged_length} features"
+            f"{share_text(rule.joint_support)} · {counted(rule.length, 'condition')} on "
+            f"{counted(rule.merged_length, 'feature')}",
+            help=MEASURES,
         )
         if not rule.conditions:
             st.info(
@@ -173,11 +191,6 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     if rule.conditions:
         show_features(rule)
     show_examples(rule)
-
-
-def escape_markdown(text: str) -> str:
-    """Text whose signs Markdown leaves alone: names come from files."""
-    return "".join(f"\\{sign}" if sign in "\\`*_{}[]<>#+-!|$~:^" else sign for sign in text)
 
 
 def show_tree(rule: Rule) -> None:
@@ -207,9 +220,9 @@ def show_tree(rule: Rule) -> None:
         alt="The decision tree with the path of the rule",
     )
     st.caption(
-        f"{tree.n_nodes:,} nodes; each box is as wide as its share of the states. Rules are full "
-        "in colour, what is cut off below them is grey. Drag or scroll to zoom, double-click to "
-        "go back."
+        f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. "
+        "Rules are full in colour, what is cut off below them is grey. Drag or scroll to zoom, "
+        "double-click to go back."
     )
 
 
@@ -223,7 +236,7 @@ def show_features(rule: Rule) -> None:
         for column, one in zip(st.columns(3), found[start : start + 3], strict=False):
             feature = demonstrations.features[one.feature]
             with column:
-                st.markdown(f"**{escape_markdown(figures.interval_text(one, feature))}**")
+                st.markdown(f"**{escaped(figures.interval_text(one, feature))}**")
                 st.plotly_chart(
                     figures.feature_figure(one, feature, colour),
                     key=f"feature_{one.feature}",
@@ -247,10 +260,14 @@ def show_examples(rule: Rule) -> None:
         height=table_height(count, 10),
         key="examples",
         column_config={
+            "Expert did": st.column_config.TextColumn(width=130),
+            "As the rule says": st.column_config.CheckboxColumn(width=125),
+        }
+        | {
             name: st.column_config.NumberColumn(
                 format="%d" if name in ("Episode", "Step") else "%.4g"
             )
-            for name in ("Episode", "Step", *list(columns)[4:])
+            for name in list(columns)[2:]
         },
         alt="States to which the rule applies",
     )

@@ -11,6 +11,7 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.distributions import EpisodeSeries, Histogram
 from sarl_core.explaining.language import label_text
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 
 FEATURE_HEIGHT = 170
@@ -39,7 +40,7 @@ def feature_figure(
     if histogram.values is not None:
         positions, widths = [f"{value:g}" for value in histogram.values], 0.72
     for label in range(dimension.n_labels):
-        name = label_text(label, dimension)
+        name = plain(label_text(label, dimension))
         figure.add_bar(
             x=positions,
             y=100 * histogram.counts[label] / total,
@@ -51,7 +52,8 @@ def feature_figure(
         )
     figure.update_layout(**_layout(FEATURE_HEIGHT), barmode="stack", bargap=0)
     figure.update_xaxes(
-        nticks=5, fixedrange=True,
+        nticks=5,
+        fixedrange=True,
         type="category" if histogram.values is not None else "linear",
     )
     figure.update_yaxes(nticks=4, rangemode="tozero", ticksuffix=" %", fixedrange=True)
@@ -73,27 +75,36 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
     if not dimension.is_interval:
         shares = 100 * histogram.counts.sum(axis=1) / total
         figure.add_bar(
-            y=list(dimension.label_names), x=shares, orientation="h",
+            y=[plain(name) for name in dimension.label_names],
+            x=shares,
+            orientation="h",
             marker={"color": [label_colour(label) for label in range(dimension.n_labels)]},
-            text=[f"{share:.1f} %" for share in shares], textposition="outside",
+            text=[f"{share:.1f} %" for share in shares],
+            textposition="outside",
             cliponaxis=False,
             customdata=histogram.counts.sum(axis=1),
             hovertemplate="%{y}: %{customdata:,} steps<extra></extra>",
         )
         height = 40 + 34 * dimension.n_labels
         figure.update_layout(**_layout(min(height, 900)))
-        figure.update_xaxes(visible=False, range=[0, max(float(shares.max()), 1.0) * 1.25],
-                            fixedrange=True)
-        figure.update_yaxes(autorange="reversed", fixedrange=True, ticklabelstandoff=6)
+        figure.update_xaxes(
+            visible=False, range=[0, max(float(shares.max()), 1.0) * 1.25], fixedrange=True
+        )
+        # A category, said so: Plotly takes names such as "0" and "1" for numbers.
+        figure.update_yaxes(
+            type="category", autorange="reversed", fixedrange=True, ticklabelstandoff=6
+        )
         return figure
     texts = _bin_texts(histogram, "")
     for label in range(dimension.n_labels):
-        name = label_text(label, dimension)
+        name = plain(label_text(label, dimension))
         figure.add_bar(
-            x=histogram.centres, y=100 * histogram.counts[label] / total,
+            x=histogram.centres,
+            y=100 * histogram.counts[label] / total,
             width=np.diff(histogram.edges),
             marker={"color": label_colour(label), "line": {"width": 0}},
-            name=name, customdata=texts,
+            name=name,
+            customdata=texts,
             hovertemplate="%{customdata}<br>%{y:.2f} % of the steps<extra></extra>",
         )
     for edge in dimension.inner_edges:
@@ -118,24 +129,36 @@ def episode_figure(series: EpisodeSeries, name: str, colour: str) -> go.Figure:
     figure = go.Figure()
     texts = [
         f"episodes {first} to {last}: {name} {mean:,.1f} on average, {low:,.1f} to {high:,.1f}"
-        if last > first else
-        f"episode {first}: {name} {mean:,.1f}" + (" (recording stopped here)" if open_ended else "")
+        if last > first
+        else f"episode {first}: {name} {mean:,.1f}"
+        + (" (recording stopped here)" if open_ended else "")
         for first, last, mean, low, high, open_ended in zip(
-            series.first.tolist(), series.last.tolist(), series.mean.tolist(),
-            series.low.tolist(), series.high.tolist(), series.unfinished.tolist(), strict=True,
+            series.first.tolist(),
+            series.last.tolist(),
+            series.mean.tolist(),
+            series.low.tolist(),
+            series.high.tolist(),
+            series.unfinished.tolist(),
+            strict=True,
         )
     ]
     if series.is_grouped:
         figure.add_scatter(
             x=np.concatenate([series.first, series.first[::-1]]),
             y=np.concatenate([series.high, series.low[::-1]]),
-            fill="toself", mode="none", fillcolor=faded(colour, 0.2), hoverinfo="skip",
+            fill="toself",
+            mode="none",
+            fillcolor=faded(colour, 0.2),
+            hoverinfo="skip",
         )
     symbols = np.where(series.unfinished & (series.first == series.last), "circle-open", "circle")
     figure.add_scatter(
-        x=series.first, y=series.mean, mode="markers",
+        x=series.first,
+        y=series.mean,
+        mode="markers",
         marker={"color": colour, "size": 6, "symbol": symbols, "opacity": 0.85},
-        text=texts, hovertemplate="%{text}<extra></extra>",
+        text=texts,
+        hovertemplate="%{text}<extra></extra>",
     )
     figure.update_layout(**_layout(EPISODE_HEIGHT))
     figure.update_xaxes(title={"text": "episode", "standoff": 4}, nticks=6, fixedrange=True)
@@ -148,7 +171,7 @@ def episode_figure(series: EpisodeSeries, name: str, colour: str) -> go.Figure:
 
 
 def _bin_texts(histogram: Histogram, unit: str) -> list[str]:
-    suffix = f" {unit}" if unit else ""
+    suffix = f" {plain(unit)}" if unit else ""
     if histogram.values is not None:
         return [f"{value:g}{suffix}" for value in histogram.values]
     return [

@@ -93,8 +93,9 @@ def feature_rows(demonstrations: Demonstrations) -> tuple[FeatureRow, ...]:
     low, high = observations.min(axis=0), observations.max(axis=0)
     medians = [float(np.median(observations[:, index])) for index in range(observations.shape[1])]
     return tuple(
-        FeatureRow(feature.name, feature.unit, float(low[index]), medians[index],
-                   float(high[index]))
+        FeatureRow(
+            feature.name, feature.unit, float(low[index]), medians[index], float(high[index])
+        )
         for index, feature in enumerate(demonstrations.features)
     )
 
@@ -146,8 +147,9 @@ def interval_histogram(
     """
     k = dimension.n_labels
     each = max(1, bins // k)
-    parts = [np.linspace(low, high, each, endpoint=False)
-             for low, high in pairwise(dimension.edges)]
+    parts = [
+        np.linspace(low, high, each, endpoint=False) for low, high in pairwise(dimension.edges)
+    ]
     edges = np.concatenate([*parts, [dimension.edges[-1]]])
     index = np.searchsorted(edges[1:-1], values.astype(np.float64), side="right")
     return Histogram(edges, _count(index, index // each, k, k * each))
@@ -178,7 +180,8 @@ def episode_series(
         mean=np.add.reduceat(numbers, starts) / (ends - starts),
         low=np.minimum.reduceat(numbers, starts),
         high=np.maximum.reduceat(numbers, starts),
-        unfinished=np.zeros(len(starts), dtype=np.bool_) if finished is None
+        unfinished=np.zeros(len(starts), dtype=np.bool_)
+        if finished is None
         else ~finished[ends - 1],
     )
 

@@ -183,8 +183,8 @@ def example_columns(
         count: How many at most.
 
     Returns:
-        Episode, step, what the expert did, whether that is what the rule says, and every
-        feature, rounded for display, those of the rule first.
+        What the expert did, whether that is what the rule says, every feature, rounded for
+        display, those of the rule first, and at last episode and step.
     """
     rows = example_rows(tree, node_of(rule), count)
     dimension = tree.dimension
@@ -197,8 +197,6 @@ def example_columns(
         else [label_text(label, dimension) for label in labels.tolist()]
     )
     columns: dict[str, list[object]] = {
-        "Episode": demonstrations.episodes[rows].tolist(),
-        "Step": demonstrations.steps[rows].tolist(),
         "Expert did": list(did),
         "As the rule says": (labels == rule.action).tolist(),
     }
@@ -208,5 +206,9 @@ def example_columns(
         feature = demonstrations.features[index]
         name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         values = demonstrations.observations[rows, index].astype(np.float64)
+        if name in (*columns, "Episode", "Step"):
+            name = f"{name} [{index}]"  # a column of a table has a name of its own
         columns[name] = np.round(values, _decimals(values)).tolist()
+    columns["Episode"] = demonstrations.episodes[rows].tolist()
+    columns["Step"] = demonstrations.steps[rows].tolist()
     return columns

@@ -5,7 +5,13 @@ from __future__ import annotations
 import csv
 import io
 
-from sarl_core.explaining.language import exact_condition, label_text, sentence, share_text
+from sarl_core.explaining.language import (
+    counted,
+    exact_condition,
+    label_text,
+    sentence,
+    share_text,
+)
 from sarl_core.mining.rules import RuleSet
 
 CSV_COLUMNS = (
@@ -83,20 +89,21 @@ def rules_to_text(rule_set: RuleSet) -> str:
     if thresholds.lift:
         limits.append(f"lift at least {thresholds.lift:g}")
     if thresholds.max_depth is not None:
-        limits.append(f"at most {thresholds.max_depth} conditions")
+        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
     if any(dimension.is_interval for dimension in rule_set.actions):
         limits.append(f"divider {rule_set.divider}")
     lines = [
         f"Rules for {source.env_id or 'an unnamed environment'}",
-        f"Mined from {source.steps:,} steps in {source.episodes:,} episodes: {', '.join(limits)}.",
-        f"{rule_set.rule_count:,} rules, {rule_set.mean_length:.2f} conditions on average; they "
-        f"cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"Mined from {counted(source.steps, 'step')} in "
+        f"{counted(source.episodes, 'episode')}: {', '.join(limits)}.",
+        f"{counted(rule_set.rule_count, 'rule')}, {rule_set.mean_length:.2f} conditions on "
+        f"average; they cover {share_text(rule_set.coverage)} of the states and are right in "
         f"{share_text(rule_set.fidelity)} of those.",
         "They were learned from examples and guarantee nothing.",
     ]
     for index, dimension in enumerate(rule_set.actions):
         rules = sorted(rule_set.of_dimension(index), key=lambda rule: -rule.support)
-        lines += ["", f"{dimension.name}: {len(rules):,} rules", ""]
+        lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
         lines += [
             f"{number:>4}. {sentence(rule, rule_set)}" for number, rule in enumerate(rules, start=1)
         ]

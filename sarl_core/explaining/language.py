@@ -54,6 +54,19 @@ def threshold_text(value: float) -> str:
     return np.format_float_positional(value, trim="-")
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things.
+
+    Args:
+        count: How many.
+        noun: One of them; an "s" makes it many.
+
+    Returns:
+        As "1 condition" or "1,200 conditions".
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
 def share_text(share: float, *, decimals: int | None = None) -> str:
     """A share as a percentage that never rounds up to all or down to none.
 

@@ -90,7 +90,7 @@ def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
     head = "".join(
         f"<th{css}>{name}</th>"
         for name, css in (
-            ("Query", ""),
+            ("Condition", ""),
             ("States", ' class="n"'),
             ("Support", ' class="n s"'),
             ("Confidence", ' class="n"'),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.explaining.language import action_text, number_text, sentence
+from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Track
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
@@ -82,7 +82,9 @@ def environment_dimensions(
         return tuple(
             LabelledDimension(name, labels, first=first)
             for name, labels, first in zip(
-                description.action_names, description.label_names, description.label_first,
+                description.action_names,
+                description.label_names,
+                description.label_first,
                 strict=True,
             )
         )
@@ -127,8 +129,11 @@ def tracks(
 
 
 def step_view(
-    steps: StepTable, row: int, dimensions: tuple[LabelledDimension, ...],
-    features: tuple[Feature, ...], rule_set: RuleSet | None,
+    steps: StepTable,
+    row: int,
+    dimensions: tuple[LabelledDimension, ...],
+    features: tuple[Feature, ...],
+    rule_set: RuleSet | None,
 ) -> StepView:
     """One step in words.
 
@@ -147,16 +152,18 @@ def step_view(
         proposed, executed = steps.proposed[row, index], steps.executed[row, index]
         rule = int(steps.rules[row, index])
         known = rule_set is not None and rule >= 0
-        views.append(ActionView(
-            dimension=dimension.name,
-            proposed=_in_words(float(proposed), dimension),
-            executed=_in_words(float(executed), dimension),
-            proposed_label=dimension.label_of(float(proposed)),
-            executed_label=dimension.label_of(float(executed)),
-            changed=bool(proposed != executed),
-            rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
-            rule_id=rule_set.rules[rule].id if known and rule_set else "",
-        ))
+        views.append(
+            ActionView(
+                dimension=dimension.name,
+                proposed=_in_words(float(proposed), dimension),
+                executed=_in_words(float(executed), dimension),
+                proposed_label=dimension.label_of(float(proposed)),
+                executed_label=dimension.label_of(float(executed)),
+                changed=bool(proposed != executed),
+                rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
+                rule_id=rule_set.rules[rule].id if known and rule_set else "",
+            )
+        )
     state = tuple(
         (feature.name, number_text(float(value)), feature.unit)
         for feature, value in zip(features, steps.observation[row], strict=True)
@@ -179,18 +186,23 @@ def step_texts(
     """
     lines: list[list[str]] = [[f"step {step}"] for step in steps.step.tolist()]
     for index, dimension in enumerate(dimensions):
-        prefix = f"{dimension.name}: " if len(dimensions) > 1 else ""
-        pairs = zip(steps.proposed[:, index].tolist(), steps.executed[:, index].tolist(),
-                    steps.rules[:, index].tolist(), strict=True)
+        prefix = f"{plain(dimension.name)}: " if len(dimensions) > 1 else ""
+        pairs = zip(
+            steps.proposed[:, index].tolist(),
+            steps.executed[:, index].tolist(),
+            steps.rules[:, index].tolist(),
+            strict=True,
+        )
         for line, (proposed, executed, rule) in zip(lines, pairs, strict=True):
-            done = html.escape(_in_words(executed, dimension))
+            done = plain(_in_words(executed, dimension))
             if proposed != executed:
-                wanted = html.escape(_in_words(proposed, dimension))
+                wanted = plain(_in_words(proposed, dimension))
                 line.append(f"{prefix}wanted {wanted}, done {done}")
             else:
                 line.append(f"{prefix}{done}")
             if rule_set is not None:
-                line.append(f"rule {rule_set.rules[rule].id}" if rule >= 0 else "no rule applies")
+                known = f"rule {plain(rule_set.rules[rule].id)}" if rule >= 0 else ""
+                line.append(known or "no rule applies")
     return tuple("<br>".join(line) for line in lines)
 
 
@@ -201,11 +213,14 @@ def margin_text(margin: float) -> str:
         margin: In the feature's own unit; inf where no threshold was looked at.
 
     Returns:
-        As "0.013 from the nearest threshold".
+        As "Smallest distance to a threshold on the way: 0.013 (in that feature's unit)".
     """
     if math.isinf(margin):
-        return "no threshold was looked at"
-    return f"{number_text(margin)} from the nearest threshold"
+        return "No threshold was looked at"
+    return (
+        f"Smallest distance to a threshold on the way: {number_text(margin)} "
+        "(in that feature's unit)"
+    )
 
 
 def _in_words(value: float, dimension: LabelledDimension) -> str:

@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR, label_colour
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 
 SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it
@@ -70,9 +71,7 @@ class ReturnRow:
     colour: str
 
 
-def intervention_strip(
-    tracks: Sequence[Track], texts: Sequence[str], *, current: int
-) -> go.Figure:
+def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current: int) -> go.Figure:
     """What the agent wanted, what was executed and where the two differ, step by step.
 
     Plotly reports no click on a heatmap, so points too small to see lie over it; each carries
@@ -92,25 +91,42 @@ def intervention_strip(
     for row, track in enumerate(tracks):
         n_labels = track.dimension.n_labels if track.dimension is not None else 1
         figure.add_heatmap(
-            x=steps, y=[row], z=track.labels[None, :], zmin=-0.5, zmax=n_labels - 0.5,
+            x=steps,
+            y=[row],
+            z=track.labels[None, :],
+            zmin=-0.5,
+            zmax=n_labels - 0.5,
             colorscale=_steps_of_colour(n_labels, marks=track.dimension is None),
-            showscale=False, hoverinfo="skip", ygap=5,
+            showscale=False,
+            hoverinfo="skip",
+            ygap=5,
         )
     figure.add_scatter(
-        x=np.tile(steps, len(tracks)), y=np.repeat(np.arange(len(tracks)), n_steps),
-        mode="markers", marker={"size": 1, "opacity": 0},
-        customdata=np.tile(steps, len(tracks))[:, None], text=list(texts) * len(tracks),
+        x=np.tile(steps, len(tracks)),
+        y=np.repeat(np.arange(len(tracks)), n_steps),
+        mode="markers",
+        marker={"size": 1, "opacity": 0},
+        customdata=np.tile(steps, len(tracks))[:, None],
+        text=list(texts) * len(tracks),
         hovertemplate="%{text}<extra></extra>",
     )
     figure.add_vline(x=current, line={"color": _CURRENT, "width": 2})
     figure.update_layout(**_layout(max(_ROW_HEIGHT * len(tracks) + 60, 128)), hoverdistance=-1)
     figure.update_xaxes(
-        title={"text": "step", "standoff": 2}, range=[-0.5, max(n_steps, 2) - 0.5],
-        fixedrange=True, showgrid=False, zeroline=False, nticks=8,
+        title={"text": "step", "standoff": 2},
+        range=[-0.5, max(n_steps, 2) - 0.5],
+        fixedrange=True,
+        showgrid=False,
+        zeroline=False,
+        nticks=8,
     )
     figure.update_yaxes(
-        tickvals=list(range(len(tracks))), ticktext=[track.name for track in tracks],
-        range=[len(tracks) - 0.5, -0.5], fixedrange=True, showgrid=False, zeroline=False,
+        tickvals=list(range(len(tracks))),
+        ticktext=[plain(track.name) for track in tracks],
+        range=[len(tracks) - 0.5, -0.5],
+        fixedrange=True,
+        showgrid=False,
+        zeroline=False,
         ticklabelstandoff=6,
     )
     return figure
@@ -129,24 +145,35 @@ def return_figure(lines: Sequence[ReturnLine], *, current: int) -> go.Figure:
     figure = go.Figure()
     for line in lines:
         figure.add_scatter(
-            x=np.arange(len(line.returns)), y=line.returns, mode="lines", name=line.name,
+            x=np.arange(len(line.returns)),
+            y=line.returns,
+            mode="lines",
+            name=plain(line.name),
             line={"color": line.colour, "width": 2.2},
-            hovertemplate=f"{line.name}, step %{{x}}: %{{y:,.1f}}<extra></extra>",
+            hovertemplate=f"{plain(line.name)}, step %{{x}}: %{{y:,.1f}}<extra></extra>",
         )
         figure.add_scatter(
-            x=[len(line.returns) - 1], y=line.returns[-1:], mode="markers", showlegend=False,
+            x=[len(line.returns) - 1],
+            y=line.returns[-1:],
+            mode="markers",
+            showlegend=False,
             marker={"color": line.colour, "size": 8},
-            hovertemplate=f"{line.name} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
+            hovertemplate=f"{plain(line.name)} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
         )
     figure.add_vline(x=current, line={"color": _CURRENT, "width": 1, "dash": "dot"})
     figure.update_layout(**_layout(210))
     figure.update_layout(
-        showlegend=len(lines) > 1, margin={"t": 30 if len(lines) > 1 else 8},
+        showlegend=len(lines) > 1,
+        margin={"t": 30 if len(lines) > 1 else 8},
         legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
     )
     longest = max(len(line.returns) for line in lines)
-    figure.update_xaxes(title={"text": "step", "standoff": 2}, fixedrange=True, nticks=8,
-                        range=[-0.5, max(longest, 2) - 0.5])
+    figure.update_xaxes(
+        title={"text": "step", "standoff": 2},
+        fixedrange=True,
+        nticks=8,
+        range=[-0.5, max(longest, 2) - 0.5],
+    )
     figure.update_yaxes(title={"text": "return so far", "standoff": 4}, fixedrange=True, nticks=5)
     return figure
 
@@ -164,17 +191,25 @@ def comparison_figure(rows: Sequence[ReturnRow]) -> go.Figure:
     for position, row in enumerate(rows):
         spread = _spread(len(row.returns))
         figure.add_scatter(
-            x=row.returns, y=position + spread, mode="markers",
+            x=row.returns,
+            y=position + spread,
+            mode="markers",
             marker={"color": row.colour, "size": 7, "opacity": 0.45},
             customdata=np.arange(len(row.returns)) + 1,
             hovertemplate="episode %{customdata}: %{x:,.1f}<extra></extra>",
         )
         figure.add_scatter(
-            x=[row.mean], y=[position], mode="markers",
+            x=[row.mean],
+            y=[position],
+            mode="markers",
             marker={"color": row.colour, "size": 13, "symbol": "diamond"},
             error_x={
-                "type": "data", "symmetric": False, "array": [row.high - row.mean],
-                "arrayminus": [row.mean - row.low], "thickness": 3, "width": 8,
+                "type": "data",
+                "symmetric": False,
+                "array": [row.high - row.mean],
+                "arrayminus": [row.mean - row.low],
+                "thickness": 3,
+                "width": 8,
                 "color": row.colour,
             },
             hovertemplate=(
@@ -183,11 +218,19 @@ def comparison_figure(rows: Sequence[ReturnRow]) -> go.Figure:
             ),
         )
     figure.update_layout(**_layout(70 + 62 * len(rows)))
-    figure.update_xaxes(title={"text": "return of an episode", "standoff": 2}, fixedrange=True,
-                        nticks=8, zeroline=False)
+    figure.update_xaxes(
+        title={"text": "return of an episode", "standoff": 2},
+        fixedrange=True,
+        nticks=8,
+        zeroline=False,
+    )
     figure.update_yaxes(
-        tickvals=list(range(len(rows))), ticktext=[row.name for row in rows],
-        range=[len(rows) - 0.5, -0.5], fixedrange=True, showgrid=False, zeroline=False,
+        tickvals=list(range(len(rows))),
+        ticktext=[plain(row.name) for row in rows],
+        range=[len(rows) - 0.5, -0.5],
+        fixedrange=True,
+        showgrid=False,
+        zeroline=False,
         ticklabelstandoff=6,
     )
     return figure

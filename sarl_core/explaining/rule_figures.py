@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from sarl_core.explaining.language import (
     share_text,
     short_condition,
 )
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
 
@@ -61,7 +61,7 @@ def tree_figure(
     shown = _shown(tree, window, keep=np.concatenate([cut, path]))
     figure = go.Figure()
     for label in range(tree.dimension.n_labels):
-        name = label_text(label, tree.dimension)
+        name = plain(label_text(label, tree.dimension))
         mine = shown[tree.label[shown] == label]
         for part, opacity, what in (
             (mine[~below[mine] & ~rules[mine]], 0.26, "on the way"),
@@ -78,7 +78,7 @@ def tree_figure(
     _add_hover(figure, tree, shown, window)
     _add_path(figure, tree, path, dark=dark)
     if around:
-        _add_queries(figure, tree, path, window, dark=dark)
+        _add_conditions(figure, tree, path, window, dark=dark)
     left, right, top, bottom = window
     figure.update_layout(
         height=height,
@@ -100,7 +100,7 @@ def tree_figure(
     )
     figure.update_yaxes(
         range=[bottom + 0.05, top - 0.05],
-        title={"text": "Queries answered"},
+        title={"text": "Conditions so far"},
         showgrid=False,
         zeroline=False,
         nticks=min(bottom - top + 1, 9),
@@ -125,7 +125,7 @@ def feature_figure(
     """
     edges, bounds = evidence.edges, evidence.bounds
     centres, widths = (edges[:-1] + edges[1:]) / 2, np.diff(edges)
-    unit = f" {feature.unit}" if feature.unit else ""
+    unit = f" {plain(feature.unit)}" if feature.unit else ""
     ranges = [
         f"{number_text(low)} to {number_text(high)}{unit}"
         for low, high in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
@@ -169,7 +169,7 @@ def feature_figure(
         showgrid=False,
         zeroline=False,
         nticks=6,
-        title={"text": feature.unit or feature.name, "standoff": 4},
+        title={"text": plain(feature.unit or feature.name), "standoff": 4},
     )
     figure.update_yaxes(tickformat=".0%", fixedrange=True, nticks=4, zeroline=False)
     return figure
@@ -269,11 +269,11 @@ def _add_hover(
         feature, asked = int(tree.feature[node]), ""
         if feature != LEAF:
             name = tree.source.features[feature].name
-            asked = f"<br>asks: {escape(name)} ≤ {number_text(float(tree.threshold[node]))}?"
+            asked = f"<br>asks: {plain(name)} ≤ {number_text(float(tree.threshold[node]))}?"
         texts.append(
             f"{int(tree.samples[node]):,} states ({share_text(float(tree.support[node]))})<br>"
             f"{share_text(float(tree.confidence[node]))} "
-            f"{escape(label_text(int(tree.label[node]), tree.dimension))}{asked}"
+            f"{plain(label_text(int(tree.label[node]), tree.dimension))}{asked}"
         )
     figure.add_scatter(
         x=(start + end) / 2 / total,
@@ -310,7 +310,7 @@ def _add_path(figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64], *, d
     )
 
 
-def _add_queries(
+def _add_conditions(
     figure: go.Figure,
     tree: PolicyTree,
     path: NDArray[np.int64],
@@ -318,7 +318,7 @@ def _add_queries(
     *,
     dark: bool,
 ) -> None:
-    """The queries of the path, written beside it."""
+    """The conditions of the path, written beside it."""
     total = float(tree.samples[0])
     left, right, top, bottom = window
     ink = "#f1f5f7" if dark else "#1d2730"
@@ -336,7 +336,7 @@ def _add_queries(
             "x": middle,
             "y": float(tree.depth[here]) + 0.46,
             "showarrow": False,
-            "text": escape(query_text(query, tree.source.features)),
+            "text": plain(query_text(query, tree.source.features)),
             "xanchor": "left" if rightwards else "right",
             "xshift": 12 if rightwards else -12,
             "font": {"size": 11, "color": ink},

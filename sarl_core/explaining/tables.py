@@ -54,8 +54,8 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
         Column name to one value a rule. Shares are from 0 to 1.
     """
     return {
-        "If": [conditions_text(rule, rule_set) for rule in rules],
-        "Then": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "When": [conditions_text(rule, rule_set) for rule in rules],
         "Support": [rule.support for rule in rules],
         "Confidence": [rule.confidence for rule in rules],
         "Lift": [rule.lift for rule in rules],

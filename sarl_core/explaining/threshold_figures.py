@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.language import number_text
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.landscape import Landscape
 
 Layer = Literal["rule_count", "mean_length", "coverage", "fidelity"]
@@ -273,7 +274,7 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
         figure.update_yaxes(part.layout.yaxis, row=row + 1, col=column + 1)
     ground, ink = ("#12181d", "#e4eaee") if dark else ("#ffffff", "#1d2730")
     figure.update_layout(
-        title={"text": title, "x": 0.02, "font": {"size": 17}} if title else None,
+        title={"text": plain(title), "x": 0.02, "font": {"size": 17}} if title else None,
         width=1080,
         height=860,
         margin={"l": 70, "r": 70, "t": 90 if title else 50, "b": 60},

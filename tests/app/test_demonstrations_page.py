@@ -174,6 +174,19 @@ def test_markdown_in_names_is_text() -> None:
     assert any("\\*x\\*" in part.value for part in app.markdown)
 
 
+def test_a_name_becomes_no_link_and_no_emoji() -> None:
+    frame = pd.DataFrame(
+        {"obs_http://e.com": [0.0, 1.0, 2.0], "obs_:tada:": [1.0, 0.5, 0.1], "action": [0, 1, 0]}
+    )
+    frame["obs_www.e.com a@e.com"] = [0.5, 0.2, 0.1]
+    app = upload(open_page("demonstrations"), ("odd.csv", frame.to_csv(index=False).encode()))
+    assert not errors(app)
+    words = texts(app)
+    for link in ("http://", ":tada:", "www.e", "a@e"):
+        assert link not in words
+    assert "e.com" in words
+
+
 def test_a_set_survives_the_change_of_page(tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.mktemp("sets") / "small.parquet"
     save_demonstrations(

@@ -58,12 +58,29 @@ def test_search_and_action_narrow_the_table() -> None:
     app.text_input(key="search").set_value("cart POSITION push left").run()
     found = app.dataframe[0].value
     assert 0 < len(found) < mined("cartpole", 0.0, 1.0).rule_count
-    assert found["If"].str.contains("cart position").all()
+    assert found["When"].str.contains("cart position").all()
     app.text_input(key="search").set_value("").run()
     app.selectbox(key="action").select("push right").run()
-    assert {tuple(value) for value in app.dataframe[0].value["Then"]} == {("push right",)}
+    assert {tuple(value) for value in app.dataframe[0].value["Action"]} == {("push right",)}
     app.text_input(key="search").set_value("no such thing").run()
     assert "No rule matches the search" in texts(app)
+
+
+def test_the_table_fits_the_screen_the_action_first() -> None:
+    table = open_page("rules", data="cartpole").dataframe[0]
+    names = list(table.value)
+    assert names[:2] == ["Action", "When"]
+    columns = json.loads(table.proto.columns)
+    assert set(names) <= set(columns)
+    widths = [columns[name]["width"] for name in names]
+    assert sum(widths) <= 970  # of 1008 pixels; the boxes for choosing a row take the rest
+
+
+def test_one_condition_is_no_conditions() -> None:
+    words = texts(open_page("rules", data="cartpole", support="0.05", confidence="0.7"))
+    assert "1 condition on 1 feature" in words
+    assert "1 conditions" not in words
+    assert "quer" not in words
 
 
 def test_the_tree_can_be_seen_around_the_rule() -> None:

@@ -103,8 +103,10 @@ def test_labels_come_from_the_rules_where_actions_are_continuous() -> None:
 
 
 def test_a_margin_is_told_in_words() -> None:
-    assert margin_text(float("inf")) == "no threshold was looked at"
-    assert margin_text(0.0125) == "0.0125 from the nearest threshold"
+    assert margin_text(float("inf")) == "No threshold was looked at"
+    assert margin_text(0.0125) == (
+        "Smallest distance to a threshold on the way: 0.0125 (in that feature's unit)"
+    )
 
 
 def test_returns_are_drawn_for_each_run() -> None:

@@ -68,7 +68,7 @@ def test_examples_are_states_of_the_rule(
     columns = example_columns(lander_like, lander_trees[0], rule)
     assert columns["Episode"] == lander_like.episodes[rows].tolist()
     asked = lander_like.features[rule.bounds[0].feature].name
-    assert list(columns)[4] == asked
+    assert list(columns)[2] == asked
     agrees = np.array(columns["As the rule says"])
     assert np.array_equal(agrees, lander_trees[0].demonstrated[rows] == rule.action)
 

@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sarl_core import Demonstrations, grow_policy_trees, mine_rules
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining import demonstration_figures, rule_figures
+from sarl_core.explaining.distributions import histogram_by_label
+from sarl_core.explaining.evidence import feature_evidence
+from sarl_core.explaining.markup import plain
+from sarl_core.explaining.replay_figures import Track, intervention_strip
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import cut_nodes, node_of
+
+
+def test_markup_and_templates_become_text() -> None:
+    assert plain('<b>x</b> & "y"') == '&lt;b&gt;x&lt;/b&gt; &amp; "y"'
+    assert "%{" not in plain("%{x}")
+    assert plain("pole angle, 5 %") == "pole angle, 5 %"
+
+
+def test_names_from_files_are_no_markup_in_the_figures_of_a_rule(
+    lander_like: Demonstrations,
+) -> None:
+    harmful = replace(
+        lander_like,
+        feature_names=tuple(f"<b>{i}</b>" for i in range(8)),
+        label_names=(("<i>", "1", "2", "3"),),
+    )
+    tree = grow_policy_trees(harmful)[0]
+    limits = {"supp_min": 0.005, "conf_min": 0.9}
+    rule = mine_rules((tree,), **limits).rules[0]
+    cut = cut_nodes(tree, **limits)
+    around = rule_figures.tree_figure(tree, cut, node_of(rule), around=True).to_json()
+    one = feature_evidence(harmful, tree, rule)[0]
+    for feature in (harmful.features[one.feature], Feature("x", "<b>m</b>")):
+        around += rule_figures.feature_figure(one, feature, "#0072B2").to_json()
+    for raw in ("<b>", "<i>", r"\u003cb\u003e", r"\u003ci\u003e"):
+        assert raw not in around
+
+
+def test_names_from_files_are_no_markup_in_other_figures() -> None:
+    dimension = LabelledDimension("<u>d</u>", ("<b>0</b>", "1"))
+    labels = np.array([0, 1, 1])
+    histogram = histogram_by_label(labels, labels, 2)
+    bars = demonstration_figures.action_figure(histogram, dimension)
+    assert bars.data[0].y[0] == "&lt;b&gt;0&lt;/b&gt;"
+    spread = demonstration_figures.feature_figure(Feature("x", "<b>"), histogram, dimension)
+    assert "<b>" not in "".join([*spread.data[0].customdata, spread.data[0].hovertemplate])
+    strip = intervention_strip(
+        [Track("<u>d</u>: done", labels.astype(float), dimension)], ["", "", ""], current=0
+    )
+    assert strip.layout.yaxis.ticktext[0] == "&lt;u&gt;d&lt;/u&gt;: done"
+
+
+def test_actions_named_by_numbers_stand_on_an_axis_of_names() -> None:
+    labels = np.array([0, 1, 1])
+    figure = demonstration_figures.action_figure(
+        histogram_by_label(labels, labels, 2), LabelledDimension("action", ("0", "1"))
+    )
+    assert list(figure.data[0].y) == ["0", "1"]
+    assert figure.layout.yaxis.type == "category"
