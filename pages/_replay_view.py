@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Callable
 
 import numpy as np
 import streamlit as st
@@ -35,10 +36,16 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.statistics import summarise
 
 PLAIN = {"displayModeBar": False}
+FEW = 0.3  # share of the steps below which the rules say little about an episode
 
 
-def numbers(replay: Replay) -> None:
-    """Returns, lengths and interventions."""
+def numbers(replay: Replay, unfiltered: Callable[[], None] | None) -> None:
+    """Returns, lengths and interventions.
+
+    Args:
+        replay: To show.
+        unfiltered: Runs it with the unfiltered rules; None where that is not to be offered.
+    """
     plain, shielded = replay.plain, replay.shielded
     alone = float(plain.returns[0])
     if shielded is None:
@@ -67,15 +74,23 @@ def numbers(replay: Replay) -> None:
             height="stretch",
             help=f"Some rule applied at {covered:,} of {length:,} steps.",
         )
-    if not changed:
+    if covered < FEW * length:
+        followed = "" if changed else ", and the agent did what it says"
         st.markdown(
-            ":material/info: :gray[The rules changed nothing in this episode: "
+            ":material/info: :gray["
             + (
-                "no rule applied in any of its states. Lower the minimum support or confidence on "
-                "the Thresholds page, or choose the unfiltered rules.]"
-                if not covered
-                else "wherever one applied, the agent did what it says.]"
+                f"A rule applied at {share_text(covered / length)} of the steps{followed}; "
+                "elsewhere the agent acted alone.]"
+                if covered
+                else "No rule applied at any step: the agent acted alone.]"
             )
+        )
+        if unfiltered is not None:
+            st.button("Try the unfiltered rules", key="try_unfiltered", on_click=unfiltered)
+    elif not changed:
+        st.markdown(
+            ":material/info: :gray[The rules changed nothing in this episode: wherever one "
+            "applied, the agent did what it says.]"
         )
 
 

@@ -12,7 +12,8 @@ for folder in (Path(__file__).parents[1], Path(__file__).parent):
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
 
-import _state as state  # noqa: E402  # found by the line above
+import _state as state  # noqa: E402  # found by the lines above
+from _sidebar import sidebar  # noqa: E402
 
 st.set_page_config(
     page_title="SARL Explorer",
@@ -27,6 +28,7 @@ PAGES = [
         title="Demonstrations",
         icon=":material/dataset:",
         default=True,
+        url_path="start",  # never seen: the default page is at "/"
         help="What the expert did: choose a shipped set or upload your own, and look at it.",
     ),
     st.Page(
@@ -48,7 +50,13 @@ PAGES = [
         help="An agent in its environment, with the rules as a shield and without.",
     ),
 ]
-page = st.navigation(PAGES)
-state.sidebar(thresholds_shown=page.title != "Thresholds")
+# Who knows the other addresses guesses this one.
+GUESSED = st.Page(
+    lambda: None, title="Demonstrations", url_path="demonstrations", visibility="hidden"
+)
+page = st.navigation([*PAGES, GUESSED])
+if page == GUESSED:
+    st.switch_page(PAGES[0], query_params=st.query_params.to_dict())
+sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()
 state.settle(page.title)

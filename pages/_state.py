@@ -7,7 +7,6 @@ a table) go through `url_choice`.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import math
 from collections.abc import Sequence
@@ -17,11 +16,9 @@ from typing import Any, cast
 import numpy as np
 import streamlit as st
 from numpy.typing import NDArray
-from streamlit.errors import StreamlitAPIException
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
-from sarl_core.explaining.language import threshold_text
 from sarl_core.explaining.tables import top_rules
 from sarl_core.mining.landscape import Landscape, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
@@ -352,68 +349,6 @@ def settle(page: str) -> None:
 def is_dark() -> bool:
     """Whether the visitor's theme is dark."""
     return str(st.context.theme.get("type", "light")) == "dark"
-
-
-def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
-    """Write what is in force into the URL, on a page whose widgets do not."""
-    for name, value, default in (
-        ("support", thresholds.support, FILTERED.support),
-        ("confidence", thresholds.confidence, FILTERED.confidence),
-        ("lift", thresholds.lift, 0.0),
-        ("depth", thresholds.max_depth or 0, 0),
-        ("divider", divider, MIN_DIVIDER),
-    ):
-        # Just after a change of page the parameter may still belong to the other page's widget.
-        with contextlib.suppress(StreamlitAPIException):
-            if value == default:
-                st.query_params.pop(name, None)
-            elif st.query_params.get(name) != threshold_text(value):
-                st.query_params[name] = threshold_text(value)
-
-
-def sidebar(*, thresholds_shown: bool = True) -> None:
-    """The choice of data and the thresholds in force.
-
-    Args:
-        thresholds_shown: Whether to say which thresholds are in force; a page with their sliders
-            says so itself.
-    """
-    name = chosen_dataset()
-    thresholds, divider = chosen_thresholds(), chosen_divider()
-    # A page without sliders keeps what a link says, for the page that has them.
-    choose_thresholds(thresholds)
-    choose_divider(divider)
-    if thresholds_shown:
-        _keep_in_url(thresholds, divider)
-    # The widget follows the URL, so a link and the browser's "back" both reach it.
-    st.session_state["_data_choice"] = name
-    with st.sidebar:
-        st.selectbox(
-            "Data",
-            dataset_names(),
-            format_func=dataset_label,
-            key="_data_choice",
-            on_change=lambda: choose_dataset(st.session_state["_data_choice"]),
-        )
-        demonstrations = chosen_demonstrations()
-        if demonstrations is None:
-            st.caption("Nothing uploaded yet: see the Demonstrations page.")
-            return
-        lines = [f"{len(demonstrations):,} steps in {demonstrations.n_episodes:,} episodes"]
-        if not thresholds_shown:
-            st.caption(lines[0])
-            return
-        lines += [
-            f"Support at least **{thresholds.support:g}**",
-            f"Confidence at least **{thresholds.confidence:g}**",
-        ]
-        if not demonstrations.is_discrete:
-            lines.append(f"Divider **{divider}**")
-        if thresholds.lift:
-            lines.append(f"Lift at least **{thresholds.lift:g}**")
-        if thresholds.max_depth:
-            lines.append(f"Depth at most **{thresholds.max_depth}**")
-        st.caption("  \n".join(lines))
 
 
 # --- for the pages Demonstrations and Replay ---------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _state as state
 import streamlit as st
+from _environments import registered
 from _words import in_full
 
 from sarl_core.demonstrations.formats import (
@@ -54,8 +55,13 @@ def read_upload(columns: ColumnMap | None = None) -> None:
 
 
 def environment() -> str:
-    """The environment that names and bounds are taken from, "" for none."""
-    return str(st.session_state.get("upload_env") or "").strip()
+    """The environment that names and bounds are taken from, "" for none.
+
+    Raises:
+        InputError: If the dashboard does not take it.
+    """
+    env_id = str(st.session_state.get("upload_env") or "").strip()
+    return registered(env_id) if env_id else ""
 
 
 def read_mapped() -> None:

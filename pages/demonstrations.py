@@ -175,7 +175,7 @@ def overview(demonstrations: Demonstrations, found: Contents) -> None:
         f"fingerprint `{demonstrations.digest[:12]}`",
     ]
     st.caption(" · ".join(part for part in parts if part))
-    remarks = (*demonstrations.notes, *found.warnings)
+    remarks = found.warnings  # the notes on reading among them
     if remarks:
         with st.container(border=True, gap="xsmall"):
             for remark in remarks[:8]:

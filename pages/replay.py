@@ -9,6 +9,7 @@ from pathlib import Path
 
 import _state as state
 import streamlit as st
+from _environments import registered
 from _replay_view import comparison, numbers, step_by_step
 from _replays import (
     Order,
@@ -121,17 +122,17 @@ def environment_of(choice: str | None) -> str:
     """The environment's id.
 
     Raises:
-        InputError: If the demonstrations do not say theirs.
+        InputError: If the demonstrations do not say theirs, or the dashboard does not take it.
     """
     if choice and choice != AS_DEMONSTRATED:
-        return choice.strip()
+        return registered(choice)
     demonstrations = state.chosen_demonstrations()
     if demonstrations is None or not demonstrations.env_id:
         raise InputError(
             "the demonstrations do not say which environment they are from; choose "
             "one, or type its id"
         )
-    return demonstrations.env_id
+    return registered(demonstrations.env_id)
 
 
 def continuous(choice: str | None) -> bool:
@@ -198,6 +199,21 @@ def agent_for(
     return make, digest_of(content)
 
 
+def try_unfiltered() -> None:
+    """Choose the unfiltered rules and run; for a callback."""
+    st.session_state["rules"] = "unfiltered"
+    st.session_state["_run"] = True
+
+
+def unfiltered_differ(request: Request, rule_set: RuleSet | None) -> bool:
+    """Whether the rules of a replay were filtered, from demonstrations that are at hand."""
+    return (
+        request.rules in (CHOSEN, "filtered")
+        and rule_set is not None
+        and rule_set.thresholds != UNFILTERED
+    )
+
+
 # --- the page ----------------------------------------------------------------------------------
 
 st.title("Replay")
@@ -208,7 +224,7 @@ st.caption(
 )
 order_now = settings()
 started = st.button("Run", type="primary", icon=":material/play_arrow:", key="run")
-if started:
+if started or st.session_state.pop("_run", False):
     try:
         ordered = order_now()
     except SarlError as error:
@@ -225,8 +241,9 @@ shown = st.session_state.get("_replay")
 replayed = kept_replays().get(shown.request) if shown is not None else None
 if shown is None or replayed is None:
     st.info(
-        "Choose an agent and the rules, then press Run. Try the novice first: it acts at "
-        "random, so what the rules do is plain to see.",
+        "Choose an agent and the rules, then press Run. What rules do shows best with the novice, "
+        "which acts at random, and the unfiltered rules; those at the paper's filtered thresholds "
+        "may apply at few steps.",
         icon=":material/play_circle:",
     )
     st.stop()
@@ -241,7 +258,10 @@ st.markdown(
     + (f", {len(replayed.rule_set):,} rules ({asked.rules})" if replayed.rule_set else "")
     + ("" if same else "  \n:orange[:material/info: The settings have changed since: press Run.]")
 )
-numbers(replayed)
+numbers(
+    replayed,
+    try_unfiltered if unfiltered_differ(asked, replayed.rule_set) else None,
+)
 gif = replayed.film.gif()
 st.image(gif, width="content", alt="The episode, with the rules and without")
 name = f"replay-{asked.env_id.rsplit('/', 1)[-1].rsplit(':', 1)[-1]}-{asked.agent}-{asked.seed}"

@@ -9,12 +9,22 @@ from __future__ import annotations
 
 import _state as state
 import streamlit as st
-from _rule_table import column_config, frame, table_height
+from _threshold_view import (
+    LARGEST,
+    MAPS,
+    SURFACES,
+    TRADE_OFFS,
+    follow,
+    here,
+    move,
+    show_largest,
+    show_maps,
+    show_surfaces,
+    show_trade_offs,
+)
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining import threshold_figures as figures
-from sarl_core.explaining.colours import MARKER_COLOUR
-from sarl_core.explaining.front_figure import front_figure, thin_front
 from sarl_core.explaining.language import share_text, threshold_text
 from sarl_core.explaining.steps import (
     CONFIDENCE_STEPS,
@@ -22,7 +32,6 @@ from sarl_core.explaining.steps import (
     FINE_SUPPORTS,
     SUPPORT_STEPS,
     neat_jumps,
-    neat_point,
     with_step,
 )
 from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
@@ -33,13 +42,8 @@ LAYERS: dict[str, tuple[figures.Layer, figures.Layer]] = {
     SIZE: ("rule_count", "mean_length"),
     QUALITY: ("coverage", "fidelity"),
 }
-MAPS, SURFACES = "Maps", "3-D"
 FINE, PAPER = "Fine grid", "Paper's grid"
 WHOLE = "All actions"
-LARGEST, TRADE_OFFS = "Largest rules", "Best trade-offs"
-TABLE_ROWS = 50
-BARE = {"displayModeBar": False, "scrollZoom": False}
-MARK_RADIUS = 9
 
 st.title("Thresholds")
 demonstrations = state.require_demonstrations()
@@ -47,25 +51,6 @@ grown = state.trees(demonstrations, state.chosen_divider())
 
 
 # --- what widgets do ---------------------------------------------------------------------------
-
-
-def follow() -> None:
-    """Show what the thresholds of the moment give; for callbacks, and the last thing they do."""
-    if st.session_state.get("view") == SURFACES:
-        st.rerun()  # the chosen point is part of the surface
-    st.rerun(
-        ["controls", "front"] if st.session_state.get("details") == TRADE_OFFS else ["controls"]
-    )
-
-
-def move(**thresholds: float) -> None:
-    """Put thresholds in force, by their names in the URL.
-
-    `take_over` writes them where the sliders find them: what a callback in a fragment writes to a
-    slider does not reach the browser when it asks for another run.
-    """
-    st.session_state["_moved"] = thresholds
-    follow()
 
 
 def take_over() -> None:
@@ -85,34 +70,19 @@ def use(setting: Thresholds) -> None:
     st.rerun()  # lift and depth, which it resets, are part of the maps
 
 
-def take_click(key: str) -> None:
-    """Set both thresholds to those of the clicked cell or point.
-
-    A second click on one cell takes its selection back, and means the cell all the same.
-    """
-    points = st.session_state[key].selection.points
-    if points and "customdata" in points[0]:
-        data = points[0]["customdata"]
-        # Which of the two arrives depends on how the numbers were packed for the browser.
-        values = list(data.values()) if isinstance(data, dict) else list(data)
-        clicked = Thresholds(float(values[0]), float(values[1]), *state.chosen_limits())
-        if key == "pareto":
-            clicked = neat_point(grown, clicked)
-        st.session_state["_clicked"] = (clicked.support, clicked.confidence)
-    support, confidence = st.session_state.get("_clicked", (None, None))
-    if support is not None:
-        move(support=support, confidence=confidence)
-
-
 # --- parts of the page -------------------------------------------------------------------------
 
 
 def jump_buttons(name: str, below: float | None, above: float | None) -> None:
     """Two buttons that go to the next value at which the rule set changes."""
-    with st.container(horizontal=True, horizontal_alignment="distribute", gap="small"):
+    with st.container(
+        horizontal=True, horizontal_alignment="distribute", vertical_alignment="center", gap="small"
+    ):
         for side, value in (("below", below), ("above", above)):
+            if side == "above":
+                st.caption("next change", width="content")
             st.button(
-                "no change" if value is None else threshold_text(value),
+                "none" if value is None else threshold_text(value),
                 key=f"{name}_{side}",
                 on_click=jump,
                 args=(name, value),
@@ -176,13 +146,13 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
                 help="Number of equal intervals each continuous action is divided into.",
             )
         named_settings(thresholds)
-    point = here(thresholds, dimension)
+    point = here(grown, thresholds, dimension)
     metrics(point)
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
     if table is not None:
         with table.container():
-            show_largest(thresholds, point, dimension)
+            show_largest(grown, thresholds, point, dimension)
 
 
 def named_settings(thresholds: Thresholds) -> None:
@@ -198,18 +168,6 @@ def named_settings(thresholds: Thresholds) -> None:
                 help=f"The paper's setting: support {setting.support:g}, "
                 f"confidence {setting.confidence:g}",
             )
-
-
-def here(thresholds: Thresholds, dimension: int | None) -> Landscape:
-    """The landscape of the one point that is in force."""
-    point = state.landscape(
-        grown,
-        [thresholds.support],
-        [thresholds.confidence],
-        lift=thresholds.lift,
-        depth=thresholds.max_depth,
-    )
-    return point if dimension is None else point.dimensions[dimension]
 
 
 def metrics(point: Landscape) -> None:
@@ -293,133 +251,6 @@ def switch(label: str, key: str, options: list[str], hint: str) -> str:
     )
 
 
-def show_maps(landscape: Landscape, layers: tuple[figures.Layer, figures.Layer]) -> None:
-    """Two maps side by side, with the mark that `controls` moves."""
-    margin = figures.MARGIN
-    st.html(
-        "<style>"
-        ".st-key-maps [class*='st-key-box_'] { position: relative; }"
-        ".st-key-maps [class*='st-key-box_']::after { content: ''; position: absolute; z-index: 2;"
-        f" pointer-events: none; width: {2 * MARK_RADIUS}px; height: {2 * MARK_RADIUS}px;"
-        f" left: calc({margin['l'] - MARK_RADIUS}px"
-        f" + (100% - {margin['l'] + margin['r']}px) * var(--mark-x));"
-        f" top: calc({margin['t'] - MARK_RADIUS}px"
-        f" + {figures.HEIGHT - margin['t'] - margin['b']}px * var(--mark-y));"
-        # In a layer of its own, so that the map beneath is not painted again when it moves.
-        f" will-change: transform; border: 3px solid {MARKER_COLOUR};"
-        " box-sizing: border-box; border-radius: 50%;"
-        " box-shadow: 0 0 0 1.5px #ffffff; }"
-        "</style>"
-    )
-    with st.container(key="maps"):
-        for column, layer in zip(st.columns(2), layers, strict=True):
-            with column:
-                st.markdown(f"**{figures.LAYERS[layer].title}**")
-                with st.container(key=f"box_{layer}"):
-                    st.plotly_chart(
-                        figures.heatmap(landscape, layer, dark=state.is_dark()),
-                        key=f"map_{layer}",
-                        config=BARE,
-                        selection_mode="points",
-                        on_select=lambda key=f"map_{layer}": take_click(key),
-                        alt=f"{figures.LAYERS[layer].title}, for every minimum support and "
-                        "minimum confidence",
-                    )
-    st.caption("Click a cell to set both thresholds to it. The ring marks the present ones.")
-
-
-def show_surfaces(
-    landscape: Landscape, layers: tuple[figures.Layer, figures.Layer], dimension: int | None
-) -> None:
-    """The same two layers as the paper draws them."""
-    thresholds = state.chosen_thresholds()
-    point = here(thresholds, dimension)
-    for column, layer in zip(st.columns(2), layers, strict=True):
-        with column:
-            st.markdown(f"**{figures.LAYERS[layer].title}**")
-            figure = figures.surface(
-                landscape,
-                layer,
-                dark=state.is_dark(),
-                chosen=(
-                    thresholds.support,
-                    thresholds.confidence,
-                    float(getattr(point, layer)[0, 0]),
-                ),
-            )
-            st.plotly_chart(
-                figure,
-                key=f"surface_{layer}",
-                config={"displaylogo": False},
-                alt=f"{figures.LAYERS[layer].title} as a surface",
-            )
-    st.caption("Drag to turn. The dot marks the present thresholds.")
-
-
-def show_largest(thresholds: Thresholds, point: Landscape, dimension: int | None) -> None:
-    """The rules with the most support."""
-    rules = int(point.rule_count[0, 0])
-    if not rules:
-        st.info(
-            "No part of the tree is as frequent and as certain as these thresholds ask. Lower "
-            "the minimum support or the minimum confidence: the maps show where there are rules.",
-            icon=":material/filter_alt_off:",
-        )
-        return
-    some = state.largest_rules(grown, thresholds, TABLE_ROWS)
-    shown = [rule for rule in some.rules if dimension in (None, rule.dimension)][:TABLE_ROWS]
-    st.dataframe(
-        frame(shown, some),
-        hide_index=True,
-        column_config=column_config(some),
-        height=table_height(len(shown), 10),
-        key="largest_table",
-        alt="The rules with the most support",
-    )
-    if rules > len(shown):
-        st.caption(f"The {len(shown)} rules with the most support, of {rules:,}.")
-
-
-@st.fragment(key="front")
-def show_trade_offs(dimension: int | None) -> None:
-    """The rule sets that no other one beats."""
-    thresholds = state.chosen_thresholds()
-    point = here(thresholds, dimension)
-    trees = grown if dimension is None else (grown[dimension],)
-    with st.spinner("Looking for the best trade-offs …"):
-        front = state.pareto(trees, lift=thresholds.lift, depth=thresholds.max_depth)
-    if not front:
-        st.info(
-            "There is no rule at any thresholds; lower the minimum lift under More.",
-            icon=":material/filter_alt_off:",
-        )
-        return
-    st.caption(
-        "No other thresholds give fewer rules, more coverage and more fidelity than these. "
-        "Click a point to use its thresholds."
-    )
-    points = thin_front(front)
-    figure = front_figure(
-        points,
-        dark=state.is_dark(),
-        chosen=(
-            int(point.rule_count[0, 0]),
-            float(point.coverage[0, 0]),
-            float(point.fidelity[0, 0]),
-        ),
-    )
-    st.plotly_chart(
-        figure,
-        key="pareto",
-        config=BARE,
-        selection_mode="points",
-        on_select=lambda: take_click("pareto"),
-        alt="Number of rules against coverage, coloured by fidelity",
-    )
-    if len(points) < len(front):
-        st.caption(f"{len(points):,} of {len(front):,} such rule sets are drawn.")
-
-
 # --- the page ----------------------------------------------------------------------------------
 
 take_over()
@@ -448,16 +279,16 @@ whole = state.landscape(
 )
 landscape = whole if dimension is None else whole.dimensions[dimension]
 if view == SURFACES:
-    show_surfaces(landscape, LAYERS[shown], dimension)
+    show_surfaces(grown, landscape, LAYERS[shown], dimension)
 else:
-    show_maps(landscape, LAYERS[shown])
+    show_maps(grown, landscape, LAYERS[shown])
 largest, trade_offs = st.tabs(
     [LARGEST, TRADE_OFFS], key="details", on_change="rerun", bind="query-params"
 )
 table = None
 if trade_offs.open:
     with trade_offs:
-        show_trade_offs(dimension)
+        show_trade_offs(grown, dimension)
 else:
     table = largest.empty()
 with top:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import load_demonstrations, mine_rules
+from sarl_core import load_demonstrations, mine_rules, save_demonstrations
 from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import errors, metrics, open_page, texts
 
@@ -199,3 +201,63 @@ def test_the_agent_alone_is_run_over_twenty_episodes() -> None:
     app.button(key="compare").click().run()
     assert not app.exception
     assert app.dataframe[-1].value["Run"].tolist() == ["Agent alone"]
+
+
+@pytest.fixture
+def traces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What the module `spy` leaves behind when it is imported, which registers an environment."""
+    left = tmp_path / "imported.txt"
+    (tmp_path / "spy.py").write_text(
+        "import gymnasium, pathlib\n"
+        f"pathlib.Path({str(left)!r}).write_text('imported')\n"
+        "gymnasium.register('Spy-v0', 'gymnasium.envs.classic_control.cartpole:CartPoleEnv')\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return left
+
+
+def test_a_link_imports_nothing(traces: Path) -> None:
+    app = run(open_page("replay", data="cartpole", env="spy:Spy-v0"))
+    (sentence,) = errors(app)
+    assert "spy:Spy-v0" in sentence
+    assert "\n" not in sentence
+    assert not app.metric
+    assert not traces.exists()
+    assert "spy" not in sys.modules
+
+
+def test_an_uploaded_file_imports_nothing(traces: Path, tmp_path: Path) -> None:
+    demonstrations = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+    path = tmp_path / "mine.npz"
+    save_demonstrations(replace(demonstrations, env_id="spy:Spy-v0"), path)
+    app = open_page("demonstrations")
+    app.file_uploader(key="upload_files").set_value([("mine.npz", path.read_bytes(), "")]).run()
+    assert not errors(app)
+    app.switch_page("replay.py").run()
+    run(app)
+    (sentence,) = errors(app)
+    assert "spy:Spy-v0" in sentence
+    assert not traces.exists()
+
+
+def test_the_box_of_the_upload_imports_nothing(traces: Path) -> None:
+    app = open_page("demonstrations", upload_env="spy:Spy-v0")
+    content = (DATA / "demonstrations" / "cartpole.parquet").read_bytes()
+    app.file_uploader(key="upload_files").set_value([("mine.parquet", content, "")]).run()
+    (sentence,) = errors(app)
+    assert "spy:Spy-v0" in sentence
+    assert not traces.exists()
+
+
+def test_few_covered_steps_are_said_and_the_unfiltered_rules_offered() -> None:
+    app = run(open_page("replay", data="lunar_lander", rules="filtered", seed="1"))
+    covered = metrics(app)["Covered"]
+    assert float(covered.split()[0].strip("<")) < 30
+    assert f"{covered} of the steps" in texts(app) or "No rule applied" in texts(app)
+    app.button(key="try_unfiltered").click().run()
+    assert not app.exception
+    assert app.selectbox(key="rules").value == "unfiltered"
+    assert "rules (unfiltered)" in texts(app)
+    assert "settings have changed" not in texts(app)
+    assert float(metrics(app)["Covered"].split()[0]) > 30
+    assert "try_unfiltered" not in [button.key for button in app.button]

@@ -145,3 +145,11 @@ def test_without_an_upload_the_page_says_what_to_do() -> None:
     app = open_page("thresholds", data="upload")
     assert "Nothing has been uploaded" in texts(app)
     assert not app.select_slider
+
+
+def test_the_jumps_say_what_they_are() -> None:
+    app = open_page("thresholds", data="cartpole")
+    assert [caption.value for caption in app.caption].count("next change") == 2
+    app = open_page("thresholds", data="cartpole", support="0", confidence="0")
+    assert app.button(key="support_below").label == "none"
+    assert app.button(key="support_below").disabled
