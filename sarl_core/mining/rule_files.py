@@ -57,10 +57,11 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
         raise InputError(
             f"{name} is not a rule file (its format is not {FORMAT!r}); give one that `mine` wrote"
         )
-    if document.get("version") != VERSION:
+    version = document.get("version")
+    if version != VERSION:
         raise InputError(
-            f"{name} has version {document.get('version')!r} of the rule format, and this program "
-            f"reads version {VERSION}; use a program of its version"
+            f"{name} has version {_shown(version)} of the rule format, and this program reads "
+            f"version {VERSION}; use a program of its version"
         )
     return _rule_set(_Reader(document, name, ""))
 
@@ -201,6 +202,12 @@ class _Reader:
             raise self.fail(f"{key!r} is {_shown(value)}, not a whole number from {low} to {high}")
         return value
 
+    def limit(self, key: str) -> int | None:
+        if self._value.get(key) is not None:
+            return self.count(key)
+        self._value.pop(key, None)
+        return None
+
     def parts(self, key: str) -> list[_Reader]:
         place = f"{self._place} {key}".strip()
         return [
@@ -220,7 +227,7 @@ class _Reader:
     def finish(self) -> None:
         """Refuse what nobody asked for, by name."""
         if self._value:
-            raise self.fail(f"{next(iter(self._value))!r} is not known to this version")
+            raise self.fail(f"{_shown(next(iter(self._value)))} is not known to this version")
 
 
 def _shown(value: object) -> str:
@@ -255,7 +262,7 @@ def _rule_set(document: _Reader) -> RuleSet:
             support=thresholds.number("support", low=0, high=1),
             confidence=thresholds.number("confidence", low=0, high=1),
             lift=thresholds.number("lift", 0.0, low=0),
-            max_depth=thresholds.take("max_depth", (int, type(None)), None),
+            max_depth=thresholds.limit("max_depth"),
         ),
         divider=document.count("divider", low=2, high=MAX_DIVIDER),
     )
@@ -296,7 +303,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
             name, edges, bounds_from=part.take("bounds_from", str, "action space")
         )
     else:
-        raise part.fail(f"the kind {kind!r} is neither 'discrete' nor 'interval'")
+        raise part.fail(f"the kind {_shown(kind)} is neither 'discrete' nor 'interval'")
     part.finish()
     return action
 
@@ -308,19 +315,21 @@ def _read_rule(
     for entry in part.parts("conditions"):
         feature, op = entry.take("feature", int), entry.take("op", str)
         if not 0 <= feature < n_features:
-            raise entry.fail(f"there is no feature {feature}")
+            raise entry.fail(f"there is no feature {_shown(feature)}")
         if op not in ("<=", ">"):
-            raise entry.fail(f"the operator {op!r} is neither '<=' nor '>'")
+            raise entry.fail(f"the operator {_shown(op)} is neither '<=' nor '>'")
         conditions.append(Condition(feature, op, entry.number("threshold")))
         entry.finish()
     dimension, action = part.take("dimension", int), part.take("action", int)
     if not 0 <= dimension < len(actions):
-        raise part.fail(f"there is no action dimension {dimension}")
+        raise part.fail(f"there is no action dimension {_shown(dimension)}")
     if not 0 <= action < actions[dimension].n_labels:
-        raise part.fail(f"the action {action} is none of the {actions[dimension].n_labels} labels")
+        raise part.fail(
+            f"the action {_shown(action)} is none of the {actions[dimension].n_labels} labels"
+        )
     origin = part.take("origin", str, "mined")
     if origin not in ("mined", "manual"):
-        raise part.fail(f"the origin {origin!r} is neither 'mined' nor 'manual'")
+        raise part.fail(f"the origin {_shown(origin)} is neither 'mined' nor 'manual'")
     if part.take("length", int, len(conditions)) != len(conditions):
         raise part.fail(f"'length' does not match its {len(conditions)} conditions")
     value = part.number("demonstrated_value") if part.has("demonstrated_value") else None

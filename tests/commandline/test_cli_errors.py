@@ -179,6 +179,8 @@ def test_control_c_is_one_line_and_code_130(tmp_path):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # Whoever starts the tests in the background has them ignore it.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     # Only a program that has come to its work can be interrupted in it.
     busy = Path(f"/proc/{process.pid}/maps")

@@ -102,6 +102,8 @@ BAD = {
         lambda d: d["rules"][0]["conditions"][0].update(threshold=10**400),
         "far too large",
     ),
+    "a version beyond counting": (lambda d: d.update(version=10**400), "far too large"),
+    "a depth beyond counting": (lambda d: d["thresholds"].update(max_depth=10**400), "far too"),
     "no steps": (lambda d: d["demonstrations"].update(steps=0), "'steps' is 0"),
     "a confidence of 7": (lambda d: d["rules"][0].update(confidence=7), "'confidence' is 7"),
     "more samples than steps": (lambda d: d["rules"][0].update(samples=10**9), "'samples'"),
