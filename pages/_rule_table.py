@@ -27,14 +27,18 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         for dimension in rule_set.actions
         for label in range(dimension.n_labels)
     }
+    # About seven pixels a letter; what a long action takes, the conditions give.
+    action_width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
     return {
         "Action": column.MultiselectColumn(
-            width=150,
+            width=action_width,
             help="What the expert does there",
             options=list(colours),
             color=list(colours.values()),
         ),
-        "When": column.TextColumn(width=322, help="The conditions under which the rule applies"),
+        "When": column.TextColumn(
+            width=472 - action_width, help="The conditions under which the rule applies"
+        ),
         "Support": column.NumberColumn(
             width=80, format="%.4f", help="Share of all states to which the rule applies"
         ),
