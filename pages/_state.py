@@ -29,6 +29,7 @@ SHIPPED = {
     "lunar_lander": ("Lunar Lander", "LunarLander-v3"),
     "cartpole": ("Cart Pole", "CartPole-v1"),
     "pendulum": ("Pendulum", "Pendulum-v1"),
+    "bipedal_walker": ("Bipedal Walker", "BipedalWalker-v3"),
 }
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"

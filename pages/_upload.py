@@ -15,7 +15,7 @@ from sarl_core.demonstrations.formats import (
 )
 from sarl_core.errors import InputError, SarlError
 
-ENVIRONMENTS = ("CartPole-v1", "LunarLander-v3", "Pendulum-v1")
+ENVIRONMENTS = tuple(env_id for _, env_id in state.SHIPPED.values())
 
 
 def uploaded_files() -> list[tuple[memoryview, str]]:

@@ -32,7 +32,7 @@ from sarl_core.shielding.shield import Projection
 
 # The words on screen are those in the URL.
 AS_DEMONSTRATED = "as demonstrated"
-ENVIRONMENTS = (AS_DEMONSTRATED, "CartPole-v1", "LunarLander-v3", "Pendulum-v1")
+ENVIRONMENTS = (AS_DEMONSTRATED, *(env_id for _, env_id in state.SHIPPED.values()))
 OWN_FILE = "own file"
 AGENTS = ("novice", "untrained", "expert", OWN_FILE)
 CHOSEN, NO_RULES = "at the thresholds", "none"

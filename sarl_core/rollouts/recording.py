@@ -22,6 +22,7 @@ SHIPPED = {
     "CartPole-v1": "cartpole",
     "LunarLander-v3": "lunar_lander",
     "Pendulum-v1": "pendulum",
+    "BipedalWalker-v3": "bipedal_walker",
 }
 SHIPPED_STEPS = 15_000  # the paper's amount
 

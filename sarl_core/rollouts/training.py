@@ -88,6 +88,22 @@ RECIPES: dict[str, Recipe] = {
             "clip_range": 0.2,
         },
     ),
+    "BipedalWalker-v3": Recipe(
+        algorithm="PPO",
+        steps=3_000_000,
+        n_envs=16,
+        normalise=True,
+        validation_every=100_000,
+        gamma=0.999,
+        parameters={
+            "n_steps": 1024,
+            "batch_size": 256,
+            "n_epochs": 8,
+            "gae_lambda": 0.95,
+            "learning_rate": "linear:0.0004",
+            "clip_range": 0.18,
+        },
+    ),
     "Pendulum-v1": Recipe(
         algorithm="SAC",
         steps=20_000,
