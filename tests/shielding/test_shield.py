@@ -196,6 +196,14 @@ def test_a_replaced_action_carries_the_rules_label(joints, projection, divider):
                 )
 
 
+def test_the_centre_around_zero_is_zero(joints):
+    rules = mine_rules(joints, supp_min=0.005, conf_min=0.8, divider=3)
+    middle = next(rule for rule in rules.rules if rule.action == 1)
+    state = next(s for s in joints.observations if middle.applies(s[None])[0])
+    executed = Shield(rules).decide(state, np.ones(2, dtype=np.float32)).executed
+    assert executed[middle.dimension] == 0.0
+
+
 def test_clip_never_lands_on_the_wrong_side_of_an_edge():
     # 1/3 is no float32: the nearest one below the edge belongs to the lower interval.
     demonstrations = Demonstrations(
