@@ -76,7 +76,11 @@ def use(setting: Thresholds) -> None:
 def jump_buttons(name: str, below: float | None, above: float | None) -> None:
     """Two buttons that go to the next value at which the rule set changes."""
     with st.container(
-        horizontal=True, horizontal_alignment="distribute", vertical_alignment="center", gap="small"
+        horizontal=True,
+        horizontal_alignment="distribute",
+        vertical_alignment="center",
+        gap="small",
+        key=f"jumps_{name}",
     ):
         for side, value in (("below", below), ("above", above)):
             if side == "above":
@@ -254,6 +258,11 @@ def switch(label: str, key: str, options: list[str], hint: str) -> str:
 # --- the page ----------------------------------------------------------------------------------
 
 take_over()
+# Where the sliders share a narrow row, the words between two buttons stand above them.
+st.html(
+    "<style>@media (min-width: 641px) and (max-width: 1200px) {"
+    " [class*='st-key-jumps_'] > :nth-child(2) { order: -1; flex-basis: 100%; } }</style>"
+)
 st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "
     "have done the same in at least a certain share of those (confidence)."
