@@ -1,8 +1,7 @@
 """The strips above and below a scene: who acts, how it stands, and what the shield does and why.
 
-They extend the picture and cover nothing of it. The text of an animation stays for a moment
-(it could not be read at fifty changes a second) and says of which step it speaks; the bar along
-the bottom is exact for every step.
+They extend the picture and cover nothing of it. Everything they say is of the step that is shown:
+text that stayed longer would name rules that are no longer in force. Who wants to read it pauses.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ LEAST_WIDTH = 440  # a narrower scene is enlarged, so that the text has room
 
 _MARGIN = 14
 _BAR = 6
-_HELD_SECONDS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,27 +62,11 @@ class Panel:
         height, width = self.film.size
         return TOP + height * self.scale + BOTTOM, width * self.scale
 
-    def spoken_of(self, number: int) -> int:
-        """The step that the text of an animation's picture speaks of.
-
-        Args:
-            number: Of the picture.
-
-        Returns:
-            A step, no later than `number`: the latest intervention of the moment before, or
-            the step at which the moment began.
-        """
-        held = max(1, round(self.fps * _HELD_SECONDS))
-        begin = number // held * held
-        changed = np.flatnonzero(self.steps.intervened[max(0, begin - held + 1) : begin + 1])
-        return begin if not len(changed) else max(0, begin - held + 1) + int(changed[-1])
-
-    def picture(self, number: int, *, held: bool) -> NDArray[np.uint8]:
+    def picture(self, number: int) -> NDArray[np.uint8]:
         """Scene and strips.
 
         Args:
             number: 0 to T; T and more show the last state.
-            held: Whether the text stays for a moment, as in an animation.
 
         Returns:
             Indexes into the film's palette, shape `size`.
@@ -100,8 +82,7 @@ class Panel:
         if number == len(self.steps):
             self._write_end(canvas)
         else:
-            spoken = self.spoken_of(number) if held else number
-            self._write_step(canvas, spoken, aside=f"at step {spoken}" if held else "")
+            self._write_step(canvas, number)
         self._draw_bar(canvas, number)
         return canvas.pixels
 
@@ -114,12 +95,9 @@ class Panel:
         canvas.text_right(right, 10, f"return {gained}", 15, INKS.text)
         canvas.text_right(right, 32, f"step {number} of {len(self.steps)}", 13, INKS.quiet)
 
-    def _write_step(self, canvas: Canvas, step: int, aside: str) -> None:
+    def _write_step(self, canvas: Canvas, step: int) -> None:
         top, width = canvas.pixels.shape[0] - BOTTOM, canvas.pixels.shape[1]
         right = width - _MARGIN
-        if aside:
-            canvas.text_right(right, top + 14, aside, 13, INKS.quiet)
-            right -= 100
         caption = self.caption(step)
         ink, on_ink = {
             "CHANGED": (INKS.changed, INKS.on_changed),
@@ -248,20 +226,17 @@ class Caption(NamedTuple):
     has_rule: bool
 
 
-def side_by_side_picture(
-    panels: tuple[Panel, ...], number: int, *, held: bool
-) -> NDArray[np.uint8]:
+def side_by_side_picture(panels: tuple[Panel, ...], number: int) -> NDArray[np.uint8]:
     """Panels beside each other; one that has ended stays on its last state.
 
     Args:
         panels: One or two, of one environment and one palette.
         number: Of the picture.
-        held: See `Panel.picture`.
 
     Returns:
         Indexes into the palette, shape (height, width).
     """
-    pictures = [panel.picture(number, held=held) for panel in panels]
+    pictures = [panel.picture(number) for panel in panels]
     gap = np.full((pictures[0].shape[0], GAP), PAPER_INDEX, dtype=np.uint8)
     parts = [pictures[0]]
     for picture in pictures[1:]:

@@ -64,12 +64,12 @@ class Replay:
         Returns:
             Shape (height, width, 3).
         """
-        return self._coloured(side_by_side_picture(self.panels, number, held=False))
+        return self._coloured(side_by_side_picture(self.panels, number))
 
     def animation(self) -> Iterator[NDArray[np.uint8]]:
-        """The pictures as they are saved: each text stays for a moment, to be read."""
+        """All pictures, in order, as they are saved."""
         for number in range(len(self)):
-            yield self._coloured(side_by_side_picture(self.panels, number, held=True))
+            yield self.frame(number)
 
     @cached_property
     def _colours(self) -> NDArray[np.uint8]:
@@ -90,7 +90,7 @@ class Replay:
         if "_gif" not in self.__dict__:
             self.__dict__["_gif"] = gif_bytes(
                 len(self),
-                lambda number: side_by_side_picture(self.panels, number, held=True),
+                lambda number: side_by_side_picture(self.panels, number),
                 self._colours,
                 self.fps,
                 progress=progress,

@@ -160,15 +160,29 @@ def test_captions_say_what_the_step_was(pair: Replay) -> None:
     assert plain.caption(0).mark == ""
 
 
-def test_an_animations_text_stays_and_prefers_interventions(pair: Replay) -> None:
+def test_a_saved_picture_speaks_of_its_own_step_only(pair: Replay) -> None:
+    """The strip of every picture is that of its step's record, whatever the steps around it."""
     panel = pair.panels[0]
-    spoken = [panel.spoken_of(number) for number in range(len(panel.steps))]
-    changes = np.flatnonzero(np.diff(spoken)) + 1
-    assert np.diff(changes).min() >= 40  # 0.8 s at 50 pictures a second
-    for number in changes.tolist():
-        assert spoken[number] <= number
-        window = panel.steps.intervened[number - 39 : number + 1]
-        assert panel.steps.intervened[spoken[number]] == window.any()
+    top = panel.size[0] - BOTTOM
+    orange = np.array(INKS.changed.full)
+    steps = panel.steps
+    kinds = {"changed": steps.intervened, "agreed": steps.covered & ~steps.intervened}
+    assert all(kind.any() for kind in kinds.values())
+    for number in range(len(steps)):
+        line = panel.picture(number)[top : top + 4]
+        assert (line == orange).all() == bool(steps.intervened[number])
+    # The records of all other steps may be anything: the text above the bar stays as it is.
+    for kind in kinds.values():
+        number = int(np.flatnonzero(kind)[-1])
+        others = np.arange(len(steps)) != number
+        elsewhere = replace(
+            steps,
+            rules=np.where(others[:, None], -1, steps.rules),
+            intervened=steps.intervened & ~others,
+        )
+        strip = np.s_[top : top + BOTTOM - 20]
+        alone = replace(panel, steps=elsewhere).picture(number)
+        assert (alone[strip] == panel.picture(number)[strip]).all()
 
 
 def test_the_shorter_one_stays_on_its_last_state(pair: Replay) -> None:
