@@ -107,9 +107,9 @@ def test_rules_of_a_person_come_first_in_their_order_and_disabled_ones_not_at_al
     )
     edited = replace(mined, rules=added)
     shield = Shield(edited)
-    states = np.random.default_rng(0).normal(size=(500, 8)).astype(np.float32)
+    states = states_around(added, 8, n=250)
     order = [len(mined) + 1, len(mined) + 2, *range(len(mined))]
-    batch = shield.decide_batch(states, np.zeros(500, dtype=int))
+    batch = shield.decide_batch(states, np.zeros(len(states), dtype=int))
     for row, state in enumerate(states):
         place = scan([added[i] for i in order], state, 0)
         wanted = None if place is None else order[place]
@@ -125,9 +125,10 @@ def test_mined_rules_that_are_not_of_one_tree_are_scanned_in_order(lander_like):
         for i in range(5)
     )
     shield = Shield(replace(mined, rules=strange))
-    states = np.random.default_rng(0).normal(size=(300, 8)).astype(np.float32)
-    found = shield.decide_batch(states, np.zeros(300, dtype=int)).rules[:, 0]
+    states = states_around(strange, 8, n=150)
+    found = shield.decide_batch(states, np.zeros(len(states), dtype=int)).rules[:, 0]
     wanted = [scan(strange, state, 0) for state in states]
+    assert [shield.decide(state, 0).rules[0] for state in states] == wanted
     assert found.tolist() == [-1 if number is None else number for number in wanted]
 
 
