@@ -1,0 +1,75 @@
+"""Commands that make demonstrations and look at them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sarl_core.commandline import terminal
+from sarl_core.commandline.inputs import read_demonstrations
+from sarl_core.commandline.options import (
+    AgentName,
+    Env,
+    EnvOfFile,
+    File,
+    Json,
+    Seed,
+    Stochastic,
+)
+
+if TYPE_CHECKING:
+    from sarl_core.demonstrations.dataset import Demonstrations
+
+
+def record(
+    env: Env,
+    agent: AgentName,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .parquet, .csv or .npz file.",
+        ),
+    ],
+    steps: Annotated[int, typer.Option("--steps", min=1, help="How many to record.")] = 15_000,
+    seed: Seed = 0,
+    stochastic: Stochastic = False,
+    as_json: Json = False,
+) -> None:
+    """Run an agent and save what it saw and did as demonstrations.
+
+    Example: `python -m sarl_core record --env CartPole-v1 --agent expert --stochastic --steps 5000
+    --out cartpole.parquet`
+    """
+    terminal.check_output(out, (".parquet", ".csv", ".npz"))
+    with terminal.working("Recording") as advance:
+        from sarl_core.demonstrations.formats import save_demonstrations
+        from sarl_core.rollouts.recording import record as record_demonstrations
+
+        demonstrations = record_demonstrations(
+            env, agent, steps=steps, seed=seed, stochastic=stochastic, progress=advance
+        )
+        save_demonstrations(demonstrations, out)
+    _tell_demonstrations(demonstrations, out, as_json)
+
+
+def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
+    """Read and check demonstrations, and print what is in them.
+
+    Example: `python -m sarl_core check data/demonstrations/lunar_lander.parquet`
+    """
+    _tell_demonstrations(read_demonstrations(file, env), file, as_json)
+
+
+def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:
+    from sarl_core.commandline.answers import describe_demonstrations, print_demonstrations
+
+    document = describe_demonstrations(demonstrations, path)
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_demonstrations(document)

@@ -1,0 +1,173 @@
+"""Commands that run agents in environments, shielded or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sarl_core.commandline import terminal
+from sarl_core.commandline.inputs import read_shield
+from sarl_core.commandline.options import (
+    AgentName,
+    Env,
+    Json,
+    ProjectionName,
+    Rules,
+    Seed,
+    Stochastic,
+)
+from sarl_core.errors import InputError
+
+
+def evaluate(
+    env: Env,
+    agent: AgentName,
+    rules: Rules = None,
+    episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many.")] = 10,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Episode i uses this seed + i.",
+        ),
+    ] = 0,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    as_json: Json = False,
+) -> None:
+    """Run episodes, shielded or not: returns, lengths, interventions, coverage.
+
+    Example: `python -m sarl_core evaluate --env LunarLander-v3 --agent novice --rules rules.json
+    --episodes 50 --seed 1 --json`
+    """
+    with terminal.working("Running episodes") as advance:
+        from sarl_core.rollouts.episodes import rollout
+
+        found = rollout(
+            env,
+            agent,
+            shield=read_shield(rules, projection),
+            episodes=episodes,
+            seed=seed,
+            stochastic=stochastic,
+            keep_steps=False,
+            progress=advance,
+        )
+        document = found.to_dict()
+    if as_json:
+        terminal.print_json(document)
+        return
+    from sarl_core.commandline.answers import print_episodes
+
+    shielded = "unshielded" if rules is None else f"shielded by {rules}"
+    print_episodes(document, f"{found.agent} in {env}, {shielded}")
+
+
+def render(
+    env: Env,
+    agent: AgentName,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .gif or .mp4 file.",
+        ),
+    ],
+    rules: Rules = None,
+    seed: Seed = 0,
+    both: Annotated[
+        bool,
+        typer.Option(
+            "--side-by-side",
+            help="With the shield and without it, on the same seed.",
+        ),
+    ] = False,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    as_json: Json = False,
+) -> None:
+    """Play one episode and save it as a moving picture, in real time.
+
+    Example: `python -m sarl_core render --env LunarLander-v3 --agent novice --rules rules.json
+    --seed 1 --side-by-side --out replay.gif`
+    """
+    terminal.check_output(out, (".gif", ".mp4"))
+    shield = read_shield(rules, projection)
+    if both and shield is None:
+        raise InputError("--side-by-side compares with a shield; give --rules, or leave it out")
+    with terminal.working("Playing") as advance:
+        from sarl_core.rollouts.rendering import render_episode, side_by_side
+
+        if both and shield is not None:
+            replay = side_by_side(
+                env, agent, shield, seed=seed, stochastic=stochastic, progress=advance
+            )
+        else:
+            replay = render_episode(
+                env, agent, shield=shield, seed=seed, stochastic=stochastic, progress=advance
+            )
+    with terminal.working("Writing") as advance:
+        replay.save(out, progress=advance)
+    from sarl_core.commandline.answers import describe_replay, print_replay
+
+    document = describe_replay(replay, out, [shield is not None, False])
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_replay(document)
+
+
+def train_expert(
+    env: Env,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE.npz",
+            show_default=False,
+            help="The policy to write; its card stands beside it as .json.",
+        ),
+    ],
+    seed: Seed = 0,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Environment steps.",
+            show_default="the recipe's",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Train an expert as the shipped ones were, and write its weights and its card.
+
+    Example: `python -m sarl_core train-expert --env CartPole-v1 --seed 0 --out expert.npz`
+    """
+    terminal.check_output(out, (".npz",))
+    with terminal.working("Training") as advance:
+        from sarl_core.rollouts.training import train_expert as train
+
+        card = train(
+            env,
+            out=out,
+            seed=seed,
+            steps=steps,
+            progress=lambda done, total, _: advance(done, total),
+        )
+    if as_json:
+        terminal.print_json(card)
+        return
+    returns = card["returns_deterministic"]
+    terminal.print_lines(
+        [
+            f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
+            f"({returns['min']:.1f} to {returns['max']:.1f}), after "
+            f"{card['kept_after_steps']:,} steps."
+        ]
+    )

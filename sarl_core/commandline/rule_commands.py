@@ -1,0 +1,151 @@
+"""Commands that mine rules, and show what thresholds do to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sarl_core.commandline import terminal
+from sarl_core.commandline.inputs import read_demonstrations
+from sarl_core.commandline.options import (
+    Divider,
+    EnvOfFile,
+    File,
+    Json,
+)
+
+
+def mine(
+    file: File,
+    support: Annotated[
+        float,
+        typer.Option(
+            "--support",
+            show_default=False,
+            help="Minimum share of the states a rule applies to.",
+        ),
+    ],
+    confidence: Annotated[
+        float,
+        typer.Option(
+            "--confidence",
+            show_default=False,
+            help="Minimum share of those in which the expert did what the rule says.",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="RULES.json",
+            show_default=False,
+            help="The rule file to write.",
+        ),
+    ],
+    env: EnvOfFile = None,
+    lift: Annotated[float, typer.Option("--lift", help="Minimum lift.")] = 0.0,
+    divider: Divider = 2,
+    max_depth: Annotated[
+        int | None,
+        typer.Option(
+            "--max-depth",
+            min=0,
+            help="Most conditions a rule may have.",
+            show_default="no limit",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Mine a rule set and write it to a rule file.
+
+    Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
+    --confidence 0.95 --out rules.json`
+    """
+    terminal.check_output(out, (".json",))
+    with terminal.working("Mining"):
+        from sarl_core.mining.rules import Thresholds, mine_rules
+
+        Thresholds(support, confidence, lift, max_depth)  # refuse them before the file is read
+        rule_set = mine_rules(
+            read_demonstrations(file, env),
+            supp_min=support,
+            conf_min=confidence,
+            lift_min=lift,
+            max_depth=max_depth,
+            divider=divider,
+        )
+        rule_set.save(out)
+    from sarl_core.commandline.answers import describe_rules, print_rules
+
+    if as_json:
+        terminal.print_json(describe_rules(rule_set, out))
+    else:
+        print_rules(rule_set, out)
+
+
+def landscape(
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .json, .csv, .html or .png file.",
+        ),
+    ],
+    env: EnvOfFile = None,
+    divider: Divider = 2,
+    supports: Annotated[
+        str,
+        typer.Option(
+            "--supports",
+            metavar="A:B:STEP",
+            help="Minimum supports, from A to B.",
+        ),
+    ] = "0:0.5:0.05",
+    confidences: Annotated[
+        str,
+        typer.Option(
+            "--confidences",
+            metavar="A:B:STEP",
+            help="Minimum confidences, from A to B.",
+        ),
+    ] = "0:1:0.05",
+    as_json: Json = False,
+) -> None:
+    """Rule count, mean length, coverage and fidelity for every pair of thresholds of a grid.
+
+    Example: `python -m sarl_core landscape data/demonstrations/lunar_lander.parquet --out
+    landscape.html`
+    """
+    terminal.check_output(out, (".json", ".csv", ".html", ".png"))
+    with terminal.working("Drawing the landscape"):
+        from sarl_core.explaining.landscape_files import (
+            landscape_document,
+            parse_grid,
+            save_landscape,
+        )
+        from sarl_core.mining.landscape import threshold_landscape
+        from sarl_core.mining.tree import grow_policy_trees
+
+        grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
+        trees = grow_policy_trees(read_demonstrations(file, env), divider=divider)
+        found = threshold_landscape(trees, *grid)
+        names = [tree.dimension.name for tree in trees]
+        source = trees[0].source
+        title = f"{source.env_id or file.name}: {source.steps:,} steps"
+        save_landscape(found, names, out, title=title)
+    if as_json:
+        terminal.print_json(landscape_document(found, names))
+        return
+    cells = f"{found.rule_count.size:,} cells"
+    grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} "
+            f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
+        ]
+    )
