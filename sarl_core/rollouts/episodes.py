@@ -46,6 +46,7 @@ class Episodes:
         covered: Steps at which some rule applied, (E,) int64.
         terminated: Whether the environment ended the episode, (E,) bool.
         truncated: Whether a limit ended it, (E,) bool.
+        last_rewards: Reward of each episode's last step, which tells a crash, (E,) float64.
         steps: Every step, or None where they were not kept.
     """
 
@@ -58,6 +59,7 @@ class Episodes:
     covered: NDArray[np.int64]
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
+    last_rewards: NDArray[np.float64]
     steps: StepTable | None = None
 
     def __post_init__(self) -> None:
@@ -126,6 +128,7 @@ class Episodes:
                 "covered": self.covered,
                 "terminated": self.terminated,
                 "truncated": self.truncated,
+                "last_reward": self.last_rewards,
             }
         )
 
@@ -257,5 +260,6 @@ def _gather(
         covered=column("covered"),
         terminated=column("terminated"),
         truncated=column("truncated"),
+        last_rewards=column("last_rewards"),
         steps=concatenate(tables) if tables else None,
     )

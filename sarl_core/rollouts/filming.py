@@ -119,6 +119,7 @@ def film_episode(
         covered=np.array([int(steps.covered.sum())]),
         terminated=np.array([bool(terminated)]),
         truncated=np.array([bool(truncated)]),
+        last_rewards=steps.reward[-1:].copy(),
         steps=steps,
     )
 

@@ -27,6 +27,7 @@ class Outcome(NamedTuple):
     covered: NDArray[np.int64]
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
+    last_rewards: NDArray[np.float64]
     steps: StepTable | None
 
 
@@ -111,7 +112,7 @@ class _Run:
         self.states = np.zeros((0, self.adapter.n_features), dtype=np.float32)
         self.started = 0
         count = len(seeds)
-        self.returns = np.zeros(count)
+        self.returns, self.last_rewards = np.zeros((2, count))
         self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
         self.terminated, self.truncated = np.zeros((2, count), dtype=np.bool_)
         self.chunks: list[tuple[NDArray[Any], ...]] = []
@@ -168,6 +169,7 @@ class _Run:
                 )
             )
         self.returns[episodes] += rewards
+        self.last_rewards[episodes] = rewards
         self.lengths[episodes] += 1
         if self.shield is not None:
             self.interventions[episodes] += choice.intervened
@@ -208,6 +210,7 @@ class _Run:
             self.covered,
             self.terminated,
             self.truncated,
+            self.last_rewards,
             steps,
         )
 

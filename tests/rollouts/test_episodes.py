@@ -41,7 +41,16 @@ def shields() -> dict[str, Shield]:
 
 
 def same(first: Episodes, second: Episodes) -> bool:
-    arrays = ("seeds", "returns", "lengths", "interventions", "covered", "terminated", "truncated")
+    arrays = (
+        "seeds",
+        "returns",
+        "lengths",
+        "interventions",
+        "covered",
+        "terminated",
+        "truncated",
+        "last_rewards",
+    )
     assert isinstance(first.steps, StepTable)
     assert isinstance(second.steps, StepTable)
     return all(
@@ -118,6 +127,7 @@ def test_equals_a_plain_loop_through_the_wrapper(env_id: str, shields: dict[str,
             over = terminated or truncated
         assert over
         assert found.returns[index] == total
+        assert found.last_rewards[index] == reward
         assert (found.terminated[index], found.truncated[index]) == (terminated, truncated)
         assert found.interventions[index] == steps.intervened.sum() > 0
         assert found.covered[index] == steps.covered.sum()

@@ -1,0 +1,217 @@
+"""Agents compared, each with a shield and without, on the same seeds (the paper's Fig. 5 to 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError
+from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.progress import Progress, report
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Shield
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from sarl_core.mining.rules import RuleSet
+
+# These end an episode for good reasons too; only a failure brings exactly this reward.
+_FAILURE_REWARD = {"LunarLander": -100.0, "BipedalWalker": -100.0}
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One way to act that is compared with others.
+
+    Attributes:
+        name: What it is called on screen; unique within a comparison.
+        agent: What `make_agent` takes: a name or a path.
+        rules: In force as a shield, None for no shield.
+        projection: How the shield replaces a continuous action.
+        stochastic: Whether a trained policy is sampled.
+    """
+
+    name: str
+    agent: str
+    rules: RuleSet | None = None
+    projection: Projection = "centre"
+    stochastic: bool = False
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A arms on the same seeds.
+
+    Attributes:
+        env_id: Environment.
+        seed: Of the first episode.
+        arms: What was compared.
+        episodes: E episodes of each arm, in the arms' order; their steps are not kept.
+    """
+
+    env_id: str
+    seed: int
+    arms: tuple[Arm, ...]
+    episodes: tuple[Episodes, ...]
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row an arm, as `comparison_row` gives it."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                comparison_row(arm, episodes)
+                for arm, episodes in zip(self.arms, self.episodes, strict=True)
+            ]
+        )
+
+
+def compare(
+    env_id: str,
+    arms: Sequence[Arm],
+    *,
+    episodes: int = 100,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Run the same episodes with every arm.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        arms: At least one, with names of their own.
+        episodes: How many each, E.
+        seed: Episode i of every arm starts from seed + i and draws the same random numbers.
+        jobs: Processes; changes the speed, never the result.
+        progress: Called with (episodes done, in all, over all arms); returning False stops.
+
+    Returns:
+        The comparison; the same arguments give the same one, bit for bit.
+
+    Raises:
+        InputError: If there is no arm, two share a name, a number is out of range, or an arm
+            does not fit the environment.
+        CancelledError: If `progress` returned False; nothing is kept here. Who wants to keep
+            finished arms runs them one by one with `compare_arm`.
+    """
+    names = [arm.name for arm in arms]
+    if not arms:
+        raise InputError("there is nothing to compare; choose at least one agent and shield")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"two of the compared arms are called {twice!r}; give each its own name")
+    total = len(arms) * episodes
+    found = []
+    for index, arm in enumerate(arms):
+
+        def told(done: int, _: int, before: int = index * episodes) -> None:
+            report(progress, before + done, total)
+
+        found.append(
+            compare_arm(env_id, arm, episodes=episodes, seed=seed, jobs=jobs, progress=told)
+        )
+    return Comparison(env_id, seed, tuple(arms), tuple(found))
+
+
+def compare_arm(
+    env_id: str,
+    arm: Arm,
+    *,
+    episodes: int = 100,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Episodes:
+    """Run the episodes of one arm.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        arm: Agent and shield.
+        episodes: How many, E.
+        seed: Of the first.
+        jobs: Processes.
+        progress: Called with (episodes done, E); returning False stops.
+
+    Returns:
+        The episodes, without their steps.
+
+    Raises:
+        InputError: If a number is out of range, or agent, rules and environment do not fit.
+        CancelledError: If `progress` returned False.
+    """
+    shield = None if arm.rules is None else Shield(arm.rules, projection=arm.projection)
+    return rollout(
+        env_id,
+        arm.agent,
+        shield=shield,
+        episodes=episodes,
+        seed=seed,
+        stochastic=arm.stochastic,
+        jobs=jobs,
+        keep_steps=False,
+        progress=progress,
+    )
+
+
+def crashed(episodes: Episodes, env_id: str) -> NDArray[np.bool_]:
+    """Which episodes ended by failure.
+
+    In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
+    walker arrives; there a failure is an end with a last reward of -100. In CartPole, and in an
+    environment this project knows nothing of, every end that is not a time limit counts as one.
+
+    Args:
+        episodes: E finished episodes.
+        env_id: Their environment.
+
+    Returns:
+        Shape (E,).
+    """
+    family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
+    for name, reward in _FAILURE_REWARD.items():
+        if family.startswith(name):
+            return np.asarray(episodes.terminated & (episodes.last_rewards == reward))
+    return episodes.terminated
+
+
+def crash_rate(episodes: Episodes, env_id: str) -> float:
+    """Share of the episodes that ended by failure, as `crashed` says.
+
+    Args:
+        episodes: E finished episodes.
+        env_id: Their environment.
+
+    Returns:
+        0 to 1.
+    """
+    return float(crashed(episodes, env_id).mean())
+
+
+def comparison_row(arm: Arm, episodes: Episodes) -> dict[str, Any]:
+    """What one arm's episodes say, for a table.
+
+    Args:
+        arm: The arm.
+        episodes: Its E episodes.
+
+    Returns:
+        `arm`, `agent`, `rules` (their number, None without a shield), `episodes`, the statistics
+        of `Episodes.summary` (without a shield, `intervention_rate` and `coverage` are None),
+        and `crash_rate`.
+    """
+    row: dict[str, Any] = {
+        "arm": arm.name,
+        "agent": episodes.agent,
+        "rules": None if arm.rules is None else len(arm.rules),
+        "episodes": len(episodes),
+        **episodes.summary(),
+        "crash_rate": crash_rate(episodes, episodes.env_id),
+    }
+    if arm.rules is None:
+        row |= {"intervention_rate": None, "coverage": None}
+    return row
