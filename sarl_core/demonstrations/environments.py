@@ -154,6 +154,12 @@ def make_environment(env_id: str, **parameters: Any) -> Any:
             return gymnasium.make(env_id, disable_env_checker=True, **parameters)
     except Exception as error:  # other people's code, which may raise anything
         reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        lacking = isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled))
+        if lacking and ":" not in env_id:  # else it may be the named module that does not exist
+            raise InputError(
+                f"the environment {env_id!r} needs a package that is not installed "
+                f"({reason.rstrip('.')}); install it, or choose another environment"
+            ) from error
         raise InputError(
             f"the environment {env_id!r} cannot be made ({reason}); "
             "give an id that gymnasium.make knows, such as CartPole-v1"

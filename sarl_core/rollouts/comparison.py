@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.shielding.projection import Projection
@@ -30,14 +32,14 @@ class Arm:
 
     Attributes:
         name: What it is called on screen; unique within a comparison.
-        agent: What `make_agent` takes: a name or a path.
+        agent: What `make_agent` takes: a name, a path, or an agent.
         rules: In force as a shield, None for no shield.
         projection: How the shield replaces a continuous action.
         stochastic: Whether a trained policy is sampled.
     """
 
     name: str
-    agent: str
+    agent: str | Path | Agent
     rules: RuleSet | None = None
     projection: Projection = "centre"
     stochastic: bool = False

@@ -7,7 +7,7 @@ does not depend on what runs beside it, nor on the number of processes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +80,20 @@ class Episodes:
             f"steps={int(self.lengths.sum())}, mean_return={self.returns.mean():.1f})"
         )
 
+    def first(self, count: int) -> Episodes:
+        """The first of the episodes, as if no more had been run.
+
+        Args:
+            count: How many, 1 or more.
+
+        Returns:
+            At most `count` episodes.
+        """
+        changed: dict[str, Any] = {name: getattr(self, name)[:count] for name in _COLUMNS}
+        if self.steps is not None:
+            changed["steps"] = self.steps.take(self.steps.episode < count)
+        return replace(self, **changed)
+
     def summary(self) -> dict[str, float]:
         """What the episodes say together (DESIGN 5, ``evaluate --json``).
 
@@ -133,6 +147,35 @@ class Episodes:
         )
 
 
+_COLUMNS = tuple(
+    column.name for column in fields(Episodes) if column.name not in ("env_id", "agent", "steps")
+)
+
+
+def join(pieces: Sequence[Episodes]) -> Episodes:
+    """Put episodes of one agent in one environment behind each other.
+
+    Args:
+        pieces: At least one; if one has no steps, the whole has none.
+
+    Returns:
+        All their episodes, in the order given.
+    """
+    if len(pieces) == 1:
+        return pieces[0]
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in _COLUMNS
+    }
+    tables: list[StepTable] = []
+    before = 0
+    for piece in pieces:
+        if piece.steps is not None:
+            tables.append(piece.steps.numbered_from(before))
+        before += len(piece)
+    steps = concatenate(tables) if len(tables) == len(pieces) else None
+    return replace(pieces[0], steps=steps, **columns)
+
+
 def rollout(
     env_id: str,
     agent: str | Path | Agent,
@@ -179,8 +222,7 @@ def rollout(
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     seeds = np.arange(seed, seed + episodes, dtype=np.int64)
-    pieces = [seeds] if jobs == 1 else np.array_split(seeds, min(episodes, jobs * _ROUNDS))
-    outcomes: list[Outcome] = []
+    pieces = np.array_split(seeds, min(episodes, jobs * _ROUNDS))
     done = 0
 
     def finished(count: int) -> None:
@@ -189,23 +231,23 @@ def rollout(
         report(progress, done, episodes)
 
     if jobs == 1:
-        outcomes.append(
-            play(
-                env_id,
-                actor,
-                shield,
-                seeds,
-                batch=batch,
-                max_steps=MAX_STEPS,
-                keep_steps=keep_steps,
-                finished=lambda: finished(1),
-            )
+        outcome = play(
+            env_id,
+            actor,
+            shield,
+            seeds,
+            batch=batch,
+            max_steps=MAX_STEPS,
+            keep_steps=keep_steps,
+            finished=lambda: finished(1),
         )
-    else:
-        for outcome in _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps):
-            outcomes.append(outcome)
-            finished(len(outcome.returns))
-    return _gather(env_id, actor.name, seeds, outcomes)
+        return _episodes(env_id, actor.name, seeds, outcome)
+    found = []
+    outcomes = _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps)
+    for piece, outcome in zip(pieces, outcomes, strict=True):
+        found.append(_episodes(env_id, actor.name, piece, outcome))
+        finished(len(piece))
+    return join(found)
 
 
 def _in_processes(
@@ -236,30 +278,5 @@ def _in_processes(
             )
 
 
-def _gather(
-    env_id: str, agent: str, seeds: NDArray[np.int64], outcomes: Sequence[Outcome]
-) -> Episodes:
-    """Episodes from pieces that follow each other."""
-
-    def column(name: str) -> Any:
-        return np.concatenate([getattr(outcome, name) for outcome in outcomes])
-
-    tables: list[StepTable] = []
-    before = 0
-    for outcome in outcomes:
-        if outcome.steps is not None:
-            tables.append(outcome.steps.numbered_from(before) if before else outcome.steps)
-        before += len(outcome.returns)
-    return Episodes(
-        env_id=env_id,
-        agent=agent,
-        seeds=seeds,
-        returns=column("returns"),
-        lengths=column("lengths"),
-        interventions=column("interventions"),
-        covered=column("covered"),
-        terminated=column("terminated"),
-        truncated=column("truncated"),
-        last_rewards=column("last_rewards"),
-        steps=concatenate(tables) if tables else None,
-    )
+def _episodes(env_id: str, agent: str, seeds: NDArray[np.int64], outcome: Outcome) -> Episodes:
+    return Episodes(env_id=env_id, agent=agent, seeds=seeds, **outcome._asdict())

@@ -143,3 +143,23 @@ def test_environment_that_does_not_exist(env_id: str) -> None:
         make_environment(env_id)
     assert "\n" not in str(error.value)
     assert repr(env_id) in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ModuleNotFoundError("No module named 'engine'"),
+        gymnasium.error.DependencyNotInstalled(
+            "engine is not installed, run `pip install engine`."
+        ),
+    ],
+)
+def test_a_package_that_is_missing_is_named(error: Exception) -> None:
+    def fail(**_: Any) -> Any:
+        raise error
+
+    gymnasium.register("test/Lacking-v0", entry_point=fail)
+    with pytest.raises(InputError, match="needs a package that is not installed") as found:
+        make_environment("test/Lacking-v0")
+    gymnasium.registry.pop("test/Lacking-v0")
+    assert "engine" in str(found.value)

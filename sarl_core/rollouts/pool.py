@@ -1,0 +1,228 @@
+"""Many episodes in worker processes, piece by piece, for a server with several callers.
+
+`rollout` with several jobs serves one caller who waits for all. Here every finished piece is
+handed over at once, so that what is done stays when the rest is called off; callers take turns on
+one set of processes; and what fails in one task leaves the others alone.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any, NamedTuple
+
+from sarl_core.errors import InputError, SarlError, WorkError
+from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.shielding.shield import Shield
+
+_PIECE_SECONDS = 1.0  # what one piece should take: progress is told, and work ends, this often
+_FIRST_PIECE = 4
+_LARGEST_PIECE = 32  # environments that `play` steps side by side
+_IDLE_SECONDS = 300  # after which a process that nobody needs ends
+_NICENESS = 10  # whoever serves pages goes first
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Episodes to run.
+
+    Attributes:
+        env_id: What ``gymnasium.make`` takes.
+        agent: Chooses the actions.
+        shield: Checks them, or None.
+        seed: Of the first episode.
+        episodes: How many; episode i has seed + i.
+    """
+
+    env_id: str
+    agent: Agent
+    shield: Shield | None
+    seed: int
+    episodes: int
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be run.
+
+        Raises:
+            InputError: If there is no episode to run, or the seed is negative.
+        """
+        if self.episodes < 1 or self.seed < 0:
+            raise InputError(
+                f"{self.episodes} episodes from seed {self.seed} cannot be run; give at least "
+                "one episode, and a seed of 0 or more"
+            )
+
+
+class Found(NamedTuple):
+    """What came of a piece of a task.
+
+    Attributes:
+        task: Index of the task.
+        result: The next of its episodes, in the order of their seeds, without their steps; or
+            why there are no more.
+    """
+
+    task: int
+    result: Episodes | SarlError
+
+
+class _Piece(NamedTuple):
+    task: int
+    start: int
+    episodes: int
+
+
+class _Progress:
+    """How far a task is."""
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.asked = self.given = 0  # episodes handed to a process; given to the caller
+        self.size = _FIRST_PIECE
+        self.early: dict[int, Episodes] = {}  # finished before those that come before them
+        self.failed = False
+
+    @property
+    def is_open(self) -> bool:
+        return not self.failed and self.asked < self.task.episodes
+
+
+class WorkerPool:
+    """Processes that run episodes; they start when first needed."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        """Start nothing yet.
+
+        Args:
+            workers: Processes; as many as there are processors where not given, at most 8.
+        """
+        self.workers = workers or min(os.cpu_count() or 1, 8)
+        self._lock = Lock()
+        self._processes: Any = None
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[Found]:
+        """Run the episodes of several tasks, in their order.
+
+        Ending the iteration early calls off the pieces that no process has begun.
+
+        Args:
+            tasks: What to run.
+
+        Yields:
+            Pieces as they are finished; of one task, in the order of the seeds.
+
+        Raises:
+            WorkError: If a process ended in the middle of its work.
+        """
+        progress = [_Progress(task) for task in tasks]
+        waiting = deque(range(len(tasks)))
+        running: dict[Any, _Piece] = {}
+        try:
+            while True:
+                while waiting and not progress[waiting[0]].is_open:
+                    waiting.popleft()
+                # One more than there are processes, so that none of them waits for this loop; not
+                # all at once, so that another caller's pieces come in between.
+                if waiting and len(running) <= self.workers:
+                    piece = _next_piece(waiting[0], progress[waiting[0]])
+                    running[self._submit(tasks[piece.task], piece)] = piece
+                    continue
+                if not running:
+                    return
+                yield from self._collect(running, progress)
+        finally:
+            for future in running:
+                future.cancel()
+
+    def close(self) -> None:
+        """End the processes, when what they have begun is done."""
+        with self._lock:
+            processes, self._processes = self._processes, None
+        if processes is not None:
+            processes.shutdown(wait=True)
+
+    def _submit(self, task: Task, piece: _Piece) -> Any:
+        from concurrent.futures import BrokenExecutor
+
+        from joblib.externals.loky.process_executor import ProcessPoolExecutor
+
+        seed = task.seed + piece.start
+        work = (_work, task.env_id, task.agent, task.shield, seed, piece.episodes)
+        with self._lock:
+            if self._processes is not None:
+                try:
+                    return self._processes.submit(*work)
+                except BrokenExecutor:  # another caller's loss; the processes are made anew
+                    pass
+            self._processes = ProcessPoolExecutor(
+                self.workers,
+                timeout=_IDLE_SECONDS,
+                initializer=_step_back,
+                env={"OMP_NUM_THREADS": "1"},
+            )
+            return self._processes.submit(*work)
+
+    def _collect(self, running: dict[Any, _Piece], progress: list[_Progress]) -> Iterator[Found]:
+        """Wait for a piece, and hand over what can be."""
+        from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, wait
+
+        done, _ = wait(running, return_when=FIRST_COMPLETED)
+        for future in done:
+            piece = running.pop(future)
+            state = progress[piece.task]
+            try:
+                episodes, seconds = future.result()
+            except SarlError as error:
+                if not state.failed:
+                    state.failed = True
+                    yield Found(piece.task, error)
+                continue
+            except BrokenExecutor as error:
+                with self._lock:
+                    self._processes = None  # the next caller gets new ones
+                raise WorkError(
+                    "a process that ran episodes ended unexpectedly, as when memory runs out; "
+                    "run again, with fewer episodes at a time"
+                ) from error
+            state.size = round(piece.episodes * _PIECE_SECONDS / max(seconds, 1e-3))
+            state.early[piece.start] = episodes
+            while (ready := state.early.pop(state.given, None)) is not None:
+                state.given += len(ready)
+                yield Found(piece.task, ready)
+
+
+def _next_piece(task: int, state: _Progress) -> _Piece:
+    size = min(max(state.size, 1), _LARGEST_PIECE, state.task.episodes - state.asked)
+    piece = _Piece(task, state.asked, size)
+    state.asked += size
+    return piece
+
+
+def _step_back() -> None:
+    """Let other processes go first; for a new process."""
+    if hasattr(os, "nice"):
+        os.nice(_NICENESS)
+
+
+def _work(
+    env_id: str, agent: Agent, shield: Shield | None, seed: int, count: int
+) -> tuple[Episodes, float]:
+    """Run one piece and say how long it took; in a process."""
+    start = time.perf_counter()
+    try:
+        episodes = rollout(
+            env_id, agent, shield=shield, episodes=count, seed=seed, keep_steps=False
+        )
+    except SarlError:
+        raise
+    except Exception as error:  # of other people's environments, which may raise anything
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(
+            f"an episode in {env_id} failed ({reason}); choose another environment or agent"
+        ) from error
+    return episodes, time.perf_counter() - start

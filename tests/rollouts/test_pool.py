@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError, SarlError, WorkError
+from sarl_core.mining.rules import mine_rules
+from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.episodes import Episodes, join, rollout
+from sarl_core.rollouts.pool import Task, WorkerPool
+from sarl_core.rollouts.recording import record
+from sarl_core.shielding.shield import Shield
+
+COLUMNS = ("seeds", "returns", "lengths", "interventions", "covered", "terminated", "last_rewards")
+
+
+@dataclass(frozen=True)
+class Misbehaving:
+    """An agent whose actions no environment takes, or that takes its process with it."""
+
+    deadly: bool
+    name: str = "misbehaving"
+    n_uniforms: int = 0
+
+    def act(self, observations: NDArray[np.float32], uniforms: Any) -> NDArray[np.int64]:
+        if self.deadly:
+            import os
+
+            os._exit(1)
+        raise RuntimeError("this is\nnot an action")
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[WorkerPool]:
+    pool = WorkerPool(2)
+    yield pool
+    pool.close()
+
+
+def gathered(pool: WorkerPool, tasks: list[Task]) -> dict[int, list[Episodes | SarlError]]:
+    found: dict[int, list[Episodes | SarlError]] = {}
+    for task, result in pool.run(tasks):
+        found.setdefault(task, []).append(result)
+    return found
+
+
+def task(agent: str = "novice", episodes: int = 40, seed: int = 3) -> Task:
+    return Task("CartPole-v1", make_agent(agent, "CartPole-v1"), None, seed, episodes)
+
+
+def test_pieces_together_are_what_one_rollout_gives(pool: WorkerPool) -> None:
+    rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
+    novice = make_agent("novice", "CartPole-v1")
+    tasks = [task(), Task("CartPole-v1", novice, Shield(rules), 7, 45), task("expert", 1)]
+    found = gathered(pool, tasks)
+    for index, asked in enumerate(tasks):
+        pieces = [piece for piece in found[index] if isinstance(piece, Episodes)]
+        whole = rollout(
+            asked.env_id,
+            asked.agent,
+            shield=asked.shield,
+            episodes=asked.episodes,
+            seed=asked.seed,
+            keep_steps=False,
+        )
+        together = join(pieces)
+        assert together.steps is None
+        for name in COLUMNS:
+            assert (getattr(together, name) == getattr(whole, name)).all()
+    assert len(found[1]) > 1
+
+
+def test_what_is_done_stays_when_the_rest_is_called_off(pool: WorkerPool) -> None:
+    work = pool.run([task(episodes=1_000)])
+    index, first = next(work)
+    work.close()  # type: ignore[attr-defined]  # a generator
+    assert index == 0
+    assert isinstance(first, Episodes)
+    assert first.seeds.tolist() == list(range(3, 3 + len(first)))
+    # The processes are there for others.
+    assert sum(len(piece) for piece in gathered(pool, [task(episodes=5)])[0]) == 5  # type: ignore[arg-type]
+
+
+def test_a_task_that_fails_leaves_the_others_alone(pool: WorkerPool) -> None:
+    bad = Task("CartPole-v1", Misbehaving(deadly=False), None, 0, 50)
+    found = gathered(pool, [task(episodes=9), bad, task(episodes=9)])
+    (error,) = found[1]
+    assert isinstance(error, InputError)
+    assert str(error) == (
+        "an episode in CartPole-v1 failed (RuntimeError: this is not an action); choose another "
+        "environment or agent"
+    )
+    for index in (0, 2):
+        assert sum(len(piece) for piece in found[index] if isinstance(piece, Episodes)) == 9
+
+
+def test_rules_of_another_environment_are_one_sentence(pool: WorkerPool) -> None:
+    rules = mine_rules(record("Pendulum-v1", "expert", steps=400), supp_min=0.0, conf_min=1.0)
+    bad = Task("CartPole-v1", make_agent("novice", "CartPole-v1"), Shield(rules), 0, 10)
+    (error,) = gathered(pool, [bad])[0]
+    assert isinstance(error, InputError)
+    assert "rules" in str(error)
+
+
+def test_after_a_process_has_died_there_are_new_ones() -> None:
+    pool = WorkerPool(1)
+    deadly = Task("CartPole-v1", Misbehaving(deadly=True), None, 0, 2)
+    with pytest.raises(WorkError, match="ended unexpectedly"):
+        gathered(pool, [deadly])
+    assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3  # type: ignore[arg-type]
+    pool.close()
+
+
+@pytest.mark.parametrize(("episodes", "seed"), [(0, 0), (-1, 0), (1, -1)])
+def test_nothing_to_run_is_refused(episodes: int, seed: int) -> None:
+    with pytest.raises(InputError, match="at least one episode"):
+        task(episodes=episodes, seed=seed)
