@@ -161,11 +161,7 @@ def compare_arm(
 
 
 def crashed(episodes: Episodes, env_id: str) -> NDArray[np.bool_]:
-    """Which episodes ended by failure.
-
-    In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
-    walker arrives; there a failure is an end with a last reward of -100. In CartPole, and in an
-    environment this project knows nothing of, every end that is not a time limit counts as one.
+    """Which episodes ended by failure, as `failed` says.
 
     Args:
         episodes: E finished episodes.
@@ -174,11 +170,31 @@ def crashed(episodes: Episodes, env_id: str) -> NDArray[np.bool_]:
     Returns:
         Shape (E,).
     """
+    return failed(env_id, episodes.terminated, episodes.last_rewards)
+
+
+def failed(
+    env_id: str, terminated: NDArray[np.bool_], last_rewards: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which ends of episodes are failures.
+
+    In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
+    walker arrives; there a failure is an end with a last reward of -100. In CartPole, and in an
+    environment this project knows nothing of, every end that is not a time limit counts as one.
+
+    Args:
+        env_id: Environment.
+        terminated: Whether the environment ended each episode, and no limit, (E,).
+        last_rewards: Reward of each episode's last step, (E,).
+
+    Returns:
+        Shape (E,).
+    """
     family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
     for name, reward in _FAILURE_REWARD.items():
         if family.startswith(name):
-            return np.asarray(episodes.terminated & (episodes.last_rewards == reward))
-    return episodes.terminated
+            return np.asarray(terminated & (last_rewards == reward))
+    return terminated
 
 
 def crash_rate(episodes: Episodes, env_id: str) -> float:
