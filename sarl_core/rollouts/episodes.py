@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.player import Outcome, play
 from sarl_core.rollouts.progress import Progress, report
-from sarl_core.rollouts.statistics import summarise
+from sarl_core.rollouts.statistics import Interval, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 
 if TYPE_CHECKING:
@@ -94,6 +95,11 @@ class Episodes:
             changed["steps"] = self.steps.take(self.steps.episode < count)
         return replace(self, **changed)
 
+    @cached_property
+    def statistics(self) -> Interval:
+        """Mean, interquartile mean and its interval of the returns; worked out once."""
+        return summarise(self.returns)
+
     def summary(self) -> dict[str, float]:
         """What the episodes say together (DESIGN 5, ``evaluate --json``).
 
@@ -101,7 +107,7 @@ class Episodes:
             `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all
             steps `intervention_rate` and `coverage`.
         """
-        returns = summarise(self.returns)
+        returns = self.statistics
         steps = float(self.lengths.sum())
         return {
             "mean": returns.mean,
