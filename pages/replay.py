@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 
 import _state as state
 import streamlit as st
-from _environments import registered
+from _choices import (
+    AGENTS,
+    CHOSEN,
+    ENVIRONMENTS,
+    NO_RULES,
+    OWN_FILE,
+    PAPERS,
+    PROJECTIONS,
+    agent_for,
+    continuous,
+    environment_of,
+    rules_for,
+)
 from _replay_view import comparison, numbers, step_by_step
 from _replays import (
     Order,
@@ -21,24 +30,11 @@ from _replays import (
     with_progress,
 )
 from _words import escaped
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.errors import InputError, SarlError
-from sarl_core.mining.rule_files import rules_from_json
-from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
-from sarl_core.rollouts.agents import Agent, make_agent
-from sarl_core.shielding.shield import Projection
+from sarl_core.errors import SarlError
+from sarl_core.mining.rules import UNFILTERED, RuleSet
 
-# The words on screen are those in the URL.
-AS_DEMONSTRATED = "as demonstrated"
-ENVIRONMENTS = (AS_DEMONSTRATED, *(env_id for _, env_id in state.SHIPPED.values()))
-OWN_FILE = "own file"
-AGENTS = ("novice", "untrained", "expert", OWN_FILE)
-CHOSEN, NO_RULES = "at the thresholds", "none"
-PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 RULE_SETS = (CHOSEN, *PAPERS, OWN_FILE, NO_RULES)
-PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
 
 # --- what is asked for -------------------------------------------------------------------------
 
@@ -116,87 +112,6 @@ def settings() -> Callable[[], Order]:
         )
 
     return order
-
-
-def environment_of(choice: str | None) -> str:
-    """The environment's id.
-
-    Raises:
-        InputError: If the demonstrations do not say theirs, or the dashboard does not take it.
-    """
-    if choice and choice != AS_DEMONSTRATED:
-        return registered(choice)
-    demonstrations = state.chosen_demonstrations()
-    if demonstrations is None or not demonstrations.env_id:
-        raise InputError(
-            "the demonstrations do not say which environment they are from; choose "
-            "one, or type its id"
-        )
-    return registered(demonstrations.env_id)
-
-
-def continuous(choice: str | None) -> bool:
-    """Whether the environment takes continuous actions; False where it cannot be used."""
-    try:
-        return not describe_environment(environment_of(choice)).is_discrete
-    except SarlError:
-        return False
-
-
-def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | None, str]:
-    """The rule set that was chosen, None for none, and what tells it from others.
-
-    Raises:
-        InputError: If it cannot be had.
-    """
-    if choice == NO_RULES:
-        return None, ""
-    if choice == OWN_FILE:
-        if uploaded is None:
-            raise InputError("no rule file has been uploaded; upload one, or choose other rules")
-        content = uploaded.getvalue()
-        return rules_from_json(content, name=uploaded.name), digest_of(content)
-    demonstrations = state.chosen_demonstrations()
-    if demonstrations is None:
-        raise InputError(
-            "there are no demonstrations to mine rules from; upload some on the "
-            "Demonstrations page, or choose a shipped set in the sidebar"
-        )
-    grown = state.trees(demonstrations, state.chosen_divider())
-    rule_set = state.rule_set(grown, PAPERS.get(choice))
-    return rule_set, repr((rule_set.source.digest, rule_set.thresholds, rule_set.divider))
-
-
-def digest_of(content: bytes) -> str:
-    """Fingerprint of a file."""
-    return hashlib.blake2b(content, digest_size=16).hexdigest()
-
-
-def agent_for(
-    choice: str, uploaded: UploadedFile | None, env_id: str, seed: int
-) -> tuple[Callable[[], Agent], str]:
-    """How to make the agent, and what tells it from others of its name.
-
-    Raises:
-        InputError: If there is no such agent.
-    """
-    if choice != OWN_FILE:
-        return lambda: make_agent(choice, env_id, seed=seed), ""
-    if uploaded is None:
-        raise InputError("no policy has been uploaded; upload one, or choose another agent")
-    content = uploaded.getvalue()
-
-    def make() -> Agent:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / Path(uploaded.name).name
-            path.write_bytes(content)
-            try:
-                return make_agent(path, env_id, seed=seed)
-            except SarlError as error:
-                # The folder is ours; the person knows the file by its name.
-                raise InputError(str(error).replace(f"{folder}/", "")) from error
-
-    return make, digest_of(content)
 
 
 def try_unfiltered() -> None:

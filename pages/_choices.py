@@ -1,0 +1,153 @@
+"""What a visitor may choose on several pages: environment, agents, rules; and what it stands for.
+
+The words on screen are those in the URL.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import _state as state
+import streamlit as st
+from _environments import registered
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.errors import InputError, SarlError
+from sarl_core.mining.rule_files import rules_from_json
+from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
+from sarl_core.rollouts.agents import EXPERT_FOLDER, Agent, make_agent, shipped_experts
+from sarl_core.shielding.shield import Projection
+
+AS_DEMONSTRATED = "as demonstrated"
+ENVIRONMENTS = (AS_DEMONSTRATED, *(env_id for _, env_id in state.SHIPPED.values()))
+OWN_FILE = "own file"
+AGENTS = ("novice", "untrained", "expert", OWN_FILE)
+CHOSEN, NO_RULES, COMPACT = "at the thresholds", "none", "compact"
+PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
+PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
+RULES_FOLDER = Path(__file__).parents[1] / "data" / "rules"
+
+
+def environment_of(choice: str | None) -> str:
+    """The environment's id.
+
+    Raises:
+        InputError: If the demonstrations do not say theirs, or the dashboard does not take it.
+    """
+    if choice and choice != AS_DEMONSTRATED:
+        return registered(choice)
+    demonstrations = state.chosen_demonstrations()
+    if demonstrations is None or not demonstrations.env_id:
+        raise InputError(
+            "the demonstrations do not say which environment they are from; choose "
+            "one, or type its id"
+        )
+    return registered(demonstrations.env_id)
+
+
+def continuous(choice: str | None) -> bool:
+    """Whether the environment takes continuous actions; False where it cannot be used."""
+    try:
+        return not describe_environment(environment_of(choice)).is_discrete
+    except SarlError:
+        return False
+
+
+def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | None, str]:
+    """The rule set that was chosen, None for none, and what tells it from others.
+
+    Raises:
+        InputError: If it cannot be had.
+    """
+    if choice == NO_RULES:
+        return None, ""
+    if choice == OWN_FILE:
+        if uploaded is None:
+            raise InputError("no rule file has been uploaded; upload one, or choose other rules")
+        content = uploaded.getvalue()
+        return rules_from_json(content, name=uploaded.name), digest_of(content)
+    if choice == COMPACT:
+        return compact_rules()
+    demonstrations = state.chosen_demonstrations()
+    if demonstrations is None:
+        raise InputError(
+            "there are no demonstrations to mine rules from; upload some on the "
+            "Demonstrations page, or choose a shipped set in the sidebar"
+        )
+    grown = state.trees(demonstrations, state.chosen_divider())
+    rule_set = state.rule_set(grown, PAPERS.get(choice))
+    return rule_set, repr((rule_set.source.digest, rule_set.thresholds, rule_set.divider))
+
+
+def compact_file() -> Path:
+    """Where the compact rules of the chosen data lie; there may be none."""
+    return RULES_FOLDER / f"{state.chosen_dataset()}_compact.json"
+
+
+@st.cache_resource(max_entries=16, show_spinner=False)
+def _rule_file(path: Path, stamp: int) -> tuple[RuleSet, str]:
+    content = path.read_bytes()
+    return rules_from_json(content, name=path.name), digest_of(content)
+
+
+def compact_rules() -> tuple[RuleSet, str]:
+    """The compact rules of the chosen data, and what tells them from others.
+
+    Raises:
+        InputError: If there are none, or they cannot be read.
+    """
+    path = compact_file()
+    try:
+        return _rule_file(path, path.stat().st_mtime_ns)
+    except OSError as error:
+        raise InputError(
+            f"there are no compact rules for {state.dataset_label(state.chosen_dataset())}; "
+            "choose other rules"
+        ) from error
+
+
+def digest_of(content: bytes) -> str:
+    """Fingerprint of a file."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()
+
+
+def _latest_expert() -> int:
+    return max((path.stat().st_mtime_ns for path in EXPERT_FOLDER.glob("*.npz")), default=0)
+
+
+@st.cache_data(max_entries=64, show_spinner=False)
+def _expert_digest(env_id: str, stamp: int) -> str:
+    path = shipped_experts().get(env_id)
+    return digest_of(path.read_bytes()) if path is not None else ""
+
+
+def agent_for(
+    choice: str, uploaded: UploadedFile | None, env_id: str, seed: int
+) -> tuple[Callable[[], Agent], str]:
+    """How to make the agent, and what tells it from others of its name.
+
+    Raises:
+        InputError: If there is no such agent.
+    """
+    if choice != OWN_FILE:
+        told = _expert_digest(env_id, _latest_expert()) if choice == "expert" else ""
+        return lambda: make_agent(choice, env_id, seed=seed), told
+    if uploaded is None:
+        raise InputError("no policy has been uploaded; upload one, or choose another agent")
+    content = uploaded.getvalue()
+
+    def make() -> Agent:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / Path(uploaded.name).name
+            path.write_bytes(content)
+            try:
+                return make_agent(path, env_id, seed=seed)
+            except SarlError as error:
+                # The folder is ours; the person knows the file by its name.
+                raise InputError(str(error).replace(f"{folder}/", "")) from error
+
+    return make, digest_of(content)
