@@ -59,6 +59,8 @@ class PolicyTree:
         sample_order: Row numbers of the demonstrations, sorted by leaf, (N,) int64.
         sample_start: Where each node's rows begin in `sample_order`, (n,) int64.
         demonstrated: Action of each row in this dimension, (N,); what a projection may use.
+        label: What a rule cut at each node says, (n,) int64: the most frequent label, the lowest
+            where several are, unless the tree was improved by what it achieves.
     """
 
     index: int
@@ -75,6 +77,7 @@ class PolicyTree:
     sample_order: NDArray[np.int64]
     sample_start: NDArray[np.int64]
     demonstrated: NDArray[np.int64] | NDArray[np.float32]
+    label: NDArray[np.int64]
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -100,14 +103,9 @@ class PolicyTree:
         return np.asarray(self.counts.sum(axis=1))
 
     @cached_property
-    def label(self) -> NDArray[np.int64]:
-        """Most frequent label at each node, the lowest where several are, (n,)."""
-        return np.asarray(self.counts.argmax(axis=1), dtype=np.int64)
-
-    @cached_property
     def correct(self) -> NDArray[np.int64]:
         """Pairs at each node that carry its label, (n,)."""
-        return np.asarray(self.counts.max(axis=1))
+        return np.asarray(np.take_along_axis(self.counts, self.label[:, None], axis=1)[:, 0])
 
     @cached_property
     def support(self) -> NDArray[np.float64]:
@@ -116,14 +114,15 @@ class PolicyTree:
 
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
-        """Share of each node's pairs that carry its label, (n,)."""
-        return self.correct / self.samples
+        """Share of each node's pairs that carry its label, 0 where there are none, (n,)."""
+        return self.correct / np.maximum(self.samples, 1)
 
     @cached_property
     def lift(self) -> NDArray[np.float64]:
         """Confidence over the label's share of all pairs, (n,)."""
         shares = self.counts[0] / self.samples[0]
-        return np.asarray(self.confidence / shares[self.label])
+        of_label = shares[self.label]
+        return np.divide(self.confidence, of_label, out=np.zeros(self.n_nodes), where=of_label > 0)
 
     @cached_property
     def confidence_above(self) -> NDArray[np.float64]:
@@ -247,52 +246,85 @@ def grow_policy_trees(
 
     if max_depth is not None and max_depth < 1:
         raise InputError(f"the maximum depth is {max_depth}; give 1 or more, or none")
-    source = Source(
-        env_id=demonstrations.env_id,
-        features=demonstrations.features,
-        digest=demonstrations.digest,
-        steps=len(demonstrations),
-        episodes=demonstrations.n_episodes,
-    )
     trees = []
     for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
-        demonstrated = demonstrations.action_columns[:, index].copy()
-        labels = dimension.labels_of(demonstrated)
+        labels = dimension.labels_of(demonstrations.action_columns[:, index])
         learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
         learner.fit(demonstrations.observations, labels)
-        trees.append(
-            _read(
-                learner,
-                demonstrations.observations,
-                labels,
-                index,
-                dimension,
-                int(divider),
-                source,
-                demonstrated,
-            )
-        )
+        trees.append(count_tree(structure_of(learner), demonstrations, index, divider=divider))
     return tuple(trees)
 
 
-def _read(
-    learner: object,
-    observations: NDArray[np.float32],
-    labels: NDArray[np.int64],
-    index: int,
-    dimension: LabelledDimension,
-    divider: int,
-    source: Source,
-    demonstrated: NDArray[np.int64] | NDArray[np.float32],
-) -> PolicyTree:
+@dataclass(frozen=True, eq=False)
+class TreeStructure:
+    """The queries of a tree with n nodes, the root first, and what its nodes say.
+
+    Attributes:
+        feature: Feature queried at each node, (n,) int64; `LEAF` at leaves.
+        threshold: A state goes left where ``x[feature] <= threshold``, (n,) float64.
+        children_left: Node number of the left child, (n,) int64, `LEAF` at leaves.
+        children_right: Node number of the right child, (n,) int64, `LEAF` at leaves.
+        label: What each node says, (n,) int64; None for the most frequent label.
+    """
+
+    feature: NDArray[np.int64]
+    threshold: NDArray[np.float64]
+    children_left: NDArray[np.int64]
+    children_right: NDArray[np.int64]
+    label: NDArray[np.int64] | None = None
+
+    def apply(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """The leaf that each state reaches, (B,), as `PolicyTree.apply`."""
+        return walk(
+            observations, self.feature, self.threshold, self.children_left, self.children_right
+        )
+
+
+def structure_of(learner: object) -> TreeStructure:
+    """Read the queries of a fitted tree of scikit-learn.
+
+    Args:
+        learner: A fitted `DecisionTreeClassifier` or `DecisionTreeRegressor`.
+
+    Returns:
+        Its queries, without labels.
+    """
     tree = learner.tree_  # type: ignore[attr-defined]  # scikit-learn has no types
     left = np.asarray(tree.children_left, dtype=np.int64)
-    right = np.asarray(tree.children_right, dtype=np.int64)
+    return TreeStructure(
+        feature=np.where(left == LEAF, LEAF, tree.feature).astype(np.int64),
+        threshold=np.array(tree.threshold, dtype=np.float64),
+        children_left=left,
+        children_right=np.asarray(tree.children_right, dtype=np.int64),
+    )
+
+
+def count_tree(
+    structure: TreeStructure, demonstrations: Demonstrations, index: int, *, divider: int
+) -> PolicyTree:
+    """Send demonstrations down a tree and count what the expert did at every node.
+
+    Args:
+        structure: Its queries, over the demonstrations' features.
+        demonstrations: N pairs.
+        index: Which action dimension.
+        divider: Number of intervals of continuous dimensions.
+
+    Returns:
+        The tree.
+
+    Raises:
+        InputError: If the divider is out of range.
+    """
+    dimension = label_dimensions(demonstrations, divider)[index]
+    demonstrated = demonstrations.action_columns[:, index].copy()
+    labels = dimension.labels_of(demonstrated)
+    left, right = structure.children_left, structure.children_right
     levels = _levels(left, right)
     n = len(left)
     parent = np.full(n, -1, dtype=np.int64)
     depth = np.zeros(n, dtype=np.int64)
-    leaves = np.asarray(tree.apply(observations), dtype=np.int64)
+    leaves = structure.apply(demonstrations.observations)
     # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
     counts = np.bincount(
         leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
@@ -314,10 +346,16 @@ def _read(
     return PolicyTree(
         index=index,
         dimension=dimension,
-        divider=divider,
-        source=source,
-        feature=np.where(left == LEAF, LEAF, tree.feature).astype(np.int64),
-        threshold=np.array(tree.threshold, dtype=np.float64),
+        divider=int(divider),
+        source=Source(
+            env_id=demonstrations.env_id,
+            features=demonstrations.features,
+            digest=demonstrations.digest,
+            steps=len(demonstrations),
+            episodes=demonstrations.n_episodes,
+        ),
+        feature=structure.feature,
+        threshold=structure.threshold,
         children_left=left,
         children_right=right,
         parent=parent,
@@ -327,6 +365,9 @@ def _read(
         sample_order=np.argsort(start[leaves], kind="stable").astype(np.int64),
         sample_start=start,
         demonstrated=demonstrated,
+        label=(
+            counts.argmax(axis=1).astype(np.int64) if structure.label is None else structure.label
+        ),
     )
 
 
