@@ -49,6 +49,12 @@ PAGES = [
         icon=":material/play_circle:",
         help="An agent in its environment, with the rules as a shield and without.",
     ),
+    st.Page(
+        "shield.py",
+        title="Shield",
+        icon=":material/shield:",
+        help="What a shield is worth: agents with the rules and without, over many episodes.",
+    ),
 ]
 # Who knows the other addresses guesses this one.
 GUESSED = st.Page(

@@ -81,18 +81,20 @@ class Episodes:
             f"steps={int(self.lengths.sum())}, mean_return={self.returns.mean():.1f})"
         )
 
-    def first(self, count: int) -> Episodes:
-        """The first of the episodes, as if no more had been run.
+    def part(self, start: int, stop: int) -> Episodes:
+        """Some of the episodes, as if no others had been run.
 
         Args:
-            count: How many, 1 or more.
+            start: Index of the first one.
+            stop: Index after the last one, above `start`; may lie beyond the end.
 
         Returns:
-            At most `count` episodes.
+            Those episodes, numbered from 0.
         """
-        changed: dict[str, Any] = {name: getattr(self, name)[:count] for name in _COLUMNS}
+        changed: dict[str, Any] = {name: getattr(self, name)[start:stop] for name in _COLUMNS}
         if self.steps is not None:
-            changed["steps"] = self.steps.take(self.steps.episode < count)
+            ends = np.searchsorted(self.steps.episode, [start, stop])
+            changed["steps"] = self.steps.take(slice(*ends.tolist())).numbered_from(-start)
         return replace(self, **changed)
 
     @cached_property

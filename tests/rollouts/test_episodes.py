@@ -8,7 +8,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.rules import mine_rules
 from sarl_core.rollouts import episodes as episodes_module
 from sarl_core.rollouts.agents import make_agent
-from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.steps import StepTable
@@ -197,6 +197,16 @@ def test_frames(shields: dict[str, Shield]) -> None:
     assert len(steps) == 600
     assert "StepTable(episode=int64[600]" in repr(found.steps)
     assert "env_id='Pendulum-v1'" in repr(found)
+
+
+def test_parts_are_what_a_shorter_rollout_gives_and_join_again() -> None:
+    whole = rollout("CartPole-v1", "novice", episodes=7, seed=2)
+    parts = [whole.part(0, 3), whole.part(3, 5), whole.part(5, 99)]
+    assert [len(part) for part in parts] == [3, 2, 2]
+    assert same(parts[0], rollout("CartPole-v1", "novice", episodes=3, seed=2))
+    assert same(parts[1], rollout("CartPole-v1", "novice", episodes=2, seed=5))
+    assert same(join(parts), whole)
+    assert join([parts[0], rollout("CartPole-v1", "novice", keep_steps=False)]).steps is None
 
 
 def test_without_a_shield_nothing_intervenes() -> None:

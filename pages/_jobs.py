@@ -1,0 +1,85 @@
+"""Long work that goes on beside the pages: they look in, show how far it is, and may call it off.
+
+The work belongs to the visitor's session. Other pages can be opened meanwhile; when the visitor has
+gone for good, it ends by itself.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from threading import Thread
+
+from streamlit import runtime
+from streamlit.runtime.scriptrunner import get_script_run_ctx
+
+from sarl_core.errors import SarlError, WorkError
+
+GONE_AFTER = 20.0  # seconds without a connection: longer than a reload, or a tunnel
+
+
+class Job:
+    """One piece of work in a thread of its own.
+
+    Attributes:
+        total: Units of work in all.
+        done: Units finished.
+        text: What is being done.
+        error: Why it ended early; None if it did not, or was called off.
+    """
+
+    def __init__(self, work: Callable[[Job], None], total: int) -> None:
+        """Start at once.
+
+        Args:
+            work: Does it, tells how far it is, and stops when no longer `wanted`. No Streamlit in
+                there: it has no page to write to.
+            total: Units of work in all.
+        """
+        self.total, self.done, self.text = total, 0, "Starting …"
+        self.error: SarlError | None = None
+        self._work = work
+        self._cancelled = self._finished = False
+        context = get_script_run_ctx()
+        self._session = context.session_id if context is not None else ""
+        self._seen = time.monotonic()
+        Thread(target=self._run, daemon=True, name="job").start()
+
+    @property
+    def running(self) -> bool:
+        """Whether more can be expected of it."""
+        return not (self._finished or self._cancelled)
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether it was called off."""
+        return self._cancelled
+
+    @property
+    def share(self) -> float:
+        """How far it is, 0 to 1."""
+        return min(self.done / self.total, 1.0) if self.total else 1.0
+
+    def cancel(self) -> None:
+        """Call it off; what is being done this moment is let go of."""
+        if not self._finished:
+            self._cancelled = True
+
+    def wanted(self) -> bool:
+        """Whether to go on; for the work itself."""
+        now = time.monotonic()
+        if not runtime.exists() or runtime.get_instance().is_active_session(self._session):
+            self._seen = now
+        return not self._cancelled and now - self._seen < GONE_AFTER
+
+    def _run(self) -> None:
+        try:
+            self._work(self)
+        except SarlError as error:
+            self.error = error
+        except Exception:  # a mistake of ours: the page has a sentence, the log the rest
+            logging.getLogger(__name__).exception("work beside the pages failed")
+            self.error = WorkError("the work failed unexpectedly; the server's log says more")
+        finally:
+            self._finished = True

@@ -1,0 +1,344 @@
+"""Shield: any agents with any shields on the same seeds, in one table and one picture.
+
+What is known of the present choices is shown at once, whoever ran it and whenever; Run adds what is
+missing. The work goes on beside the page, in processes of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import _state as state
+import streamlit as st
+from _choices import (
+    AGENTS,
+    CHOSEN,
+    COMPACT,
+    ENVIRONMENTS,
+    OWN_FILE,
+    PAPERS,
+    PROJECTIONS,
+    agent_for,
+    compact_file,
+    continuous,
+    digest_of,
+    environment_of,
+    rules_for,
+)
+from _comparisons import Comparing, Row, results
+from _shield_view import Line, show
+from _words import in_full
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.errors import SarlError
+from sarl_core.explaining.comparison_figures import arm_style
+from sarl_core.explaining.language import counted
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.comparison import Arm
+from sarl_core.shielding.shield import Projection, Shield
+
+NO_SHIELD = "no shield"
+# Their places give them their colours, the paper's where it has them.
+AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
+RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE)
+MOST_EPISODES = 1_000
+JOB = "_comparing"
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What the widgets say."""
+
+    env: str | None
+    episodes: int
+    seed: int
+    projection: Projection
+    agents: list[str]
+    shields: list[str]
+    policy_files: list[UploadedFile]
+    rule_file: UploadedFile | None
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """An agent: its name, its place among the colours, how to make it, and what tells it."""
+
+    name: str
+    place: int
+    make: Callable[[], Agent]
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """A shield: its name, its place among the colours, its rules, and what tells them."""
+
+    name: str
+    place: int | None
+    rules: RuleSet | None
+    digest: str
+
+
+# --- what is asked for -------------------------------------------------------------------------
+
+
+def settings() -> Choices:
+    """The widgets."""
+    with st.container(border=True):
+        in_a_row = 4 if continuous(st.session_state.get("env")) else 3
+        with st.grid(in_a_row, min_column_width=150, gap="small"):
+            env = st.selectbox(
+                "Environment",
+                state.with_own(ENVIRONMENTS, "env"),
+                key="env",
+                bind="query-params",
+                accept_new_options=True,
+                help="That of the demonstrations, or type any id that Gymnasium knows, such as "
+                "CartPole-v1.",
+            )
+            episodes = st.number_input(
+                "Episodes",
+                1,
+                MOST_EPISODES,
+                20,
+                key="episodes",
+                bind="query-params",
+                help="So many for every agent with every shield, each on a seed of its own. The "
+                "paper's figures show 100.",
+            )
+            seed = st.number_input(
+                "Seed",
+                0,
+                2**31 - 1 - MOST_EPISODES,
+                1,
+                key="seed",
+                bind="query-params",
+                help="Of the first episode. All agents meet the same seeds; the same seed gives "
+                "the same result.",
+            )
+            projection = PROJECTIONS[0]
+            if continuous(env):
+                projection = st.selectbox(
+                    "Replace by",
+                    PROJECTIONS,
+                    key="projection",
+                    bind="query-params",
+                    help="What a continuous action that breaks a rule becomes. Centre: the "
+                    "middle of the rule's interval. Clip: the nearest value in it. Expert: "
+                    "what the expert typically did there.",
+                )
+        agents = st.pills(
+            "Agents",
+            AGENTS,
+            selection_mode="multi",
+            default=["novice", "expert"],
+            key="agents",
+            bind="query-params",
+            help="Novice: random actions. Expert: the one that is shipped for this environment. "
+            "Untrained: a fresh network, its actions sampled. Own file: policies of yours.",
+        )
+        policy_files: list[UploadedFile] = []
+        if OWN_FILE in agents:
+            policy_files = st.file_uploader(
+                "Policies: .npz, or Stable-Baselines3 .zip (PPO, A2C or DQN)",
+                accept_multiple_files=True,
+                key="policy_files",
+            )
+        offered = [NO_SHIELD, *PAPERS, CHOSEN, COMPACT, OWN_FILE]
+        if not compact_file().is_file():
+            offered.remove(COMPACT)
+        shields = st.pills(
+            "Shields",
+            offered,
+            selection_mode="multi",
+            default=[NO_SHIELD, *PAPERS],
+            key="shields",
+            bind="query-params",
+            help="Filtered: support 0.005, confidence 0.95. Unfiltered: support 0, confidence 1. "
+            "At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
+            "this environment. Own file: rules you saved.",
+        )
+        rule_file = None
+        if OWN_FILE in shields:
+            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+    return Choices(
+        env,
+        int(episodes or 1),
+        int(seed or 0),
+        projection,
+        [name for name in AGENTS if name in agents],
+        [name for name in offered if name in shields],
+        policy_files,
+        rule_file,
+    )
+
+
+def pilots(choices: Choices, env_id: str) -> list[Pilot]:
+    """The chosen agents."""
+    found = []
+    for choice in choices.agents:
+        place = AGENT_PLACES.index(choice)
+        if choice != OWN_FILE:
+            make, digest = agent_for(choice, None, env_id, choices.seed)
+            found.append(Pilot(choice.capitalize(), place, make, f"{choice} {digest}"))
+        for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
+            make, digest = agent_for(choice, file, env_id, choices.seed)
+            name = file.name.rsplit(".", 1)[0]
+            found.append(Pilot(name, place + number, make, f"own {digest}"))
+    return found
+
+
+def guards(choices: Choices) -> tuple[list[Guard], list[str]]:
+    """The chosen shields that can be had, and why the others cannot."""
+    found, problems = [], []
+    for choice in choices.shields:
+        if choice == NO_SHIELD:
+            found.append(Guard(choice, None, None, ""))
+        elif choice == OWN_FILE and choices.rule_file is None:
+            continue  # an empty place to put a file says enough
+        else:
+            try:
+                rules, digest = rules_for(choice, choices.rule_file)
+            except SarlError as error:
+                problems.append(str(error))
+            else:
+                found.append(Guard(choice, RULES_PLACES.index(choice), rules, digest))
+    return found, problems
+
+
+def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
+    """One agent with one shield."""
+    projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
+    name = f"{pilot.name}, {guard.name}"
+    told = (env_id, pilot.digest, guard.digest, projection, choices.seed)
+
+    def shield() -> Shield | None:
+        return None if guard.rules is None else Shield(guard.rules, projection=projection)
+
+    return Line(
+        Row(digest_of(repr(told).encode()), name, env_id, choices.seed, pilot.make, shield),
+        Arm(name, pilot.name, guard.rules, projection),
+        arm_style(pilot.place, guard.place),
+        pilot.name,
+        guard.name,
+    )
+
+
+# --- running -----------------------------------------------------------------------------------
+
+
+def job_now() -> Comparing | None:
+    """The work that this visitor asked for last."""
+    return st.session_state.get(JOB)
+
+
+def start(lines: list[Line], episodes: int) -> None:
+    """Run what is missing; for a callback."""
+    st.session_state[JOB] = Comparing([line.row for line in lines], episodes)
+
+
+def run_or_cancel(lines: list[Line], missing: list[Line], episodes: int) -> None:
+    """The button, and how far the work is."""
+    job = job_now()
+    if job is not None and job.running:
+        with st.container(horizontal=True, vertical_alignment="center"):
+            st.progress(job.share, job.text)
+            st.button("Cancel", icon=":material/close:", on_click=job.cancel, key="cancel")
+        return
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.button(
+            "Run",
+            type="primary",
+            icon=":material/play_arrow:",
+            key="run",
+            on_click=start,
+            args=(lines, episodes),
+            disabled=not missing,
+        )
+        rows = f"{len(lines)} combinations" if len(lines) > 1 else "1 combination"
+        st.caption(
+            f"{counted(episodes, 'episode')} for each of {rows}"
+            + (
+                "."
+                if len(missing) == len(lines)
+                else "; all of them are here already."
+                if not missing
+                else f"; {len(lines) - len(missing)} are here already."
+            ),
+            width="content",
+        )
+
+
+def say_what_came_of_it(lines: list[Line]) -> None:
+    """What the last work has to say besides its numbers."""
+    job = job_now()
+    if job is None or job.running:
+        return
+    keys = {line.row.key for line in lines}
+    for sentence in sorted({str(e) for key, e in job.problems.items() if key in keys}):
+        st.error(in_full(sentence), icon=":material/error:")
+    if job.error is not None:
+        st.error(in_full(str(job.error)), icon=":material/error:")
+    if job.cancelled:
+        st.info(
+            "Cancelled. What had been finished is kept; Run goes on from there.",
+            icon=":material/pause_circle:",
+        )
+
+
+# --- the page ----------------------------------------------------------------------------------
+
+st.title("Shield")
+st.caption(
+    "What a shield is worth: agents with the rules and without, on the same seeds. The rules are "
+    "learned from demonstrations; they guarantee nothing."
+)
+chosen = settings()
+try:
+    environment = environment_of(chosen.env)
+    continuous(chosen.env)
+    chosen_pilots = pilots(chosen, environment)
+except SarlError as error:
+    st.error(in_full(str(error)), icon=":material/error:")
+    st.stop()
+chosen_guards, refused = guards(chosen)
+for sentence in refused:
+    st.error(in_full(sentence), icon=":material/error:")
+wanted = [
+    line(chosen, environment, pilot, guard) for pilot in chosen_pilots for guard in chosen_guards
+]
+if not wanted:
+    st.info(
+        "Choose at least one agent and one shield; a shield of your own needs its file.",
+        icon=":material/checklist:",
+    )
+    st.stop()
+at_work = job_now() is not None and job_now().running
+
+
+@st.fragment(run_every=1.0 if at_work else None)
+def outcome() -> None:
+    """The button or the progress, and all that is known so far."""
+    job = job_now()
+    if at_work and not (job is not None and job.running):
+        st.rerun()  # once more as a whole, and no longer every second
+    known = [results().get(line.row.key, chosen.episodes) for line in wanted]
+    missing = [
+        line
+        for line, found in zip(wanted, known, strict=True)
+        if found is None or len(found) < chosen.episodes
+    ]
+    run_or_cancel(wanted, missing, chosen.episodes)
+    say_what_came_of_it(wanted)
+    show(
+        [(line, found) for line, found in zip(wanted, known, strict=True) if found is not None],
+        environment,
+        chosen.seed,
+        chosen.episodes,
+        at_work=at_work,
+    )
+
+
+outcome()
