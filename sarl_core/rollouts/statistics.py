@@ -34,6 +34,48 @@ class Interval:
     high: float
 
 
+@dataclass(frozen=True)
+class MeanInterval:
+    """The mean of a few numbers, and how sure one can be of it.
+
+    Attributes:
+        mean: Of the values.
+        low: Lower end of the 95 % interval of the mean.
+        high: Upper end.
+    """
+
+    mean: float
+    low: float
+    high: float
+
+
+def mean_interval(values: ArrayLike) -> MeanInterval:
+    """The mean of a few runs, as learners with seeds of their own, with its 95 % interval.
+
+    Student's interval: with a handful of values, a bootstrap is too sure of itself, and a middle
+    half is hardly there. Values that are NaN are left out.
+
+    Args:
+        values: One number a run, shape (K,).
+
+    Returns:
+        The mean and its interval; with one value, or equal ones, the interval is that value; NaN
+        without any.
+    """
+    from scipy.special import stdtrit
+
+    array = np.asarray(values, dtype=np.float64).reshape(-1)
+    array = array[~np.isnan(array)]
+    if len(array) == 0:
+        return MeanInterval(float("nan"), float("nan"), float("nan"))
+    mean = float(array.mean())
+    if (array == array[0]).all():
+        value = float(array[0])
+        return MeanInterval(value, value, value)
+    half = float(stdtrit(len(array) - 1, 0.975)) * float(array.std(ddof=1)) / len(array) ** 0.5
+    return MeanInterval(mean, mean - half, mean + half)
+
+
 def interquartile_mean(values: ArrayLike, axis: int = -1) -> NDArray[np.float64]:
     """Mean of the middle half of the values, more robust than the mean, tighter than the median.
 

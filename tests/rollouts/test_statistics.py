@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from sarl_core.errors import InputError
-from sarl_core.rollouts.statistics import interquartile_mean, summarise
+from sarl_core.rollouts.statistics import interquartile_mean, mean_interval, summarise
 
 
 def test_known_values() -> None:
@@ -56,3 +56,28 @@ def test_same_seed_same_interval() -> None:
 def test_nothing_to_summarise_is_an_error(values: list[float]) -> None:
     with pytest.raises(InputError):
         summarise(values)
+
+
+def test_the_interval_of_a_mean_is_students() -> None:
+    found = mean_interval([1.0, 2.0, 3.0, 4.0, 5.0])
+    # 2.776 is the 97.5 % point with four degrees of freedom, from any table.
+    half = 2.776 * np.sqrt(2.5 / 5)
+    assert found.mean == 3.0
+    assert (found.low, found.high) == pytest.approx((3 - half, 3 + half), abs=1e-3)
+
+
+def test_the_interval_of_a_mean_of_five_covers_the_truth_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(1)
+    inside = [
+        found.low <= 7.0 <= found.high
+        for sample in rng.normal(7.0, 3.0, (2000, 5))
+        for found in [mean_interval(sample)]
+    ]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.015)
+
+
+def test_the_interval_of_a_mean_without_spread_or_without_values() -> None:
+    assert mean_interval([0.5]) == mean_interval([0.5, 0.5, np.nan])
+    assert (mean_interval([0.5]).low, mean_interval([0.5]).high) == (0.5, 0.5)
+    empty = mean_interval([np.nan])
+    assert np.isnan([empty.mean, empty.low, empty.high]).all()
