@@ -1,4 +1,4 @@
-"""What the Shield page shows of a comparison: two figures and a table."""
+"""What the Shield page shows of a comparison: what it comes to, two figures, and a table."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from typing import Any
 
 import streamlit as st
 from _comparisons import Row
+from _words import escaped
 
 from sarl_core.explaining.comparison_figures import ArmStyle, returns_figure, typical_figure
+from sarl_core.explaining.comparison_text import clear_change, verdict
 from sarl_core.explaining.language import share_text
 from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate
 from sarl_core.rollouts.episodes import Episodes
 
 PLAIN = {"displayModeBar": False}
 HEIGHT = 400
+ROW = 46  # pixels a row of the first figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,21 +40,16 @@ class Line:
     shield: str
 
 
-def show(
-    found: Sequence[tuple[Line, Episodes]],
-    env_id: str,
-    seed: int,
-    episodes: int,
-    *,
-    at_work: bool,
-) -> None:
+Found = Sequence[tuple[Line, Episodes]]
+
+
+def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
     """The comparison, or what to do where there is none.
 
     Args:
         found: What has been run of the present choices.
         env_id: Environment.
         seed: Of the first episode.
-        episodes: How many were asked for.
         at_work: Whether more is on its way.
     """
     if not found:
@@ -67,11 +65,14 @@ def show(
         env_id, seed, tuple(line.arm for line in lines), tuple(episodes for _, episodes in found)
     )
     styles = [line.style for line in lines]
+    height = max(HEIGHT, 60 + ROW * len(lines))
+    if not at_work:
+        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in verdicts(found)))
     left, right = st.columns([2, 3], gap="medium")
     with left:
         st.markdown("**Typical return**")
         st.plotly_chart(
-            typical_figure(comparison, styles=styles),
+            typical_figure(comparison, styles=styles, height=height),
             config=PLAIN,
             key="typical",
             alt="Interquartile mean of the returns with its 95 % interval, for every agent and "
@@ -80,37 +81,116 @@ def show(
     with right:
         st.markdown("**Every episode**")
         st.plotly_chart(
-            returns_figure(comparison, styles=styles, height=HEIGHT),
+            returns_figure(comparison, styles=styles, height=height),
             config=PLAIN,
             key="returns",
             alt="Return of every episode, for every agent and shield",
         )
-    table(found, env_id)
     st.caption(
         "The typical return is the mean of the middle half of the episodes, which a few odd ones "
-        "do not move, with its 95 % interval."
+        "do not move, with its 95 % interval. Click a name to hide its line, twice to see it alone."
     )
+    st.dataframe(
+        [table_row(line, episodes) for line, episodes in found],
+        hide_index=True,
+        height="content",
+        column_config=column_config(),
+        key="comparison_table",
+    )
+    if not at_work:
+        name = env_id.rsplit("/", 1)[-1]
+        st.download_button(
+            "Download CSV",
+            lambda: csv(comparison),
+            f"comparison-{name}-{seed}.csv",
+            "text/csv",
+            key="comparison_csv",
+            on_click="ignore",
+            icon=":material/download:",
+        )
 
 
-def table(found: Sequence[tuple[Line, Episodes]], env_id: str) -> None:
-    """One row a line."""
-    rows = [table_row(line, episodes, env_id) for line, episodes in found]
-    st.dataframe(rows, hide_index=True, height="content", key="table")
+def verdicts(found: Found) -> list[str]:
+    """For each agent, what the shield did that served it best, and the one that harmed it most."""
+    sentences = []
+    for agent in dict.fromkeys(line.agent for line, _ in found):
+        own = [(line, episodes) for line, episodes in found if line.agent == agent]
+        alone = next((episodes for line, episodes in own if line.arm.rules is None), None)
+        if alone is None:
+            continue
+        shielded = [
+            (line, episodes)
+            for line, episodes in own
+            if line.arm.rules is not None and len(episodes) == len(alone)
+        ]
+        shielded.sort(key=lambda pair: pair[1].statistics.iqm, reverse=True)
+        told = shielded[:1] + [
+            pair for pair in shielded[1:][-1:] if clear_change(alone, pair[1]) < 0
+        ]
+        sentences += [
+            verdict(agent.lower(), f"the {rules_name(line.shield)}", alone, episodes)
+            for line, episodes in told
+        ]
+    return sentences
 
 
-def table_row(line: Line, episodes: Episodes, env_id: str) -> dict[str, Any]:
+def rules_name(shield: str) -> str:
+    """A shield in the middle of a sentence."""
+    return f"rules {shield}" if shield.startswith("at ") else f"{shield} rules"
+
+
+def column_config() -> dict[str, Any]:
+    """What the columns look like, and what they mean."""
+    column = st.column_config
+    return {
+        "Agent": column.TextColumn(pinned=True),
+        "Shield": column.TextColumn(pinned=True),
+        "Rules": column.TextColumn(alignment="right", help="Rules in the set"),
+        "Episodes": column.NumberColumn(format="localized"),
+        "Typical return": column.NumberColumn(
+            format="%.1f", help="Mean of the middle half of the episodes (IQM)"
+        ),
+        "95 % interval": column.TextColumn(
+            alignment="right", help="Of the typical return, by bootstrap"
+        ),
+        "Mean return": column.NumberColumn(format="%.1f", help="Of all episodes"),
+        "Changed": column.TextColumn(
+            alignment="right", help="Share of the steps at which the shield changed the action"
+        ),
+        "Covered": column.TextColumn(
+            alignment="right", help="Share of the steps at which some rule applied"
+        ),
+        "Crashes": column.TextColumn(
+            alignment="right",
+            help="Share of the episodes that ended in failure: a fall, a crash, or whatever else "
+            "ends an episode of this environment before its time. A landing or an arrival is none.",
+        ),
+    }
+
+
+def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
     """What the table says of a line."""
     numbers, summary = episodes.statistics, episodes.summary()
-    shielded = line.arm.rules is not None
+    rules = line.arm.rules
     return {
         "Agent": line.agent,
         "Shield": line.shield,
-        "Rules": f"{len(line.arm.rules):,}" if line.arm.rules is not None else "–",
+        "Rules": f"{len(rules):,}" if rules is not None else "–",
         "Episodes": len(episodes),
-        "Typical return": round(numbers.iqm, 1),
+        "Typical return": numbers.iqm,
         "95 % interval": f"{numbers.low:,.1f} to {numbers.high:,.1f}",
-        "Mean return": round(numbers.mean, 1),
-        "Changed": share_text(summary["intervention_rate"]) if shielded else "–",
-        "Covered": share_text(summary["coverage"]) if shielded else "–",
-        "Crashes": share_text(crash_rate(episodes, env_id)),
+        "Mean return": numbers.mean,
+        "Changed": share_text(summary["intervention_rate"]) if rules is not None else "–",
+        "Covered": share_text(summary["coverage"]) if rules is not None else "–",
+        "Crashes": share_text(crash_rate(episodes, episodes.env_id)),
     }
+
+
+def csv(comparison: Comparison) -> bytes:
+    """The table as a file, every number in full."""
+    frame = comparison.to_frame()
+    projections = [arm.projection if arm.rules is not None else "" for arm in comparison.arms]
+    frame.insert(2, "projection", projections)
+    frame.insert(0, "seed", comparison.seed)
+    frame.insert(0, "environment", comparison.env_id)
+    return str(frame.to_csv(index=False)).encode()

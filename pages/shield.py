@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import _state as state
 import streamlit as st
@@ -44,6 +45,7 @@ NO_SHIELD = "no shield"
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
 RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE)
 MOST_EPISODES = 1_000
+FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
 JOB = "_comparing"
 
 
@@ -109,14 +111,14 @@ def settings() -> Choices:
                 "paper's figures show 100.",
             )
             seed = st.number_input(
-                "Seed",
+                "First seed",
                 0,
                 2**31 - 1 - MOST_EPISODES,
-                1,
-                key="seed",
+                FRESH_SEED,
+                key="first_seed",
                 bind="query-params",
-                help="Of the first episode. All agents meet the same seeds; the same seed gives "
-                "the same result.",
+                help="The episodes start from this seed, the next one, and so on, the same for "
+                "all agents. The same seeds give the same result.",
             )
             projection = PROJECTIONS[0]
             if continuous(env):
@@ -208,6 +210,19 @@ def guards(choices: Choices) -> tuple[list[Guard], list[str]]:
     return found, problems
 
 
+def seen_before(choices: Choices, env_id: str) -> bool:
+    """Whether rules are tried on episodes from which they were mined."""
+    demonstrations = state.chosen_demonstrations()
+    return (
+        demonstrations is not None
+        and demonstrations.seed is not None
+        and demonstrations.env_id == env_id
+        and demonstrations.seed < choices.seed + choices.episodes
+        and choices.seed < demonstrations.seed + demonstrations.n_episodes
+        and any(name not in (NO_SHIELD, OWN_FILE) for name in choices.shields)
+    )
+
+
 def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
@@ -231,7 +246,13 @@ def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
 
 def job_now() -> Comparing | None:
     """The work that this visitor asked for last."""
-    return st.session_state.get(JOB)
+    return cast("Comparing | None", st.session_state.get(JOB))
+
+
+def working() -> bool:
+    """Whether it goes on."""
+    job = job_now()
+    return job is not None and job.running
 
 
 def start(lines: list[Line], episodes: int) -> None:
@@ -258,15 +279,10 @@ def run_or_cancel(lines: list[Line], missing: list[Line], episodes: int) -> None
             disabled=not missing,
         )
         rows = f"{len(lines)} combinations" if len(lines) > 1 else "1 combination"
+        ready = len(lines) - len(missing)
         st.caption(
             f"{counted(episodes, 'episode')} for each of {rows}"
-            + (
-                "."
-                if len(missing) == len(lines)
-                else "; all of them are here already."
-                if not missing
-                else f"; {len(lines) - len(missing)} are here already."
-            ),
+            + (f"; {'all' if not missing else ready} of them are here already." if ready else "."),
             width="content",
         )
 
@@ -315,15 +331,20 @@ if not wanted:
         icon=":material/checklist:",
     )
     st.stop()
-at_work = job_now() is not None and job_now().running
+if seen_before(chosen, environment):
+    st.warning(
+        "Some of these seeds are those of the demonstrations, where the rules know the way. A "
+        f"first seed such as {FRESH_SEED:,} shows what they bring elsewhere.",
+        icon=":material/casino:",
+    )
+at_work = working()
 
 
 @st.fragment(run_every=1.0 if at_work else None)
 def outcome() -> None:
     """The button or the progress, and all that is known so far."""
-    job = job_now()
-    if at_work and not (job is not None and job.running):
-        st.rerun()  # once more as a whole, and no longer every second
+    if at_work != working():
+        st.rerun()  # as a whole: from now on every second, or no longer
     known = [results().get(line.row.key, chosen.episodes) for line in wanted]
     missing = [
         line
@@ -336,7 +357,6 @@ def outcome() -> None:
         [(line, found) for line, found in zip(wanted, known, strict=True) if found is not None],
         environment,
         chosen.seed,
-        chosen.episodes,
         at_work=at_work,
     )
 

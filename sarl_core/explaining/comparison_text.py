@@ -1,0 +1,52 @@
+"""What a comparison comes to, in a sentence."""
+
+from __future__ import annotations
+
+from sarl_core.explaining.language import share_text
+from sarl_core.rollouts.comparison import crash_rate
+from sarl_core.rollouts.episodes import Episodes
+
+
+def clear_change(alone: Episodes, shielded: Episodes) -> int:
+    """Whether the typical return differs by more than the intervals leave open.
+
+    Args:
+        alone: Episodes of an agent without a shield.
+        shielded: Its episodes with a shield.
+
+    Returns:
+        1 if it rises with the shield, -1 if it falls, 0 if the intervals overlap.
+    """
+    before, after = alone.statistics, shielded.statistics
+    return int(after.low > before.high) - int(after.high < before.low)
+
+
+def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str:
+    """Whether a shield did an agent good.
+
+    Args:
+        agent: Its name, as "novice".
+        shield: What is in force, as "the unfiltered rules".
+        alone: Episodes of the agent without a shield.
+        shielded: Its episodes with the shield, on the same seeds.
+
+    Returns:
+        As "With the unfiltered rules the typical return of the novice rises from 22 to 500, and
+        0 % instead of 100 % of its episodes end in a crash."
+    """
+    before, after = (f"{episodes.statistics.iqm:,.0f}" for episodes in (alone, shielded))
+    change = {
+        1: f"rises from {before} to {after}",
+        -1: f"falls from {before} to {after}",
+        0: f"does not clearly change ({after}, without them {before})",
+    }[clear_change(alone, shielded)]
+    crashes = [crash_rate(episodes, episodes.env_id) for episodes in (shielded, alone)]
+    ends = (
+        f", and {share_text(crashes[0])} instead of {share_text(crashes[1])} of its episodes end "
+        "in a crash"
+        if crashes[0] != crashes[1]
+        else f", and {share_text(crashes[0])} of its episodes end in a crash, as without"
+        if crashes[0]
+        else ""
+    )
+    return f"With {shield} the typical return of the {agent} {change}{ends}."
