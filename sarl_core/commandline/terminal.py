@@ -26,6 +26,10 @@ _INTERRUPTED = 130  # what a shell expects of a program that Ctrl-C ended
 Advance = Callable[[int, int], None]
 
 
+class StoppedError(SarlError):
+    """Ctrl-C ended work that keeps what is finished; the message says what is there."""
+
+
 def run(app: typer.Typer, arguments: Sequence[str]) -> int:
     """Run a command line.
 
@@ -67,6 +71,8 @@ def _told(error: BaseException) -> tuple[str, int]:
     """An exception as a sentence and an exit code."""
     if isinstance(error, typer.TyperException):
         return error.format_message(), 2
+    if isinstance(error, StoppedError):
+        return str(error), _INTERRUPTED
     if isinstance(error, SarlError):
         return str(error), 2 if isinstance(error, InputError) else 1
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):

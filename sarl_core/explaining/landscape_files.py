@@ -164,9 +164,22 @@ def figure_to_png(figure: go.Figure) -> bytes:
     try:
         picture: bytes = figure.to_image(format="png", scale=2)
     except Exception as error:  # whatever Kaleido or the browser has to complain about
-        reason = " ".join(str(error).split()).split(". ")[0][:200] or type(error).__name__
-        raise WorkError(
-            f"the picture could not be drawn, which takes an installed Chromium or Chrome "
-            f"({reason}); install one, or write .html"
-        ) from error
+        raise cannot_draw(error, "install one, or write .html") from error
     return picture
+
+
+def cannot_draw(error: Exception, advice: str) -> WorkError:
+    """What to tell who has no browser to draw pictures with.
+
+    Args:
+        error: Of Kaleido or the browser.
+        advice: What to do.
+
+    Returns:
+        The error to raise.
+    """
+    reason = " ".join(str(error).split()).split(". ")[0][:200] or type(error).__name__
+    return WorkError(
+        f"the picture could not be drawn, which takes an installed Chromium or Chrome ({reason}); "
+        f"{advice}"
+    )

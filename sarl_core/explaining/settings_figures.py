@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.comparison_figures import arm_style
+from sarl_core.explaining.language import share_text
 from sarl_core.explaining.markup import plain
 
 SETTING_COLOURS = {
@@ -47,7 +48,7 @@ def settings_figure(
         )
     for setting, colour in SETTING_COLOURS.items():
         chosen = [(name, value) for name, other, value in rows if other == setting]
-        texts = [f"{value:.0%}" if share else f"{value:,.0f}" for _, value in chosen]
+        texts = [share_text(value) if share else f"{value:,.0f}" for _, value in chosen]
         figure.add_scatter(
             x=[value for _, value in chosen],
             y=[names.index(name) for name, _ in chosen],
@@ -78,7 +79,11 @@ def settings_figure(
             "itemwidth": 30,
         },
     )
-    axis = {"range": [-0.03, 1.06], "tickformat": ".0%"} if share else {"type": "log", "dtick": 1}
+    axis = (
+        {"range": [-0.03, 1.06], "tickformat": ".0%"}
+        if share
+        else {"type": "log", "dtick": 1, "tickformat": ",d"}
+    )
     figure.update_xaxes(
         title={"text": title, "standoff": 2}, fixedrange=True, zeroline=False, **axis
     )

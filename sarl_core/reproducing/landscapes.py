@@ -21,7 +21,7 @@ from sarl_core.reproducing.shipped import (
     environments,
     trees_of,
 )
-from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge
+from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge, percent
 from sarl_core.rollouts.progress import Progress, report
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def _draw(frame: pd.DataFrame, part: str, dark: bool, layer: Size) -> tuple[Draw
     what = f"{LAYERS[layer].title}, {environment_name(part)}"
     flat, raised = heatmap(found, layer, dark=dark), surface(found, layer, dark=dark)
     flat.update_layout(height=380)
-    raised.update_layout(height=380)
+    raised.update_layout(height=380, scene_camera_eye={"x": 1.4, "y": -1.5, "z": 0.9})
     return (
         Drawing(what, flat, alt=f"{what}: a map over minimum support and minimum confidence"),
         Drawing(f"{what}, as a surface", raised, alt=f"{what}: the same as a surface"),
@@ -216,7 +216,9 @@ def _fewer_with_more_confidence(found: dict[str, Landscape]) -> Claim:
         ours=f"On Cart Pole, asking confidence 1 in place of {one.confidences[middle]:g} gives "
         f"fewer rules at {int(fewer.sum())} of {len(fewer)} minimum supports, and more at "
         f"{int(more.sum())}."
-        + (" At support 0 it gives more, as the paper says itself, one sentence before." * more[0]),
+        + (
+            " At support 0 it gives more, as the paper says one sentence before." if more[0] else ""
+        ),
         verdict=judge(bool(fewer.all()), bool(fewer.any())),
         decided_by="Compares the two on Cart Pole; agrees if there are fewer at every minimum "
         "support of the grid, partly at some.",
@@ -272,7 +274,7 @@ def _longest_rules(found: dict[str, Landscape]) -> Claim:
         f"greatest mean stands where the paper says in {_of(holds)}.",
         verdict=judge(all(holds.values()), any(holds.values()) or bool(corner >= _NEAR * greatest)),
         decided_by="Agrees if no other cell has longer rules, in every environment; partly, in "
-        f"some, or if Cart Pole's stand within {1 - _NEAR:.0%} of the greatest.",
+        f"some, or if Cart Pole's stand within {percent(1 - _NEAR)} of the greatest.",
         numbers={"at_support_0_confidence_1": corner, "greatest": greatest},
     )
 

@@ -13,7 +13,7 @@ from sarl_core.reproducing.shipped import (
     environments,
     named_rules,
 )
-from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge
+from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge, percent
 from sarl_core.rollouts.progress import Progress, report
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def settings_claims(frames: Frames) -> tuple[Claim, ...]:
             where="Lessons Learned, Table 1",
             ours=f"Filtered rules of the unfiltered ones: {counts}.",
             verdict=judge(max(shares.values()) <= _COMPACT, min(shares.values()) <= _COMPACT),
-            decided_by=f"Agrees if at most {_COMPACT:.0%} of the rules remain, in every "
+            decided_by=f"Agrees if at most {percent(_COMPACT)} of the rules remain, in every "
             "environment; partly, in some.",
             numbers={f"share_{env_id}": float(share) for env_id, share in shares.items()},
         ),
@@ -135,7 +135,7 @@ def settings_claims(frames: Frames) -> tuple[Claim, ...]:
                 else "."
             ),
             verdict=judge(covered[least] >= _EVERY_STATE, max(covered.values()) >= _EVERY_STATE),
-            decided_by=f"Agrees from {_EVERY_STATE:.1%} in every environment; partly, in some.",
+            decided_by=f"Agrees from {100 * _EVERY_STATE:g} % in every environment; partly, in some.",
             numbers={f"coverage_{env_id}": float(share) for env_id, share in covered.items()},
         ),
     )

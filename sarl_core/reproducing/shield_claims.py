@@ -19,7 +19,7 @@ from sarl_core.reproducing.shields import (
     dividers_of,
     returns_of,
 )
-from sarl_core.reproducing.study import Claim, Frames, judge
+from sarl_core.reproducing.study import Claim, Frames, judge, percent
 from sarl_core.rollouts.statistics import Interval, interquartile_mean, summarise
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _novice_range(returns: Returns) -> Claim:
         ours=f"It varies between {number(values.min())} and {number(values.max())}; "
         f"{share_text(inside)} of the episodes are within the paper's range.",
         verdict=judge(inside == 1.0, inside >= _MOSTLY),
-        decided_by=f"Agrees if every episode is from 8 to 95, partly if {_MOSTLY:.0%} are.",
+        decided_by=f"Agrees if every episode is from 8 to 95, partly if {percent(_MOSTLY)} are.",
         numbers={"least": float(values.min()), "greatest": float(values.max()), "inside": inside},
     )
 
@@ -133,7 +133,7 @@ def _as_the_expert_in_parts(returns: Returns, name: str, where: str) -> Claim:
         ours=f"{share_text(share)} of its episodes reach {number(level)}, which three of four of "
         "the expert's do.",
         verdict=judge(share >= OFTEN, share > 0),
-        decided_by=f"Agrees if {OFTEN:.0%} of the episodes reach the expert's lower quartile, "
+        decided_by=f"Agrees if {percent(OFTEN)} of the episodes reach the expert's lower quartile, "
         "partly if one does.",
         numbers={"share": share, "level": level},
     )
@@ -179,7 +179,7 @@ def _always_better(returns: Returns) -> Claim:
         ours=f"With the rules the return is higher in {share_text(better)} of the episodes, seed "
         "for seed.",
         verdict=judge(better == 1.0, better >= _MOSTLY),
-        decided_by=f"Agrees if it is higher on every seed, partly on {_MOSTLY:.0%}.",
+        decided_by=f"Agrees if it is higher on every seed, partly on {percent(_MOSTLY)}.",
         numbers={"share": better},
     )
 
@@ -196,8 +196,8 @@ def _filtered_similar(returns: Returns) -> Claim:
         ours=f"Typical returns: filtered {interval(some)}, unfiltered {interval(many)}; the "
         f"novice alone has {number(novice)}.",
         verdict=judge(apart <= _SIMILAR, some.iqm - novice >= 0.5 * (many.iqm - novice)),
-        decided_by=f"Agrees if the two are within {_SIMILAR:.0%} of the way from the lone novice "
-        "to the expert, partly if the filtered rules bring half of what the unfiltered ones do.",
+        decided_by=f"Agrees if the two are within {percent(_SIMILAR)} of the way from the lone "
+        "novice to the expert, partly if the filtered rules bring half of what the unfiltered ones do.",
         numbers={"filtered": some.iqm, "unfiltered": many.iqm, "apart": apart},
     )
 
@@ -232,8 +232,8 @@ def _closely_followed(returns: Returns) -> Claim:
         f"novice has {interval(novice)}. Filtered rules bring "
         f"{share_text(max(gained, 0.0))} of what the unfiltered ones do.",
         verdict=judge(gained >= _MOST_OF_THE_WAY, gained >= 0.5),
-        decided_by=f"Agrees if filtered rules bring {_MOST_OF_THE_WAY:.0%} of what unfiltered ones "
-        "bring to the lone novice's typical return, partly if half.",
+        decided_by=f"Agrees if filtered rules bring {percent(_MOST_OF_THE_WAY)} of what unfiltered "
+        "ones bring to the lone novice's typical return, partly if half.",
         numbers={"filtered": some.iqm, "unfiltered": many.iqm, "novice": novice.iqm},
     )
 
@@ -245,8 +245,8 @@ def _deeper_falls(lander: Returns, cart: Returns) -> Claim:
         paper="Falls downwards are more pronounced than on CartPole.",
         where="text on Figure 6",
         ours="The lowest tenth of the episodes lies below the typical one by, of the way from "
-        f"novice to expert: filtered {depths[1]:.0%} (Cart Pole {depths[0]:.0%}), unfiltered "
-        f"{deeper[1]:.0%} (Cart Pole {deeper[0]:.0%}).",
+        f"novice to expert: filtered {percent(depths[1])} (Cart Pole {percent(depths[0])}), "
+        f"unfiltered {percent(deeper[1])} (Cart Pole {percent(deeper[0])}).",
         verdict=judge(
             depths[1] > depths[0] and deeper[1] > deeper[0],
             depths[1] > depths[0] or deeper[1] > deeper[0],
@@ -287,11 +287,11 @@ def _by_the_shield_alone(returns: Returns) -> Claim:
         paper="The expert's performance can be reached by the shield alone.",
         where="Lessons Learned",
         ours=f"With unfiltered rules the typical return is {interval(many)}, "
-        f"{way:.0%} of the way from the lone novice ({number(novice)}) to the expert "
+        f"{percent(way)} of the way from the lone novice ({number(novice)}) to the expert "
         f"({number(expert)}).",
         verdict=judge(meets, way >= _MOST_OF_THE_WAY),
         decided_by=f"{COMPARED}; agrees if those of expert and unfiltered rules meet, partly from "
-        f"{_MOST_OF_THE_WAY:.0%} of the way.",
+        f"{percent(_MOST_OF_THE_WAY)} of the way.",
         numbers={"unfiltered": many.iqm, "expert": expert, "way": way},
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -86,3 +87,19 @@ def named_rules(env_id: str, divider: int = PAPER_DIVIDER) -> dict[str, RuleSet]
 
 def _path(name: str) -> Path:
     return DEMONSTRATION_FOLDER / f"{name}.parquet"
+
+
+def fingerprints(env_id: str) -> dict[str, str]:
+    """What tells the shipped files of an environment from others of their name.
+
+    Args:
+        env_id: One of `environments`.
+
+    Returns:
+        Digests of the `demonstrations` and of the `expert`.
+    """
+    expert = EXPERT_FOLDER / f"{SHIPPED[env_id]}.npz"
+    return {
+        "demonstrations": demonstrations_of(env_id).digest,
+        "expert": hashlib.blake2b(expert.read_bytes(), digest_size=16).hexdigest(),
+    }

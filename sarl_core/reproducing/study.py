@@ -135,3 +135,15 @@ def judge(agrees: bool, partly: bool = False) -> Verdict:
         The verdict.
     """
     return "agrees" if agrees else "partly" if partly else "does not agree"
+
+
+def percent(share: float) -> str:
+    """A share for a sentence, which may be below 0 or above 1.
+
+    Args:
+        share: As 0.12.
+
+    Returns:
+        As "12 %".
+    """
+    return f"{100 * share:.0f} %".replace("-", "−")

@@ -23,7 +23,7 @@ from sarl_core.reproducing.shields import (
     dividers_of,
     returns_of,
 )
-from sarl_core.reproducing.study import Claim, Frames, judge
+from sarl_core.reproducing.study import Claim, Frames, judge, percent
 from sarl_core.rollouts.statistics import interquartile_mean
 
 if TYPE_CHECKING:
@@ -65,8 +65,8 @@ def _expert_drops(returns: Returns) -> Claim:
         f"{number(values.min())}; {share_text(share)} of its episodes are below half of its "
         "typical return.",
         verdict=judge(share >= OFTEN, share > 0),
-        decided_by=f"Agrees if {OFTEN:.0%} of the episodes are below half of its typical return, "
-        "partly if one is.",
+        decided_by=f"Agrees if {percent(OFTEN)} of the episodes are below half of its typical "
+        "return, partly if one is.",
         numbers={"mean": float(values.mean()), "lowest": float(values.min()), "share": share},
     )
 
@@ -91,7 +91,7 @@ def _no_help(returns: Returns, name: str) -> Claim:
         paper=f"With {name} rules there is no improvement over the lone novice.",
         where="Figure 7",
         ours=f"Typical returns: {interval(shielded)} with the rules, {interval(novice)} without: "
-        f"{way:.0%} of the way to the expert.",
+        f"{percent(way)} of the way to the expert.",
         verdict=judge(shielded.low <= novice.high, way < 0.5),
         decided_by=f"{COMPARED}; agrees if that with the rules does not lie above that without, "
         "partly if it does, but by less than half of the way to the expert.",
@@ -110,7 +110,7 @@ def _no_fluctuation(returns: Returns) -> Claim:
         f"novice to the expert would be {number(level)}.",
         verdict=judge(best < level, max(shares) < OFTEN),
         decided_by="Agrees if no episode gets half of the way from the lone novice's typical "
-        f"return to the expert's, partly if fewer than {OFTEN:.0%} do.",
+        f"return to the expert's, partly if fewer than {percent(OFTEN)} do.",
         numbers={"best": best, "level": level},
     )
 
