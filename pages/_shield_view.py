@@ -128,7 +128,7 @@ def verdicts(found: Found) -> list[str]:
             pair for pair in shielded[1:][-1:] if clear_change(alone, pair[1]) < 0
         ]
         sentences += [
-            verdict(agent.lower(), f"the {rules_name(line.shield)}", alone, episodes)
+            verdict(agent, f"the {rules_name(line.shield)}", alone, episodes)
             for line, episodes in told
         ]
     return sentences

@@ -32,6 +32,7 @@ from _shield_view import Line, show
 from _words import in_full
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.comparison_figures import arm_style
 from sarl_core.explaining.language import counted
@@ -184,7 +185,7 @@ def pilots(choices: Choices, env_id: str) -> list[Pilot]:
         place = AGENT_PLACES.index(choice)
         if choice != OWN_FILE:
             make, digest = agent_for(choice, None, env_id, choices.seed)
-            found.append(Pilot(choice.capitalize(), place, make, f"{choice} {digest}"))
+            found.append(Pilot(choice, place, make, f"{choice} {digest}"))
         for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
             make, digest = agent_for(choice, file, env_id, choices.seed)
             name = file.name.rsplit(".", 1)[0]
@@ -314,7 +315,7 @@ st.caption(
 chosen = settings()
 try:
     environment = environment_of(chosen.env)
-    continuous(chosen.env)
+    describe_environment(environment)
     chosen_pilots = pilots(chosen, environment)
 except SarlError as error:
     st.error(in_full(str(error)), icon=":material/error:")
@@ -322,9 +323,13 @@ except SarlError as error:
 chosen_guards, refused = guards(chosen)
 for sentence in refused:
     st.error(in_full(sentence), icon=":material/error:")
-wanted = [
-    line(chosen, environment, pilot, guard) for pilot in chosen_pilots for guard in chosen_guards
-]
+lines_by_key = {
+    each.row.key: each  # a file uploaded twice is one
+    for pilot in chosen_pilots
+    for guard in chosen_guards
+    for each in [line(chosen, environment, pilot, guard)]
+}
+wanted = list(lines_by_key.values())
 if not wanted:
     st.info(
         "Choose at least one agent and one shield; a shield of your own needs its file.",

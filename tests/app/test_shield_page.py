@@ -1,0 +1,251 @@
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import load_demonstrations, mine_rules
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.rollouts.comparison import Arm, compare
+from tests.app.screens import errors, open_page, texts
+
+DATA = Path(__file__).parents[2] / "data"
+CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+
+
+def finished(app: AppTest) -> AppTest:
+    """Look in until the work is done, as the browser does every second."""
+    for _ in range(600):
+        assert not app.exception, app.exception
+        if "cancel" not in [button.key for button in app.button]:
+            return app
+        time.sleep(0.1)
+        app.run()
+    raise AssertionError("the work does not end")
+
+
+def run(app: AppTest) -> AppTest:
+    app.button(key="run").click().run()
+    return finished(app)
+
+
+def rows(app: AppTest) -> dict[str, dict[str, Any]]:
+    """The table by agent and shield."""
+    if not app.dataframe:
+        return {}
+    found = app.dataframe[-1].value.to_dict("records")
+    return {f"{row['Agent']}, {row['Shield']}": row for row in found}
+
+
+def test_before_a_run_the_page_says_what_to_do() -> None:
+    app = open_page("shield", data="cartpole", first_seed="1000")
+    assert "press Run" in texts(app)
+    assert not rows(app)
+    assert not app.button(key="run").disabled
+
+
+def test_every_agent_with_every_shield_is_what_the_library_gives() -> None:
+    app = run(open_page("shield", data="cartpole", episodes="5", first_seed="2000"))
+    assert not errors(app)
+    filtered = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
+    unfiltered = mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0)
+    arms = [
+        Arm(f"{agent}, {name}", agent, rules)
+        for agent in ("novice", "expert")
+        for name, rules in (
+            ("no shield", None),
+            ("filtered", filtered),
+            ("unfiltered", unfiltered),
+        )
+    ]
+    wanted = compare("CartPole-v1", arms, episodes=5, seed=2000)
+    shown = rows(app)
+    assert list(shown) == [arm.name for arm in arms]
+    for arm, episodes in zip(arms, wanted.episodes, strict=True):
+        row = shown[arm.name]
+        assert row["Episodes"] == 5
+        assert row["Mean return"] == pytest.approx(episodes.returns.mean())
+        assert row["Typical return"] == pytest.approx(episodes.statistics.iqm)
+        assert (row["Changed"] == "–") == (arm.rules is None)
+    assert shown["novice, unfiltered"]["Rules"] == f"{len(unfiltered):,}"
+    assert shown["novice, no shield"]["Crashes"] == "100 %"
+    assert "the typical return of the novice rises" in texts(app)
+    assert len(app.get("plotly_chart")) == 2
+    assert [button.label for button in app.get("download_button")] == ["Download CSV"]
+
+
+def test_who_asks_again_has_it_at_once_and_more_goes_on_from_there() -> None:
+    query = {"data": "cartpole", "first_seed": "3000", "agents": "novice", "shields": "no shield"}
+    first = rows(run(open_page("shield", episodes="9", **query)))["novice, no shield"]
+    again = open_page("shield", episodes="9", **query)
+    assert rows(again)["novice, no shield"] == first
+    assert again.button(key="run").disabled
+    assert "all of them are here already" in texts(again)
+    fewer = open_page("shield", episodes="4", **query)
+    assert rows(fewer)["novice, no shield"]["Episodes"] == 4
+    assert fewer.button(key="run").disabled
+    more = open_page("shield", episodes="12", **query)
+    assert rows(more)["novice, no shield"]["Episodes"] == 9
+    assert rows(run(more))["novice, no shield"]["Episodes"] == 12
+    alone = compare("CartPole-v1", [Arm("a", "novice")], episodes=12, seed=3000)
+    assert rows(more)["novice, no shield"]["Mean return"] == alone.episodes[0].returns.mean()
+
+
+def test_what_was_finished_before_a_cancel_stays_readable() -> None:
+    # Enough work for minutes, on any machine.
+    query = {"data": "bipedal_walker", "episodes": "1000", "agents": "novice"}
+    app = open_page("shield", shields="no shield", **query)
+    app.button(key="run").click().run()
+    for _ in range(600):
+        if rows(app):
+            break
+        time.sleep(0.1)
+        app.run()
+    app.button(key="cancel").click().run()
+    assert not app.exception
+    assert "Cancelled" in texts(app)
+    assert 0 < rows(app)["novice, no shield"]["Episodes"] < 1000
+    assert not app.button(key="run").disabled
+    other = open_page("shield", shields="no shield", **query)
+    assert rows(other)["novice, no shield"]["Episodes"] > 0
+
+
+def test_the_work_goes_on_while_other_pages_are_looked_at() -> None:
+    app = open_page("shield", data="cartpole", episodes="30", first_seed="4000")
+    app.button(key="run").click().run()
+    app.switch_page("rules.py").run()
+    assert not app.exception
+    app.switch_page("shield.py").run()
+    assert len(rows(finished(app))) == 6
+
+
+@pytest.mark.parametrize("projection", ["centre", "clip", "expert"])
+def test_continuous_actions_are_replaced_in_three_ways(projection: str) -> None:
+    app = run(
+        open_page("shield", data="pendulum", episodes="2", agents="novice", projection=projection)
+    )
+    assert not errors(app)
+    assert set(rows(app)) == {f"novice, {name}" for name in ("no shield", "filtered", "unfiltered")}
+    assert rows(app)["novice, unfiltered"]["Changed"] != "0 %"
+
+
+def test_on_the_seeds_of_the_demonstrations_the_page_says_so() -> None:
+    assert not open_page("shield", data="cartpole").warning
+    app = open_page("shield", data="cartpole", first_seed="5")
+    assert "know the way" in app.warning[0].value
+    assert not open_page("shield", data="cartpole", first_seed="5", shields="no shield").warning
+    assert not open_page("shield", data="cartpole", first_seed="30").warning
+
+
+@pytest.fixture
+def lacking() -> Iterator[str]:
+    """An environment whose package is missing."""
+
+    def fail(**_: Any) -> Any:
+        raise ModuleNotFoundError("No module named 'engine'")
+
+    gymnasium.register("Lacking-v0", entry_point=fail)
+    yield "Lacking-v0"
+    gymnasium.registry.pop("Lacking-v0")
+
+
+def test_a_package_that_the_environment_lacks_is_named(lacking: str) -> None:
+    (sentence,) = errors(open_page("shield", data="cartpole", env=lacking))
+    assert "No module named 'engine'" in sentence
+    assert "install it" in sentence
+
+
+@pytest.mark.parametrize(
+    ("query", "fragment"),
+    [
+        ({"env": "Nowhere-v9"}, "no environment 'Nowhere-v9'"),
+        ({"env": "CarRacing-v3"}, "as images do"),
+        ({"data": "upload", "env": "CartPole-v1", "shields": "filtered"}, "no demonstrations"),
+    ],
+)
+def test_what_cannot_be_run_is_said_before_it_is_asked_for(
+    query: dict[str, str], fragment: str
+) -> None:
+    (sentence,) = errors(open_page("shield", **{"data": "cartpole", **query}))
+    assert fragment in sentence
+
+
+@pytest.mark.parametrize(
+    ("query", "fragment", "left"),
+    [
+        ({"env": "MountainCar-v0", "shields": "no shield"}, "no shipped expert", ["novice"]),
+        ({"env": "Pendulum-v1", "agents": "novice"}, "rules", ["novice"]),
+    ],
+)
+def test_what_fails_leaves_the_other_rows(
+    query: dict[str, str], fragment: str, left: list[str]
+) -> None:
+    app = run(open_page("shield", **{"data": "cartpole", "episodes": "2", **query}))
+    (sentence,) = errors(app)
+    assert fragment in sentence
+    assert "\n" not in sentence
+    assert [row["Agent"] for row in rows(app).values()] == left
+
+
+@pytest.mark.parametrize("episodes", ["0", "-3", "many", "1e9"])
+def test_a_number_of_episodes_that_cannot_be_is_the_usual_one(episodes: str) -> None:
+    app = open_page("shield", data="cartpole", episodes=episodes)
+    assert app.number_input(key="episodes").value == 20
+
+
+def test_with_nothing_chosen_the_page_says_so() -> None:
+    app = open_page("shield", data="cartpole", shields="own file")
+    assert "at least one agent and one shield" in texts(app)
+    assert not app.button
+
+
+def test_a_policy_and_rules_of_one_s_own() -> None:
+    app = open_page(
+        "shield", data="lunar_lander", env="CartPole-v1", episodes="2", first_seed="5000"
+    )
+    app.pills(key="agents").set_value(["own file"]).run()
+    app.pills(key="shields").set_value(["no shield", "own file"]).run()
+    policy = (DATA / "experts" / "cartpole.npz").read_bytes()
+    app.file_uploader(key="policy_files").set_value([("mine.npz", policy, "")]).run()
+    rules = mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0)
+    app.file_uploader(key="rule_file").set_value(
+        ("r.json", rules_to_json(rules).encode(), "")
+    ).run()
+    run(app)
+    assert not errors(app)
+    assert rows(app)["mine, no shield"]["Mean return"] == 500.0
+    assert rows(app)["mine, own file"]["Rules"] == f"{len(rules):,}"
+
+
+def test_a_rule_file_of_another_version_and_a_foreign_policy_are_named() -> None:
+    app = open_page("shield", data="cartpole", episodes="2", first_seed="6000")
+    app.pills(key="shields").set_value(["no shield", "own file"]).run()
+    document = json.loads(rules_to_json(mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)))
+    content = json.dumps(document | {"version": 99}).encode()
+    app.file_uploader(key="rule_file").set_value(("new.json", content, "")).run()
+    (sentence,) = errors(app)
+    assert "new.json has version 99" in sentence
+    app.pills(key="agents").set_value(["novice", "own file"]).run()
+    policy = (DATA / "experts" / "lunar_lander.npz").read_bytes()
+    app.file_uploader(key="policy_files").set_value([("lander.npz", policy, "")]).run()
+    run(app)
+    assert any("lander.npz" in sentence and "features" in sentence for sentence in errors(app))
+    assert list(rows(app)) == ["novice, no shield"]
+
+
+def test_compact_rules_are_offered_where_there_are_some(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    query = {"data": "cartpole", "episodes": "2", "first_seed": "7000", "agents": "novice"}
+    open_page("shield", **query)
+    monkeypatch.setattr("_choices.RULES_FOLDER", tmp_path)
+    assert "compact" not in open_page("shield", **query).pills(key="shields").options
+    mine_rules(CARTPOLE, supp_min=0.1, conf_min=0.5).save(tmp_path / "cartpole_compact.json")
+    app = run(open_page("shield", **query, shields="compact"))
+    assert list(rows(app)) == ["novice, compact"]

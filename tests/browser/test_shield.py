@@ -1,0 +1,44 @@
+"""The page Shield in a browser: run, look, change, download, come back."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.walking import no_trace, parameters, settle, visit
+
+
+def test_a_comparison_is_run_changed_downloaded_and_found_again(
+    screen: Page, tmp_path: Path
+) -> None:
+    visit(screen, "/shield?data=cartpole&episodes=4&first_seed=8000", "Shield")
+    expect(screen.get_by_text("press Run")).to_be_visible()
+    screen.get_by_role("button", name="Run", exact=True).click()
+    expect(screen.get_by_text("all of them are here already")).to_be_visible()
+    settle(screen)
+    expect(screen.get_by_text("the typical return of the novice rises")).to_be_visible()
+    assert screen.locator(".js-plotly-plot").count() == 2
+    assert screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace").count() == 6
+    with screen.expect_download() as started:
+        screen.get_by_test_id("stDownloadButton").click()
+    path = tmp_path / "comparison.csv"
+    started.value.save_as(path)
+    rows = list(csv.DictReader(path.read_text().splitlines()))
+    assert [row["arm"] for row in rows][:3] == [
+        "novice, no shield",
+        "novice, filtered",
+        "novice, unfiltered",
+    ]
+    assert {row["seed"] for row in rows} == {"8000"}
+    # Without the expert: at once, and a link shows the same.
+    screen.get_by_text("expert", exact=True).first.click()
+    expect(screen.get_by_text("4 episodes for each of 3 combinations")).to_be_visible()
+    settle(screen)
+    assert parameters(screen)["agents"] == "novice"
+    visit(screen, screen.url, "Shield")
+    expect(screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace")).to_have_count(
+        3
+    )
+    no_trace(screen)
