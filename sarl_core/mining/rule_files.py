@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.errors import InputError
@@ -117,6 +117,8 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
             "max_depth": thresholds.max_depth,
         },
         "divider": rule_set.divider,
+        # Where it is the paper's cut, the file is what it was before there was another.
+        **({"cut": rule_set.cut} if rule_set.cut != "thresholds" else {}),
         "demonstrations": {
             "digest": source.digest,
             "steps": source.steps,
@@ -265,6 +267,7 @@ def _rule_set(document: _Reader) -> RuleSet:
             max_depth=thresholds.limit("max_depth"),
         ),
         divider=document.count("divider", low=2, high=MAX_DIVIDER),
+        cut=_read_cut(document),
     )
     for part in (thresholds, demonstrations, document):
         part.finish()
@@ -273,6 +276,13 @@ def _rule_set(document: _Reader) -> RuleSet:
         doubled = next(one for one in ids if ids.count(one) > 1)
         raise document.fail(f"the rule id {doubled!r} stands twice")
     return rule_set
+
+
+def _read_cut(document: _Reader) -> Literal["thresholds", "leaves"]:
+    cut: Literal["thresholds", "leaves"] = document.take("cut", str, "thresholds")
+    if cut not in ("thresholds", "leaves"):
+        raise document.fail(f"the cut {_shown(cut)} is neither 'thresholds' nor 'leaves'")
+    return cut
 
 
 def _read_feature(part: _Reader) -> Feature:

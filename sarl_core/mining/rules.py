@@ -177,6 +177,8 @@ class RuleSet:
         source: Environment, features and fingerprint of the demonstrations.
         thresholds: In force when it was mined.
         divider: Number of intervals of continuous dimensions.
+        cut: Where the paths were cut: at the first node that reaches the thresholds
+            (Algorithm 1), or nowhere, so that every leaf is a rule and every state is covered.
     """
 
     rules: tuple[Rule, ...]
@@ -184,6 +186,7 @@ class RuleSet:
     source: Source
     thresholds: Thresholds
     divider: int = 2
+    cut: Literal["thresholds", "leaves"] = "thresholds"
 
     def __len__(self) -> int:
         """Number of rules."""
@@ -191,6 +194,8 @@ class RuleSet:
 
     def __repr__(self) -> str:
         """Its size, as `RuleSet('CartPole-v1', rules=12, support>=0.005, confidence>=0.95)`."""
+        if self.cut == "leaves":
+            return f"RuleSet({self.source.env_id!r}, rules={len(self)}, every leaf)"
         return (
             f"RuleSet({self.source.env_id!r}, rules={len(self)}, "
             f"support>={self.thresholds.support:g}, confidence>={self.thresholds.confidence:g})"
@@ -384,7 +389,8 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
 def _demonstrated(tree: PolicyTree, node: int) -> float | None:
     if not tree.dimension.is_interval:
         return None
-    return float(np.median(tree.demonstrated[tree.rows(node)]))
+    rows = tree.rows(node)
+    return float(np.median(tree.demonstrated[rows])) if len(rows) else None
 
 
 def _conditions(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[tuple[Condition, ...]]:

@@ -115,14 +115,16 @@ class PolicyTree:
     @cached_property
     def confidence(self) -> NDArray[np.float64]:
         """Share of each node's pairs that carry its label, 0 where there are none, (n,)."""
-        return self.correct / np.maximum(self.samples, 1)
+        return np.asarray(self.correct / np.maximum(self.samples, 1))
 
     @cached_property
     def lift(self) -> NDArray[np.float64]:
         """Confidence over the label's share of all pairs, (n,)."""
         shares = self.counts[0] / self.samples[0]
         of_label = shares[self.label]
-        return np.divide(self.confidence, of_label, out=np.zeros(self.n_nodes), where=of_label > 0)
+        lift = np.zeros(self.n_nodes)
+        np.divide(self.confidence, of_label, out=lift, where=of_label > 0)
+        return lift
 
     @cached_property
     def confidence_above(self) -> NDArray[np.float64]:

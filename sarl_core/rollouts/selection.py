@@ -1,0 +1,92 @@
+"""Choosing the best of many candidates by episodes, most of which go to the few that are good."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Score = Callable[[int, int, int], NDArray[np.float64]]
+"""Called with (candidate, first seed, how many); gives the return of each episode."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """How the best candidate was found.
+
+    Attributes:
+        best: Its index.
+        means: Mean return of each candidate over the episodes it was given, (K,).
+        episodes: How many each was given, (K,) int64.
+    """
+
+    best: int
+    means: NDArray[np.float64]
+    episodes: NDArray[np.int64]
+
+
+def planned_episodes(candidates: int, first: int, most: int) -> int:
+    """How many episodes `successive_halving` runs in all.
+
+    Args:
+        candidates: K, at least 1.
+        first: Episodes of the first turn.
+        most: Most episodes a candidate is given.
+
+    Returns:
+        Their number, over all candidates.
+    """
+    total, given, left = 0, 0, candidates
+    while given < most:
+        new = min(max(first, given), most - given)  # every turn doubles what each has
+        total, given = total + new * left, given + new
+        if left == 1 and given >= most:
+            break
+        left = max(1, (left + 1) // 2)
+    return total
+
+
+def successive_halving(
+    candidates: int,
+    score: Score,
+    *,
+    seed: int,
+    first: int = 16,
+    most: int = 256,
+    finished: Callable[[int], None] | None = None,
+) -> Selection:
+    """Give all a few episodes, the better half twice as many, and so on.
+
+    All candidates are given the same seeds, so that luck is shared, and what was run counts on.
+
+    Args:
+        candidates: K, at least 1.
+        score: Runs episodes of one candidate.
+        seed: Of the first episode.
+        first: Episodes of the first turn.
+        most: Most episodes a candidate is given; the last one left gets them all.
+        finished: Called with the number of episodes after each call of `score`; may raise.
+
+    Returns:
+        The selection. The winner's mean is too good by what luck it was chosen for: report it on
+        other episodes.
+    """
+    returns: list[list[float]] = [[] for _ in range(candidates)]
+    left: Sequence[int] = range(candidates)
+    given = 0
+    while given < most:
+        new = min(max(first, given), most - given)
+        for candidate in left:
+            returns[candidate] += score(candidate, seed + given, new).tolist()
+            if finished is not None:
+                finished(new)
+        given += new
+        ranked = sorted(left, key=lambda candidate: -float(np.mean(returns[candidate])))
+        left = ranked[: max(1, (len(ranked) + 1) // 2)]
+    return Selection(
+        best=left[0],
+        means=np.array([float(np.mean(one)) for one in returns]),
+        episodes=np.array([len(one) for one in returns], dtype=np.int64),
+    )
