@@ -98,15 +98,20 @@ def landscape_of(frame: pd.DataFrame, env_id: str) -> Landscape:
     )
 
 
-def _parts(frame: pd.DataFrame) -> tuple[str, ...]:
+def _environments(frame: pd.DataFrame) -> tuple[str, ...]:
     return tuple(frame["environment"].unique().tolist())
+
+
+def _parts(frame: pd.DataFrame) -> tuple[str, ...]:
+    return tuple(environment_name(env_id) for env_id in _environments(frame))
 
 
 def _draw(frame: pd.DataFrame, part: str, dark: bool, layer: Size) -> tuple[Drawing, ...]:
     from sarl_core.explaining.threshold_figures import LAYERS, heatmap, surface
 
-    found = landscape_of(frame, part)
-    what = f"{LAYERS[layer].title}, {environment_name(part)}"
+    env_id = next(one for one in _environments(frame) if environment_name(one) == part)
+    found = landscape_of(frame, env_id)
+    what = f"{LAYERS[layer].title}, {part}"
     flat, raised = heatmap(found, layer, dark=dark), surface(found, layer, dark=dark)
     flat.update_layout(height=380)
     raised.update_layout(height=380, scene_camera_eye={"x": 1.4, "y": -1.5, "z": 0.9})
@@ -129,7 +134,7 @@ def _settings(_: Effort) -> dict[str, Any]:
 def _numbers(frame: pd.DataFrame, layer: Size) -> dict[str, Any]:
     """The greatest value of a layer, where it stands, and the value at the paper's corner."""
     found = {}
-    for env_id in _parts(frame):
+    for env_id in _environments(frame):
         one = landscape_of(frame, env_id)
         values = np.asarray(getattr(one, layer), dtype=np.float64)
         row, column = np.unravel_index(int(values.argmax()), values.shape)
@@ -155,7 +160,7 @@ def count_claims(frames: Frames) -> tuple[Claim, ...]:
         Its claims and ours.
     """
     frame = frames["2"]
-    found = {env_id: landscape_of(frame, env_id) for env_id in _parts(frame)}
+    found = {env_id: landscape_of(frame, env_id) for env_id in _environments(frame)}
     return (
         _most_rules(found),
         _fewer_with_less_confidence(found),
@@ -230,13 +235,13 @@ def _fewer_with_more_support(found: dict[str, Landscape]) -> Claim:
     holds = {
         env_id: bool((np.diff(one.rule_count, axis=0) <= 0).all()) for env_id, one in found.items()
     }
-    cart = found[PAPER_ENVIRONMENT].rule_count
+    supports, cart = found[PAPER_ENVIRONMENT].supports, found[PAPER_ENVIRONMENT].rule_count
     return Claim(
         paper="If more support is asked, fewer rules are found.",
         where="text on Figure 2",
         ours=f"The number never rises with the support, at any confidence, in {_of(holds)}. On "
         f"Cart Pole at confidence 1 it falls from {int(cart[0, -1]):,} at support 0 to "
-        f"{counted(int(cart[1, -1]), 'rule')} at {PAPER_SUPPORTS[1]:g}.",
+        f"{counted(int(cart[1, -1]), 'rule')} at {supports[1]:g}.",
         verdict=judge(all(holds.values()), any(holds.values())),
         decided_by="Agrees if the number never rises from one support of the grid to the next, in "
         "every environment; partly, in some.",
@@ -257,7 +262,7 @@ def length_claims(frames: Frames) -> tuple[Claim, ...]:
         Its claims and ours.
     """
     frame = frames["3"]
-    found = {env_id: landscape_of(frame, env_id) for env_id in _parts(frame)}
+    found = {env_id: landscape_of(frame, env_id) for env_id in _environments(frame)}
     return (_longest_rules(found), _middle(found), _same_way(found))
 
 

@@ -267,7 +267,7 @@ LEARNING = Study(
     settings=_settings,
     numbers=_numbers,
     claims=learning_claims,
-    parts=lambda frame: (_ENVIRONMENT,),
+    parts=lambda frame: (environment_name(_ENVIRONMENT),),
     draw=_draw,
     columns=(
         "environment",

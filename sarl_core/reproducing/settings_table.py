@@ -135,7 +135,8 @@ def settings_claims(frames: Frames) -> tuple[Claim, ...]:
                 else "."
             ),
             verdict=judge(covered[least] >= _EVERY_STATE, max(covered.values()) >= _EVERY_STATE),
-            decided_by=f"Agrees from {100 * _EVERY_STATE:g} % in every environment; partly, in some.",
+            decided_by=f"Agrees from {100 * _EVERY_STATE:g} % in every environment; partly, in "
+            "some.",
             numbers={f"coverage_{env_id}": float(share) for env_id, share in covered.items()},
         ),
     )

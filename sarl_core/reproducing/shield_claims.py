@@ -197,7 +197,8 @@ def _filtered_similar(returns: Returns) -> Claim:
         f"novice alone has {number(novice)}.",
         verdict=judge(apart <= _SIMILAR, some.iqm - novice >= 0.5 * (many.iqm - novice)),
         decided_by=f"Agrees if the two are within {percent(_SIMILAR)} of the way from the lone "
-        "novice to the expert, partly if the filtered rules bring half of what the unfiltered ones do.",
+        "novice to the expert, partly if the filtered rules bring half of what the unfiltered "
+        "ones do.",
         numbers={"filtered": some.iqm, "unfiltered": many.iqm, "apart": apart},
     )
 

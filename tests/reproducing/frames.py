@@ -1,0 +1,106 @@
+"""Tables as the studies measure them, made up so that it is known what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from sarl_core.rollouts.relevance import Relevance
+
+SUPPORTS, CONFIDENCES = (0.0, 0.1, 0.2), (0.0, 0.5, 0.75, 1.0)
+ENVIRONMENTS = ("CartPole-v1", "LunarLander-v3")
+
+
+def landscapes(
+    counts: Mapping[str, ArrayLike], lengths: Mapping[str, ArrayLike] | None = None
+) -> pd.DataFrame:
+    """The table of Figures 2 and 3 from one 3 x 4 matrix an environment."""
+    supports, confidences = np.meshgrid(SUPPORTS, CONFIDENCES, indexing="ij")
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "environment": env_id,
+                    "divider": 0,
+                    "support": supports.ravel(),
+                    "confidence": confidences.ravel(),
+                    "rule_count": np.asarray(values).ravel(),
+                    "mean_length": np.asarray((lengths or counts)[env_id], dtype=float).ravel(),
+                    "coverage": 0.5,
+                    "fidelity": np.nan,
+                }
+            )
+            for env_id, values in counts.items()
+        ],
+        ignore_index=True,
+    )
+
+
+def learning(
+    filtered: Sequence[float],
+    unfiltered: Sequence[float],
+    *,
+    covered: float = 0.8,
+    spread: float = 0.01,
+) -> pd.DataFrame:
+    """The table of Figure 4 from the shares of broken rules in each test, for three learners."""
+    steps = 10_000
+    shifts = np.array([-spread, 0.0, spread])[:, None]
+    broken = np.array([np.asarray(shares) + shifts for shares in (filtered, unfiltered)])
+    applied = np.empty(broken.shape)
+    applied[0], applied[1] = covered * steps, steps
+    tests = broken.shape[2]
+    return Relevance(
+        env_id="CartPole-v1",
+        names=("filtered", "unfiltered"),
+        rule_counts=(5, 1500),
+        seeds=np.arange(3),
+        learned_steps=np.arange(tests) * 500,
+        test_steps=steps,
+        applied=applied.round().astype(np.int64),
+        broken=(broken * applied).round().astype(np.int64),
+        returns=np.broadcast_to(np.linspace(20, 500, tests), (3, tests)).copy(),
+    ).to_frame()
+
+
+def episodes(
+    env_id: str,
+    novice: ArrayLike,
+    expert: ArrayLike,
+    shielded: Mapping[int, tuple[ArrayLike, ArrayLike]],
+) -> pd.DataFrame:
+    """The table of Figures 5 to 7 from returns; filtered and unfiltered ones by their divider."""
+    arms = [(0, "novice alone", "novice", 0, novice)]
+    for divider, (filtered, unfiltered) in shielded.items():
+        arms += [
+            (divider, "filtered", "novice", 6, filtered),
+            (divider, "unfiltered", "novice", 3000, unfiltered),
+        ]
+    arms.append((0, "expert", "expert", 0, expert))
+    parts = []
+    for divider, arm, agent, rules, returns in arms:
+        values = np.asarray(returns, dtype=np.float64)
+        parts.append(
+            pd.DataFrame(
+                {
+                    "environment": env_id,
+                    "divider": divider,
+                    "arm": arm,
+                    "agent": agent,
+                    "rule_count": rules,
+                    "crashed": values < 0,
+                    "seed": np.arange(len(values)) + 30_000_000,
+                    "return": values,
+                    "length": 100,
+                    "interventions": 40 if rules else 0,
+                    "covered": 50 if rules else 0,
+                    "terminated": True,
+                    "truncated": False,
+                    "last_reward": np.where(values < 0, -100.0, 1.0),
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)

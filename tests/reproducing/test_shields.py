@@ -1,0 +1,210 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sarl_core import Shield, rollout
+from sarl_core.reproducing.shields import comparison_of, dividers_of
+from sarl_core.reproducing.shipped import named_rules
+from sarl_core.reproducing.studies import STUDIES
+from sarl_core.reproducing.study import FIRST_SEED, Effort, Verdict
+from tests.reproducing.frames import episodes
+
+SMALL = Effort(quick=True, learners=1, phases=1, test_steps=1, episodes=3)
+
+
+def noisy(mean: float, spread: float, count: int = 40) -> np.ndarray:
+    return mean + spread * np.random.default_rng(round(abs(mean))).normal(size=count)
+
+
+NOVICE = np.linspace(9, 90, 40)
+EXPERT = np.full(40, 500.0)
+UNFILTERED = np.where(np.arange(40) % 8 == 0, 167.0, 500.0)
+FILTERED = np.where(np.arange(40) % 8 == 4, 200.0, 490.0)
+
+
+def cart(**change: np.ndarray) -> pd.DataFrame:
+    arms = {"novice": NOVICE, "filtered": FILTERED, "unfiltered": UNFILTERED, "expert": EXPERT}
+    arms |= change
+    return episodes(
+        "CartPole-v1", arms["novice"], arms["expert"], {0: (arms["filtered"], arms["unfiltered"])}
+    )
+
+
+def lander(**change: np.ndarray) -> pd.DataFrame:
+    arms = {
+        "novice": noisy(-180, 60),
+        "filtered": np.concatenate([noisy(200, 20, 30), noisy(-300, 60, 5), noisy(280, 10, 5)]),
+        "unfiltered": np.concatenate([noisy(255, 20, 35), noisy(-210, 60, 5)]),
+        "expert": noisy(270, 15),
+    } | change
+    return episodes(
+        "LunarLander-v3",
+        arms["novice"],
+        arms["expert"],
+        {0: (arms["filtered"], arms["unfiltered"])},
+    )
+
+
+def walker(**change: np.ndarray) -> pd.DataFrame:
+    arms = {
+        "novice": noisy(-100, 10),
+        "filtered": noisy(-105, 10),
+        "unfiltered": noisy(-103, 10),
+        "expert": np.concatenate([noisy(200, 20, 34), noisy(0, 30, 6)]),
+        "finer": noisy(60, 10),
+    } | change
+    return episodes(
+        "BipedalWalker-v3",
+        arms["novice"],
+        arms["expert"],
+        {2: (arms["filtered"], arms["unfiltered"]), 3: (arms["filtered"], arms["finer"])},
+    )
+
+
+def verdicts(name: str, **frames: pd.DataFrame) -> list[Verdict]:
+    tables = {key.removeprefix("figure_"): frame for key, frame in frames.items()}
+    return [claim.verdict for claim in STUDIES[name].claims(tables)]
+
+
+def test_cart_pole_as_the_paper_shows_it() -> None:
+    assert verdicts("5", figure_5=cart()) == ["partly", *["agrees"] * 6]
+    # The typical return of both is 500; a worse one than the expert's would agree.
+    worse = np.where(np.arange(40) % 2 == 0, 300.0, 500.0)
+    assert verdicts("5", figure_5=cart(unfiltered=worse, filtered=worse))[0] == "agrees"
+    ours = [claim.ours for claim in STUDIES["5"].claims({"5": cart()})]
+    assert "between 9 and 90; 100 %" in ours[1]
+    assert "The lowest return is 167; 12 % of the episodes are below 250" in ours[3]
+
+
+@pytest.mark.parametrize(
+    ("change", "number", "expected"),
+    [
+        ({"expert": np.full(40, 400.0)}, 0, "does not agree"),
+        ({"novice": np.linspace(9, 98, 40)}, 1, "partly"),
+        ({"novice": np.linspace(9, 150, 40)}, 1, "does not agree"),
+        ({"unfiltered": np.where(np.arange(40) == 3, 500.0, 300.0)}, 2, "partly"),
+        ({"unfiltered": np.full(40, 499.0)}, 2, "does not agree"),
+        ({"unfiltered": np.where(np.arange(40) == 3, 300.0, 500.0)}, 3, "partly"),
+        ({"unfiltered": np.full(40, 500.0)}, 3, "does not agree"),
+        ({"unfiltered": np.where(np.arange(40) == 3, 80.0, 500.0)}, 4, "partly"),
+        ({"unfiltered": np.where(np.arange(40) == 3, 20.0, 500.0)}, 4, "does not agree"),
+        ({"unfiltered": np.where(np.arange(40) == 39, 80.0, 500.0)}, 5, "partly"),
+        ({"unfiltered": NOVICE[::-1].copy()}, 5, "does not agree"),
+        ({"filtered": np.full(40, 300.0)}, 6, "partly"),
+        ({"filtered": np.full(40, 200.0)}, 6, "does not agree"),
+    ],
+)
+def test_other_cart_poles(change: dict[str, np.ndarray], number: int, expected: Verdict) -> None:
+    assert verdicts("5", figure_5=cart(**change))[number] == expected
+
+
+def test_lunar_lander_as_the_paper_shows_it() -> None:
+    found = verdicts("6", figure_6=lander(), figure_5=cart())
+    assert found == ["agrees", "agrees", "agrees", "agrees", "agrees", "partly"]
+    # The comparison with CartPole needs its table.
+    assert len(verdicts("6", figure_6=lander())) == 5
+
+
+@pytest.mark.parametrize(
+    ("change", "number", "expected"),
+    [
+        ({"filtered": noisy(-190, 60)}, 0, "partly"),
+        ({"expert": noisy(-400, 5)}, 0, "partly"),
+        ({"unfiltered": noisy(-500, 5), "expert": noisy(-600, 5)}, 0, "does not agree"),
+        ({"filtered": noisy(80, 10)}, 1, "partly"),
+        ({"filtered": noisy(-170, 60)}, 1, "does not agree"),
+        ({"filtered": np.where(np.arange(40) == 3, 300.0, 100.0)}, 2, "partly"),
+        ({"filtered": noisy(-170, 60)}, 2, "does not agree"),
+        ({"unfiltered": np.full(40, 250.0)}, 3, "partly"),
+        ({"unfiltered": np.full(40, 250.0), "filtered": np.full(40, 9.0)}, 3, "does not agree"),
+        ({"unfiltered": noisy(-170, 60)}, 4, "does not agree"),
+        ({"unfiltered": noisy(268, 15)}, 5, "agrees"),
+        ({"unfiltered": noisy(0, 15)}, 5, "does not agree"),
+    ],
+)
+def test_other_landers(change: dict[str, np.ndarray], number: int, expected: Verdict) -> None:
+    found = verdicts("6", figure_6=lander(**change), figure_5=cart())
+    assert found[number] == expected
+
+
+def test_bipedal_walker_as_the_paper_shows_it() -> None:
+    assert verdicts("7", figure_7=walker()) == ["agrees"] * 6
+    ours = STUDIES["7"].claims({"7": walker()})[-1].ours
+    assert "divider 2 −10" in ours
+    assert "divider 3 6" in ours
+
+
+@pytest.mark.parametrize(
+    ("change", "number", "expected"),
+    [
+        ({"expert": noisy(280, 5)}, 0, "does not agree"),
+        ({"expert": np.append(noisy(280, 5, 39), 29.0)}, 0, "partly"),
+        ({"unfiltered": noisy(300, 5)}, 1, "does not agree"),
+        ({"unfiltered": noisy(-40, 5)}, 2, "partly"),
+        ({"unfiltered": noisy(190, 5)}, 2, "does not agree"),
+        ({"filtered": noisy(-40, 5)}, 3, "partly"),
+        ({"filtered": np.append(noisy(-105, 5, 39), 250.0)}, 4, "partly"),
+        ({"filtered": noisy(190, 5)}, 4, "does not agree"),
+        ({"finer": noisy(-103, 10)}, 5, "does not agree"),
+    ],
+)
+def test_other_walkers(change: dict[str, np.ndarray], number: int, expected: Verdict) -> None:
+    assert verdicts("7", figure_7=walker(**change))[number] == expected
+
+
+def test_the_table_holds_what_the_same_episodes_bring() -> None:
+    told = []
+    frame = STUDIES["5"].measure(SMALL, lambda done, total: told.append((done, total)))
+    assert tuple(sorted(frame.columns)) == tuple(sorted(STUDIES["5"].columns))
+    assert told[-1] == (12, 12)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    shield = Shield(named_rules("CartPole-v1")["filtered"])
+    own = rollout("CartPole-v1", "novice", shield=shield, episodes=3, seed=FIRST_SEED)
+    rows = frame[frame["arm"] == "filtered"]
+    assert rows["return"].tolist() == own.returns.tolist()
+    assert rows["interventions"].tolist() == own.interventions.tolist()
+    assert rows["rule_count"].tolist() == [5] * 3
+    expert = rollout("CartPole-v1", "expert", episodes=3, seed=FIRST_SEED, stochastic=True)
+    assert frame[frame["arm"] == "expert"]["return"].tolist() == expert.returns.tolist()
+    assert STUDIES["5"].settings(SMALL)["seeds"] == {"episodes": [FIRST_SEED, FIRST_SEED + 2]}
+
+
+def test_a_comparison_comes_back_out_of_the_table() -> None:
+    frame = walker()
+    assert dividers_of(frame) == (2, 3)
+    found = comparison_of(frame, 3)
+    assert [arm.name for arm in found.arms] == ["novice alone", "filtered", "unfiltered", "expert"]
+    assert found.episodes[2].returns == pytest.approx(noisy(60, 10))
+    assert found.episodes[0].returns == pytest.approx(noisy(-100, 10))
+    with pytest.raises(KeyError):
+        comparison_of(frame[frame["arm"] != "expert"], 3)
+
+
+def test_numbers_tell_dividers_apart() -> None:
+    numbers = STUDIES["7"].numbers(walker())
+    assert set(numbers) == {
+        "novice alone",
+        "expert",
+        *(f"{arm}, divider {k}" for arm in ("filtered", "unfiltered") for k in (2, 3)),
+    }
+    assert numbers["filtered, divider 2"]["rules"] == 6
+    assert numbers["filtered, divider 2"]["intervention_rate"] == 0.4
+    assert numbers["novice alone"]["crash_rate"] == 1.0
+    assert numbers["unfiltered, divider 3"]["mean"] == pytest.approx(noisy(60, 10).mean())
+
+
+def test_figures_are_in_the_papers_colours_and_parts_are_dividers() -> None:
+    study, frame = STUDIES["7"], walker()
+    assert study.parts(frame) == ("divider 2 (the paper's)", "divider 3")
+    returns, typical = study.draw(frame, "divider 3", False)
+    assert returns.share + typical.share == 1.0
+    lines = {line.name: line for line in returns.figure.data}
+    assert set(lines) == {"novice alone", "filtered", "unfiltered", "expert"}
+    assert np.asarray(lines["unfiltered"].y) == pytest.approx(noisy(60, 10))
+    colours = {name: line.marker.color for name, line in lines.items()}
+    assert len(set(colours.values())) == 4
+    other = study.draw(frame, "divider 2 (the paper's)", True)[0].figure
+    assert {line.name: line.marker.color for line in other.data} == colours
+    assert STUDIES["5"].parts(cart()) == ("all",)
