@@ -16,6 +16,8 @@ from sarl_core.errors import InputError
 
 MAX_DIVIDER = 100
 
+_ROUNDING = 1e-12  # of an interval's width
+
 
 @dataclass(frozen=True)
 class LabelledDimension:
@@ -67,6 +69,20 @@ class LabelledDimension:
     def inner_edges(self) -> tuple[float, ...]:
         """The edges between the intervals."""
         return self.edges[1:-1]
+
+    def centre(self, label: int) -> float:
+        """The middle of an interval.
+
+        Args:
+            label: Of a continuous dimension.
+
+        Returns:
+            Halfway between its edges.
+        """
+        low, high = self.edges[label], self.edges[label + 1]
+        centre = (low + high) / 2
+        # The edges around zero are rounded; their centre is zero all the same.
+        return 0.0 if abs(centre) < _ROUNDING * (high - low) else centre
 
     def label_of(self, value: float) -> int:
         """The label of one action.

@@ -266,7 +266,8 @@ class TreeStructure:
         threshold: A state goes left where ``x[feature] <= threshold``, (n,) float64.
         children_left: Node number of the left child, (n,) int64, `LEAF` at leaves.
         children_right: Node number of the right child, (n,) int64, `LEAF` at leaves.
-        label: What each node says, (n,) int64; None for the most frequent label.
+        label: What each node says, (n,) int64, -1 for the most frequent label; None for that
+            everywhere.
     """
 
     feature: NDArray[np.int64]
@@ -340,6 +341,7 @@ def count_tree(
         inner = level[left[level] != LEAF]
         counts[inner] = counts[left[inner]] + counts[right[inner]]
     samples = counts.sum(axis=1)
+    frequent = counts.argmax(axis=1).astype(np.int64)
     start = np.zeros(n, dtype=np.int64)
     for level in levels:
         inner = level[left[level] != LEAF]
@@ -368,7 +370,9 @@ def count_tree(
         sample_start=start,
         demonstrated=demonstrated,
         label=(
-            counts.argmax(axis=1).astype(np.int64) if structure.label is None else structure.label
+            frequent
+            if structure.label is None
+            else np.where(structure.label < 0, frequent, structure.label)
         ),
     )
 

@@ -8,37 +8,22 @@ others: they are tried one by one, in their order, before the tree is walked.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
 
-_NO_RULE = -1
 # States walked together: few enough for the processor's cache, enough to be worth a call.
 _BLOCK = 32_768
 # Levels they walk before those that have reached a leaf are taken out.
 _LEVELS = 4
 
-Numbered = tuple[int, Rule]
-
-
-class _Node(NamedTuple):
-    feature: int
-    threshold: float
-    left: int
-    right: int
-    rule: int
-
-
-_NOTHING = _Node(-1, 0.0, -1, -1, _NO_RULE)
-
 
 class Matcher:
     """The rules of one action dimension, arranged for finding the one that applies."""
 
-    def __init__(self, scanned: Sequence[Numbered], nodes: Sequence[_Node]) -> None:
+    def __init__(self, scanned: Sequence[Numbered], nodes: Sequence[RuleNode]) -> None:
         """Lay out the arrays.
 
         Args:
@@ -79,11 +64,11 @@ class Matcher:
         """
         manual = [entry for entry in rules if entry[1].origin == "manual"]
         mined = [entry for entry in rules if entry[1].origin == "mined"]
-        nodes = _tree_of(mined)
+        nodes = tree_of(mined)
         if nodes is not None:
             return cls(manual, nodes)
         # A file whose mined rules are not of one tree: what its order says, holds.
-        return cls([*manual, *mined], [_NOTHING])
+        return cls([*manual, *mined], [NOTHING])
 
     def match(self, state: list[float]) -> tuple[int | None, float]:
         """The rule that applies to one state.
@@ -132,7 +117,7 @@ class Matcher:
         Returns:
             Index in the rule set or -1, (B,), and the distances, (B,).
         """
-        rules = np.full(len(states), _NO_RULE, dtype=np.int64)
+        rules = np.full(len(states), NO_RULE, dtype=np.int64)
         margins = np.full(len(states), np.inf)
         for start in range(0, len(states), _BLOCK):
             block = slice(start, start + _BLOCK)
@@ -152,7 +137,7 @@ class Matcher:
                 margins[holding] = np.fmin(margins[holding], np.abs(gap))
                 holding = holding[(gap <= 0) == (op == "<=")]
             rules[holding] = index
-            left = left[rules[left] == _NO_RULE]
+            left = left[rules[left] == NO_RULE]
         return left
 
     def _walk(
@@ -178,38 +163,3 @@ class Matcher:
             margins[rows.take(done)] = near.take(done)
             rows, first = rows.take(going), first.take(going)
             nodes, near = nodes.take(going), near.take(going)
-
-
-def _tree_of(rules: Sequence[Numbered]) -> list[_Node] | None:
-    """Put rules that share the beginnings of their paths together again.
-
-    Args:
-        rules: Each with its index in the rule set.
-
-    Returns:
-        The nodes, root first; None if the rules are not those of one tree.
-    """
-    nodes = [_NOTHING]
-    # A stack and no recursion, because a tree may be deeper than Python's calls may go.
-    waiting = [(0, 0, list(rules))]
-    while waiting:
-        place, depth, group = waiting.pop()
-        if not group:
-            continue
-        if any(rule.length == depth for _, rule in group):
-            if len(group) > 1:
-                return None
-            nodes[place] = _NOTHING._replace(rule=group[0][0])
-            continue
-        feature, _, threshold = group[0][1].conditions[depth]
-        sides: dict[str, list[Numbered]] = {"<=": [], ">": []}
-        for entry in group:
-            condition = entry[1].conditions[depth]
-            if (condition.feature, condition.threshold) != (feature, threshold):
-                return None
-            sides[condition.op].append(entry)
-        left, right = len(nodes), len(nodes) + 1
-        nodes[place] = _Node(feature, threshold, left, right, _NO_RULE)
-        nodes += [_NOTHING, _NOTHING]
-        waiting += [(left, depth + 1, sides["<="]), (right, depth + 1, sides[">"])]
-    return nodes
