@@ -42,7 +42,7 @@ def find_study(name: str) -> Study:
     Raises:
         InputError: If there is none of this name.
     """
-    short = name.strip().lower().removeprefix("figure").removeprefix("fig.").strip(" _-")
+    short = name.strip().lower().removeprefix("figure").removeprefix("fig.")
     short = "-".join(short.replace("_", " ").split())
     if short in STUDIES:
         return STUDIES[short]

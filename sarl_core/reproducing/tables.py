@@ -43,7 +43,7 @@ def read_table(study: Study, path: Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        frame = pd.read_csv(path, float_precision="round_trip", keep_default_na=True)
+        frame = pd.read_csv(path)
         missing = [column for column in study.columns if column not in frame.columns]
         if missing:
             raise ValueError(f"it has no column {missing[0]!r}")
