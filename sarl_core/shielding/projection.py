@@ -14,8 +14,6 @@ from sarl_core.mining.rules import Rule, RuleSet
 
 Projection = Literal["centre", "clip", "expert"]
 
-_ROUNDING = 1e-12  # of an interval's width
-
 
 @dataclass(frozen=True)
 class Replacements:
@@ -94,9 +92,7 @@ def _of_rule(
     if projection == "clip":
         return np.nan, low, high
     if projection == "centre":
-        centre = (lower + upper) / 2
-        # The edges around zero are rounded; their centre is zero all the same.
-        return 0.0 if abs(centre) < _ROUNDING * (upper - lower) else centre, low, high
+        return dimension.centre(rule.action), low, high
     if rule.demonstrated_value is None:
         raise InputError(
             f"rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
