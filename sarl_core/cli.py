@@ -12,6 +12,7 @@ import typer
 
 from sarl_core.commandline import terminal
 from sarl_core.commandline.demonstration_commands import check, record
+from sarl_core.commandline.improvement_commands import aggregate
 from sarl_core.commandline.paper_commands import reproduce
 from sarl_core.commandline.rollout_commands import evaluate, render, train_expert
 from sarl_core.commandline.rule_commands import landscape, mine
@@ -25,7 +26,17 @@ app = typer.Typer(
 )
 
 # In the order of the work, which is the order of ``--help``.
-for command in (record, check, mine, landscape, evaluate, render, train_expert, reproduce):
+for command in (
+    record,
+    check,
+    mine,
+    landscape,
+    evaluate,
+    render,
+    aggregate,
+    train_expert,
+    reproduce,
+):
     app.command(command.__name__.replace("_", "-"))(command)
 
 

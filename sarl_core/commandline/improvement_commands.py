@@ -1,0 +1,219 @@
+"""The command that finds out where demonstrations are missing, and asks for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.commandline import terminal
+from sarl_core.commandline.inputs import read_demonstrations
+from sarl_core.commandline.options import (
+    AgentName,
+    Divider,
+    EnvOfFile,
+    File,
+    Json,
+    ProjectionName,
+    Seed,
+)
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.mining.rules import Thresholds
+    from sarl_core.rollouts.aggregation import Plan
+
+_NOBODY = "none"
+
+
+def aggregate(
+    context: typer.Context,
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="The rule file (.json) to write, its card beside it; with --expert none, the "
+            "states that need a demonstration (.csv).",
+        ),
+    ],
+    max_rules: Annotated[
+        int, typer.Option("--max-rules", help="Most rules of each action dimension.")
+    ] = 48,
+    env: EnvOfFile = None,
+    agent: AgentName = "novice",
+    expert: Annotated[
+        str,
+        typer.Option(
+            "--expert",
+            metavar="AGENT",
+            help="Who is asked: expert (the shipped one), the path of a trained policy, or none.",
+        ),
+    ] = "expert",
+    rounds: Annotated[
+        int, typer.Option("--rounds", help="How often the rules act and the expert answers.")
+    ] = 20,
+    episodes: Annotated[int, typer.Option("--episodes", help="Episodes a round.")] = 40,
+    support: Annotated[
+        float | None,
+        typer.Option(
+            "--support",
+            help="With --confidence: cut the trees at these thresholds.",
+            show_default="every leaf is a rule",
+        ),
+    ] = None,
+    confidence: Annotated[
+        float | None, typer.Option("--confidence", help="See --support.", show_default=False)
+    ] = None,
+    divider: Divider = 2,
+    projection: ProjectionName = "centre",
+    refine: Annotated[
+        int,
+        typer.Option(
+            "--refine",
+            help="Steps of moving thresholds and actions to where they achieve more; 0 for none.",
+        ),
+    ] = 0,
+    validation: Annotated[
+        int, typer.Option("--validation", help="Episodes by which the best is chosen.")
+    ] = 256,
+    seed: Seed = 0,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
+    as_json: Json = False,
+) -> None:
+    """Ask the expert where the rules lead, and mine few rules that do as much as possible.
+
+    Each round the rules shield the agent, the expert says what it would have done in the states
+    they lead to, and rules are mined again from all answers, at most so many for each action
+    dimension. The best round is found on episodes of its own and reported on others.
+
+    Example: `python -m sarl_core aggregate data/demonstrations/cartpole.parquet --max-rules 4
+    --rounds 5 --out compact.json`
+    """
+    nobody = expert == _NOBODY
+    terminal.check_output(out, (".csv",) if nobody else (".json",))
+    with terminal.working("Starting"):
+        from sarl_core.rollouts.aggregation import Plan
+
+        plan = Plan(
+            max_rules=max_rules,
+            rounds=rounds,
+            episodes=episodes,
+            thresholds=_thresholds(support, confidence),
+            divider=divider,
+            projection=projection,
+            generations=refine,
+            validation=validation,
+            seed=seed,
+        )
+        shown = read_demonstrations(file, env)
+    if nobody:
+        _gaps(shown, plan, env or shown.env_id, agent, out, jobs, as_json)
+        return
+    with terminal.working("Asking the expert") as advance:
+        from sarl_core.rollouts.aggregation import aggregate as run
+        from sarl_core.rollouts.aggregation_files import save_aggregation
+
+        found = run(
+            shown, plan, env_id=env, agent=agent, expert=expert, jobs=jobs, progress=advance
+        )
+    card = save_aggregation(found, out, command=_command(context))
+    if as_json:
+        terminal.print_json(card)
+        return
+    terminal.print_table(
+        ("Round", "Pairs", "Rules", "Mean return", "Coverage", "Expert disagrees"),
+        [
+            (
+                str(one.number),
+                f"{one.pairs:,}",
+                str(one.rules),
+                f"{one.mean_return:.1f}",
+                f"{one.coverage:.1%}",
+                f"{one.disagreement:.1%}",
+            )
+            for one in found.rounds
+        ],
+    )
+    reported = card["reported"]
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {card['rules']} rules of round {found.chosen}"
+            f"{', refined' if found.refined else ''}.",
+            f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
+            f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
+        ]
+    )
+
+
+def _thresholds(support: float | None, confidence: float | None) -> Thresholds | None:
+    from sarl_core.mining.rules import Thresholds
+
+    if support is None and confidence is None:
+        return None
+    if support is None or confidence is None:
+        raise InputError("--support and --confidence belong together; give both or neither")
+    return Thresholds(support, confidence)
+
+
+def _gaps(
+    shown: Demonstrations, plan: Plan, env_id: str, agent: str, out: Path, jobs: int, as_json: bool
+) -> None:
+    """Without an expert: which states need a demonstration."""
+    if plan.thresholds is None:
+        raise InputError(
+            "without thresholds every state is covered; give --support and --confidence"
+        )
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    with terminal.working("Looking for gaps") as advance:
+        from sarl_core.files import whole_file
+        from sarl_core.mining.rules import mine_rules
+        from sarl_core.rollouts.gaps import find_gaps
+
+        at = plan.thresholds
+        rules = mine_rules(shown, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
+        found = find_gaps(
+            env_id,
+            rules,
+            agent=agent,
+            episodes=plan.episodes,
+            seed=plan.seed,
+            projection=plan.projection,
+            jobs=jobs,
+            progress=advance,
+        )
+        with whole_file(out) as unfinished:
+            found.to_frame().to_csv(unfinished, index=False)
+    document: dict[str, Any] = {
+        "file": str(out),
+        "rules": len(rules),
+        "met": found.met,
+        "without_a_rule": len(found),
+        "share": found.share,
+    }
+    if as_json:
+        terminal.print_json(document)
+        return
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
+            f"({found.share:.1%}) have no rule and need a demonstration."
+        ]
+    )
+
+
+def _command(context: typer.Context) -> str:
+    """The command as it can be typed again, defaults left out."""
+    words = ["python -m sarl_core aggregate"]
+    for parameter in context.command.params:
+        value = context.params.get(parameter.name or "")
+        if parameter.name in ("as_json", "jobs") or value is None or value == parameter.default:
+            continue
+        option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
+        words += [*option, str(value)]
+    return " ".join(words)

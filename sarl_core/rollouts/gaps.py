@@ -1,0 +1,111 @@
+"""States that need a demonstration, where there is no expert to ask."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.progress import Progress
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Shield
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """States that a shielded agent met and for which the rules have no answer.
+
+    Attributes:
+        feature_names: Of the observations, d.
+        episode: Number of the episode, (K,) int64.
+        step: Within it, (K,) int64.
+        observations: The states, (K, d) float32.
+        missing: Action dimensions without a rule, (K, m) bool.
+        met: How many states were met in all.
+    """
+
+    feature_names: tuple[str, ...]
+    episode: NDArray[np.int64]
+    step: NDArray[np.int64]
+    observations: NDArray[np.float32]
+    missing: NDArray[np.bool_]
+    met: int
+
+    def __len__(self) -> int:
+        """Number of states K that need a demonstration."""
+        return len(self.episode)
+
+    @property
+    def share(self) -> float:
+        """Share of the met states that need a demonstration."""
+        return len(self) / self.met
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a state, with the columns of a demonstration file except the action."""
+        import pandas as pd
+
+        columns: dict[str, NDArray[np.generic]] = {"episode": self.episode, "step": self.step}
+        for name, column in zip(self.feature_names, self.observations.T, strict=True):
+            columns[f"obs_{name}"] = column
+        return pd.DataFrame(columns)
+
+
+def find_gaps(
+    env_id: str,
+    rules: RuleSet,
+    *,
+    agent: str | Agent = "novice",
+    episodes: int = 20,
+    seed: int = 0,
+    projection: Projection = "centre",
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Gaps:
+    """Run a shielded agent and collect the states in which some dimension has no rule.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        rules: The shield's.
+        agent: Who is shielded.
+        episodes: How many.
+        seed: Of the first.
+        projection: How the shield replaces a continuous action.
+        jobs: Processes.
+        progress: Called with (episodes done, in all); returning False stops.
+
+    Returns:
+        The states in the order they were met.
+
+    Raises:
+        InputError: If agent, rules and environment do not fit.
+        CancelledError: If `progress` returned False.
+    """
+    found = rollout(
+        env_id,
+        agent,
+        shield=Shield(rules, projection=projection),
+        episodes=episodes,
+        seed=seed,
+        jobs=jobs,
+        progress=progress,
+    )
+    table = found.steps
+    assert table is not None
+    missing = table.rules < 0
+    rows = np.flatnonzero(missing.any(axis=1))
+    return Gaps(
+        feature_names=tuple(feature.name for feature in rules.source.features),
+        episode=table.episode[rows],
+        step=table.step[rows],
+        observations=table.observation[rows],
+        missing=missing[rows],
+        met=len(table),
+    )
