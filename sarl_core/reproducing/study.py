@@ -42,7 +42,7 @@ class Effort:
 
 
 FULL = Effort(quick=False, learners=5, phases=100, test_steps=20_000, episodes=100)
-QUICK = Effort(quick=True, learners=2, phases=3, test_steps=2_000, episodes=4)
+QUICK = Effort(quick=True, learners=2, phases=3, test_steps=2_000, episodes=3)
 
 
 @dataclass(frozen=True)
