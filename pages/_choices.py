@@ -125,6 +125,21 @@ def _expert_digest(env_id: str, stamp: int) -> str:
     return digest_of(path.read_bytes()) if path is not None else ""
 
 
+def named_agent(choice: str, env_id: str) -> str:
+    """What tells an agent of a known name from others, by content.
+
+    Args:
+        choice: One of `AGENTS`, not a file.
+        env_id: Environment.
+    """
+    return f"{choice} {_expert_digest(env_id, _latest_expert()) if choice == 'expert' else ''}"
+
+
+def has_expert(env_id: str) -> bool:
+    """Whether an expert is shipped for an environment."""
+    return bool(_expert_digest(env_id, _latest_expert()))
+
+
 def agent_for(
     choice: str, uploaded: UploadedFile | None, env_id: str, seed: int
 ) -> tuple[Callable[[], Agent], str]:
@@ -134,8 +149,7 @@ def agent_for(
         InputError: If there is no such agent.
     """
     if choice != OWN_FILE:
-        told = _expert_digest(env_id, _latest_expert()) if choice == "expert" else ""
-        return lambda: make_agent(choice, env_id, seed=seed), told
+        return lambda: make_agent(choice, env_id, seed=seed), named_agent(choice, env_id)
     if uploaded is None:
         raise InputError("no policy has been uploaded; upload one, or choose another agent")
     content = uploaded.getvalue()

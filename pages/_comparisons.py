@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from threading import Lock
 
 import streamlit as st
+from _choices import digest_of
 from _jobs import Job
 
 from sarl_core.errors import SarlError
@@ -44,6 +45,22 @@ class Row:
     seed: int
     agent: Callable[[], Agent]
     shield: Callable[[], Shield | None]
+
+
+def row_key(env_id: str, agent: str, rules: str, projection: str, seed: int) -> str:
+    """Digest of what episodes depend on.
+
+    Args:
+        env_id: Environment.
+        agent: Tells the agent from all others, by content.
+        rules: Tells the rules, "" for none.
+        projection: How they replace a continuous action; "centre" where there are none.
+        seed: Of the first episode.
+
+    Returns:
+        Hexadecimal digits.
+    """
+    return digest_of(repr((env_id, agent, rules, projection, seed)).encode())
 
 
 class Results:

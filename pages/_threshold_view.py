@@ -19,7 +19,7 @@ from sarl_core.mining.tree import PolicyTree
 
 Grown = tuple[PolicyTree, ...]
 MAPS, SURFACES = "Maps", "3-D"
-LARGEST, TRADE_OFFS = "Largest rules", "Best trade-offs"
+LARGEST, TRADE_OFFS, DIVIDER = "Largest rules", "Best trade-offs", "Divider"
 TABLE_ROWS = 50
 BARE = {"displayModeBar": False, "scrollZoom": False}
 MARK_RADIUS = 9

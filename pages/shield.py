@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
 
 import _state as state
 import streamlit as st
@@ -23,11 +22,11 @@ from _choices import (
     agent_for,
     compact_file,
     continuous,
-    digest_of,
     environment_of,
     rules_for,
 )
-from _comparisons import Comparing, Row, results
+from _comparisons import Row, row_key
+from _run_bar import known, run_bar, working
 from _shield_view import Line, show
 from _words import in_full
 from streamlit.runtime.uploaded_file_manager import UploadedFile
@@ -35,7 +34,6 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.comparison_figures import arm_style
-from sarl_core.explaining.language import counted
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.comparison import Arm
@@ -47,7 +45,7 @@ AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
 RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE)
 MOST_EPISODES = 1_000
 FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
-JOB = "_comparing"
+PLACE = "comparison"
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +183,7 @@ def pilots(choices: Choices, env_id: str) -> list[Pilot]:
         place = AGENT_PLACES.index(choice)
         if choice != OWN_FILE:
             make, digest = agent_for(choice, None, env_id, choices.seed)
-            found.append(Pilot(choice, place, make, f"{choice} {digest}"))
+            found.append(Pilot(choice, place, make, digest))
         for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
             make, digest = agent_for(choice, file, env_id, choices.seed)
             name = file.name.rsplit(".", 1)[0]
@@ -228,81 +226,18 @@ def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
     name = f"{pilot.name}, {guard.name}"
-    told = (env_id, pilot.digest, guard.digest, projection, choices.seed)
+    key = row_key(env_id, pilot.digest, guard.digest, projection, choices.seed)
 
     def shield() -> Shield | None:
         return None if guard.rules is None else Shield(guard.rules, projection=projection)
 
     return Line(
-        Row(digest_of(repr(told).encode()), name, env_id, choices.seed, pilot.make, shield),
+        Row(key, name, env_id, choices.seed, pilot.make, shield),
         Arm(name, pilot.name, guard.rules, projection),
         arm_style(pilot.place, guard.place),
         pilot.name,
         guard.name,
     )
-
-
-# --- running -----------------------------------------------------------------------------------
-
-
-def job_now() -> Comparing | None:
-    """The work that this visitor asked for last."""
-    return cast("Comparing | None", st.session_state.get(JOB))
-
-
-def working() -> bool:
-    """Whether it goes on."""
-    job = job_now()
-    return job is not None and job.running
-
-
-def start(lines: list[Line], episodes: int) -> None:
-    """Run what is missing; for a callback."""
-    st.session_state[JOB] = Comparing([line.row for line in lines], episodes)
-
-
-def run_or_cancel(lines: list[Line], missing: list[Line], episodes: int) -> None:
-    """The button, and how far the work is."""
-    job = job_now()
-    if job is not None and job.running:
-        with st.container(horizontal=True, vertical_alignment="center"):
-            st.progress(job.share, job.text)
-            st.button("Cancel", icon=":material/close:", on_click=job.cancel, key="cancel")
-        return
-    with st.container(horizontal=True, vertical_alignment="center"):
-        st.button(
-            "Run",
-            type="primary",
-            icon=":material/play_arrow:",
-            key="run",
-            on_click=start,
-            args=(lines, episodes),
-            disabled=not missing,
-        )
-        rows = f"{len(lines)} combinations" if len(lines) > 1 else "1 combination"
-        ready = len(lines) - len(missing)
-        st.caption(
-            f"{counted(episodes, 'episode')} for each of {rows}"
-            + (f"; {'all' if not missing else ready} of them are here already." if ready else "."),
-            width="content",
-        )
-
-
-def say_what_came_of_it(lines: list[Line]) -> None:
-    """What the last work has to say besides its numbers."""
-    job = job_now()
-    if job is None or job.running:
-        return
-    keys = {line.row.key for line in lines}
-    for sentence in sorted({str(e) for key, e in job.problems.items() if key in keys}):
-        st.error(in_full(sentence), icon=":material/error:")
-    if job.error is not None:
-        st.error(in_full(str(job.error)), icon=":material/error:")
-    if job.cancelled:
-        st.info(
-            "Cancelled. What had been finished is kept; Run goes on from there.",
-            icon=":material/pause_circle:",
-        )
 
 
 # --- the page ----------------------------------------------------------------------------------
@@ -342,24 +277,19 @@ if seen_before(chosen, environment):
         f"first seed such as {FRESH_SEED:,} shows what they bring elsewhere.",
         icon=":material/casino:",
     )
-at_work = working()
+at_work = working(PLACE)
 
 
 @st.fragment(run_every=1.0 if at_work else None)
 def outcome() -> None:
     """The button or the progress, and all that is known so far."""
-    if at_work != working():
+    if at_work != working(PLACE):
         st.rerun()  # as a whole: from now on every second, or no longer
-    known = [results().get(line.row.key, chosen.episodes) for line in wanted]
-    missing = [
-        line
-        for line, found in zip(wanted, known, strict=True)
-        if found is None or len(found) < chosen.episodes
-    ]
-    run_or_cancel(wanted, missing, chosen.episodes)
-    say_what_came_of_it(wanted)
+    rows = [each.row for each in wanted]
+    run_bar(PLACE, rows, chosen.episodes)
+    found = zip(wanted, known(rows, chosen.episodes), strict=True)
     show(
-        [(line, found) for line, found in zip(wanted, known, strict=True) if found is not None],
+        [(each, episodes) for each, episodes in found if episodes is not None],
         environment,
         chosen.seed,
         at_work=at_work,

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import _state as state
 import streamlit as st
+from _divider_view import show_divider
 from _threshold_view import (
+    DIVIDER,
     LARGEST,
     MAPS,
     SURFACES,
@@ -291,13 +293,17 @@ if view == SURFACES:
     show_surfaces(grown, landscape, LAYERS[shown], dimension)
 else:
     show_maps(grown, landscape, LAYERS[shown])
-largest, trade_offs = st.tabs(
-    [LARGEST, TRADE_OFFS], key="details", on_change="rerun", bind="query-params"
+offered = [LARGEST, TRADE_OFFS] if demonstrations.is_discrete else [LARGEST, TRADE_OFFS, DIVIDER]
+largest, trade_offs, *divider = st.tabs(
+    offered, key="details", on_change="rerun", bind="query-params"
 )
 table = None
 if trade_offs.open:
     with trade_offs:
         show_trade_offs(grown, dimension)
+elif divider and divider[0].open:
+    with divider[0]:
+        show_divider(demonstrations, dimension)
 else:
     table = largest.empty()
 with top:

@@ -23,7 +23,7 @@ def finished(app: AppTest) -> AppTest:
     """Look in until the work is done, as the browser does every second."""
     for _ in range(600):
         assert not app.exception, app.exception
-        if "cancel" not in [button.key for button in app.button]:
+        if "cancel_comparison" not in [button.key for button in app.button]:
             return app
         time.sleep(0.1)
         app.run()
@@ -31,7 +31,7 @@ def finished(app: AppTest) -> AppTest:
 
 
 def run(app: AppTest) -> AppTest:
-    app.button(key="run").click().run()
+    app.button(key="run_comparison").click().run()
     return finished(app)
 
 
@@ -47,7 +47,7 @@ def test_before_a_run_the_page_says_what_to_do() -> None:
     app = open_page("shield", data="cartpole", first_seed="1000")
     assert "press Run" in texts(app)
     assert not rows(app)
-    assert not app.button(key="run").disabled
+    assert not app.button(key="run_comparison").disabled
 
 
 def test_every_agent_with_every_shield_is_what_the_library_gives() -> None:
@@ -85,11 +85,11 @@ def test_who_asks_again_has_it_at_once_and_more_goes_on_from_there() -> None:
     first = rows(run(open_page("shield", episodes="9", **query)))["novice, no shield"]
     again = open_page("shield", episodes="9", **query)
     assert rows(again)["novice, no shield"] == first
-    assert again.button(key="run").disabled
-    assert "all of them are here already" in texts(again)
+    assert again.button(key="run_comparison").disabled
+    assert "all done already" in texts(again)
     fewer = open_page("shield", episodes="4", **query)
     assert rows(fewer)["novice, no shield"]["Episodes"] == 4
-    assert fewer.button(key="run").disabled
+    assert fewer.button(key="run_comparison").disabled
     more = open_page("shield", episodes="12", **query)
     assert rows(more)["novice, no shield"]["Episodes"] == 9
     assert rows(run(more))["novice, no shield"]["Episodes"] == 12
@@ -101,24 +101,24 @@ def test_what_was_finished_before_a_cancel_stays_readable() -> None:
     # Enough work for minutes, on any machine.
     query = {"data": "bipedal_walker", "episodes": "1000", "agents": "novice"}
     app = open_page("shield", shields="no shield", **query)
-    app.button(key="run").click().run()
+    app.button(key="run_comparison").click().run()
     for _ in range(600):
         if rows(app):
             break
         time.sleep(0.1)
         app.run()
-    app.button(key="cancel").click().run()
+    app.button(key="cancel_comparison").click().run()
     assert not app.exception
     assert "Cancelled" in texts(app)
     assert 0 < rows(app)["novice, no shield"]["Episodes"] < 1000
-    assert not app.button(key="run").disabled
+    assert not app.button(key="run_comparison").disabled
     other = open_page("shield", shields="no shield", **query)
     assert rows(other)["novice, no shield"]["Episodes"] > 0
 
 
 def test_the_work_goes_on_while_other_pages_are_looked_at() -> None:
     app = open_page("shield", data="cartpole", episodes="30", first_seed="4000")
-    app.button(key="run").click().run()
+    app.button(key="run_comparison").click().run()
     app.switch_page("rules.py").run()
     assert not app.exception
     app.switch_page("shield.py").run()

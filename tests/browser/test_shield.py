@@ -16,7 +16,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     visit(screen, "/shield?data=cartpole&episodes=4&first_seed=8000", "Shield")
     expect(screen.get_by_text("press Run")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_text("all of them are here already")).to_be_visible()
+    expect(screen.get_by_text("all done already")).to_be_visible()
     settle(screen)
     expect(screen.get_by_text("the typical return of the novice rises")).to_be_visible()
     assert screen.locator(".js-plotly-plot").count() == 2
