@@ -40,6 +40,17 @@ class ShieldedVecEnv(VecEnvWrapper):
         self._episodes = np.full(self.num_envs, -1)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
 
+    @property
+    def decision(self) -> BatchDecision:
+        """What the shield made of the latest actions.
+
+        Raises:
+            ValueError: If there were none yet.
+        """
+        if self._decision is None:
+            raise ValueError("no action has been taken yet")
+        return self._decision
+
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed the next reset, from which the episodes in the records are counted."""
         self._episodes[:] = -1
@@ -55,14 +66,13 @@ class ShieldedVecEnv(VecEnvWrapper):
 
     def step_async(self, actions: np.ndarray[Any, Any]) -> None:
         """Check the actions and hand on what the shield makes of them."""
-        self._decision = self.shield.decide_batch(self._states, actions)
+        self._decision = self._decide(actions)
         self.venv.step_async(self._decision.executed)
 
     def step_wait(self) -> VecEnvStepReturn:
         """Wait for the environments and record the step in each."""
         observations, rewards, dones, infos = self.venv.step_wait()
-        decision = self._decision
-        assert decision is not None
+        decision = self.decision
         for i, info in enumerate(infos):
             info["shield"] = StepRecord(
                 int(self._episodes[i]),
@@ -80,6 +90,10 @@ class ShieldedVecEnv(VecEnvWrapper):
         self._steps = np.where(dones, 0, self._steps + 1)
         self._episodes += dones
         return observations, rewards, dones, infos
+
+    def _decide(self, actions: np.ndarray[Any, Any]) -> BatchDecision:
+        """The shield's decision, one action an environment; a subclass may leave some alone."""
+        return self.shield.decide_batch(self._states, actions)
 
     def _remember(self, observations: Any) -> None:
         space = self.venv.observation_space

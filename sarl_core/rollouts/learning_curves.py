@@ -1,0 +1,211 @@
+"""What happened while learning, episode by episode, and how good the learner was afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError
+
+_KINDS: dict[str, type] = {
+    "ends": np.int64,
+    "returns": np.float64,
+    "lengths": np.int64,
+    "crashed": np.bool_,
+    "interventions": np.int64,
+    "covered": np.int64,
+    "shielded": np.bool_,
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LearningCurve:
+    """E episodes that ended while learning, in the order in which they did; read-only.
+
+    Attributes:
+        ends: Environment steps, over all environments side by side, at which each ended, (E,).
+        returns: Sum of the environment's rewards, without any penalty, (E,).
+        lengths: Steps, (E,).
+        crashed: Whether it ended by failure, (E,).
+        interventions: Steps at which the rules changed what the learner had wanted, (E,).
+        covered: Steps at which a rule applied and was in force, (E,).
+        shielded: Whether the rules were in force, (E,).
+    """
+
+    ends: NDArray[np.int64]
+    returns: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    crashed: NDArray[np.bool_]
+    interventions: NDArray[np.int64]
+    covered: NDArray[np.int64]
+    shielded: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for column in fields(self):
+            getattr(self, column.name).flags.writeable = False
+
+    def __len__(self) -> int:
+        """Number of episodes E."""
+        return len(self.ends)
+
+    def __repr__(self) -> str:
+        """As `LearningCurve(episodes=412, steps=119936, crashes=130)`."""
+        steps = int(self.ends[-1]) if len(self) else 0
+        return f"LearningCurve(episodes={len(self)}, steps={steps}, crashes={self.crashes})"
+
+    @property
+    def crashes(self) -> int:
+        """Episodes that ended by failure."""
+        return int(self.crashed.sum())
+
+    @property
+    def intervention_rate(self) -> float:
+        """Share of the steps at which the rules changed the action; NaN without episodes."""
+        return _ratio(self.interventions.sum(), self.lengths.sum())
+
+    def crashes_at(self, steps: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Crashes so far.
+
+        Args:
+            steps: Environment steps, (k,).
+
+        Returns:
+            Crashes up to and with each, (k,).
+        """
+        so_far = np.concatenate([[0], np.cumsum(self.crashed)])
+        return np.asarray(so_far[np.searchsorted(self.ends, steps, side="right")])
+
+    def binned(self, edges: NDArray[np.int64]) -> Bins:
+        """Mean return and intervention rate of the episodes that ended between two edges.
+
+        Args:
+            edges: Ascending, (k + 1,); an episode belongs to the bin with low < end <= high.
+
+        Returns:
+            k bins; NaN where no episode ended.
+        """
+        place = np.searchsorted(edges, self.ends, side="left") - 1
+        inside = (place >= 0) & (place < len(edges) - 1)
+
+        def total(values: NDArray[Any]) -> NDArray[np.float64]:
+            return np.bincount(
+                place[inside], weights=values[inside], minlength=len(edges) - 1
+            ).astype(np.float64)
+
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return Bins(
+                total(self.returns) / total(np.ones(len(self))),
+                total(self.interventions) / total(self.lengths),
+            )
+
+    def to_dict(self) -> dict[str, list[Any]]:
+        """Its columns, ready for JSON."""
+        return {name: getattr(self, name).tolist() for name in _KINDS}
+
+    @classmethod
+    def from_dict(cls, columns: Mapping[str, Any]) -> LearningCurve:
+        """Read what `to_dict` wrote.
+
+        Args:
+            columns: One list a column.
+
+        Returns:
+            The curve.
+
+        Raises:
+            InputError: If a column is missing, is not numbers, or has another length.
+        """
+        try:
+            arrays: dict[str, NDArray[Any]] = {
+                name: np.array(columns[name], dtype=kind) for name, kind in _KINDS.items()
+            }
+            lengths = {array.shape for array in arrays.values()}
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"a learning curve lacks a column or a number ({error})") from error
+        if len(lengths) > 1 or arrays["ends"].ndim != 1:
+            raise InputError("the columns of a learning curve are not equally long")
+        return cls(**arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """A learning curve in k bins of steps.
+
+    Attributes:
+        returns: Mean return of the episodes that ended in each, (k,).
+        interventions: Share of their steps that the rules changed, (k,).
+    """
+
+    returns: NDArray[np.float64]
+    interventions: NDArray[np.float64]
+
+
+NO_EPISODES = LearningCurve.from_dict({name: [] for name in _KINDS})
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Episodes after learning, with the learned policy acting as it thinks best.
+
+    Attributes:
+        returns: One an episode.
+        crashes: Episodes that ended by failure.
+        intervention_rate: Share of the steps that the rules changed; 0 without a shield.
+        coverage: Share of the steps to which a rule applied; 0 without a shield.
+    """
+
+    returns: tuple[float, ...]
+    crashes: int
+    intervention_rate: float
+    coverage: float
+
+    @property
+    def mean(self) -> float:
+        """Mean return."""
+        return float(np.mean(self.returns))
+
+    @property
+    def crash_rate(self) -> float:
+        """Share of the episodes that ended by failure."""
+        return self.crashes / len(self.returns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its fields, ready for JSON."""
+        return {
+            "returns": list(self.returns),
+            "crashes": self.crashes,
+            "intervention_rate": self.intervention_rate,
+            "coverage": self.coverage,
+        }
+
+    @classmethod
+    def from_dict(cls, entry: Mapping[str, Any]) -> Trial:
+        """Read what `to_dict` wrote.
+
+        Args:
+            entry: Its fields.
+
+        Returns:
+            The trial.
+
+        Raises:
+            InputError: If a field is missing or no number.
+        """
+        try:
+            return cls(
+                returns=tuple(float(value) for value in entry["returns"]),
+                crashes=int(entry["crashes"]),
+                intervention_rate=float(entry["intervention_rate"]),
+                coverage=float(entry["coverage"]),
+            )
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"a trial after learning lacks a number ({error})") from error
+
+
+def _ratio(part: Any, whole: Any) -> float:
+    return float(part) / float(whole) if whole else float("nan")
