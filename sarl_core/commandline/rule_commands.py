@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -15,26 +15,11 @@ from sarl_core.commandline.options import (
     File,
     Json,
 )
+from sarl_core.errors import InputError
 
 
 def mine(
     file: File,
-    support: Annotated[
-        float,
-        typer.Option(
-            "--support",
-            show_default=False,
-            help="Minimum share of the states a rule applies to.",
-        ),
-    ],
-    confidence: Annotated[
-        float,
-        typer.Option(
-            "--confidence",
-            show_default=False,
-            help="Minimum share of those in which the expert did what the rule says.",
-        ),
-    ],
     out: Annotated[
         Path,
         typer.Option(
@@ -44,6 +29,30 @@ def mine(
             help="The rule file to write.",
         ),
     ],
+    support: Annotated[
+        float | None,
+        typer.Option(
+            "--support",
+            show_default=False,
+            help="Minimum share of the states a rule applies to.",
+        ),
+    ] = None,
+    confidence: Annotated[
+        float | None,
+        typer.Option(
+            "--confidence",
+            show_default=False,
+            help="Minimum share of those in which the expert did what the rule says.",
+        ),
+    ] = None,
+    setting: Annotated[
+        Literal["filtered", "unfiltered"] | None,
+        typer.Option(
+            "--setting",
+            show_default=False,
+            help="The paper's two pairs of both: filtered is 0.005 and 0.95, unfiltered 0 and 1.",
+        ),
+    ] = None,
     env: EnvOfFile = None,
     lift: Annotated[float, typer.Option("--lift", help="Minimum lift.")] = 0.0,
     divider: Divider = 2,
@@ -64,14 +73,20 @@ def mine(
     --confidence 0.95 --out rules.json`
     """
     terminal.check_output(out, (".json",))
+    given = [value is not None for value in (support, confidence, setting)]
+    if given not in ([True, True, False], [False, False, True]):
+        raise InputError("give both --support and --confidence, or --setting instead of them")
     with terminal.working("Mining"):
-        from sarl_core.mining.rules import Thresholds, mine_rules
+        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds, mine_rules
 
-        Thresholds(support, confidence, lift, max_depth)  # refuse them before the file is read
+        pair = (support or 0.0, confidence or 0.0)
+        if setting is not None:
+            pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
+        Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
         rule_set = mine_rules(
             read_demonstrations(file, env),
-            supp_min=support,
-            conf_min=confidence,
+            supp_min=pair[0],
+            conf_min=pair[1],
             lift_min=lift,
             max_depth=max_depth,
             divider=divider,

@@ -18,7 +18,16 @@ ROOT = Path(__file__).resolve().parents[2]
 LANDER = str(ROOT / "data" / "demonstrations" / "lunar_lander.parquet")
 CART = str(ROOT / "data" / "demonstrations" / "cartpole.parquet")
 PENDULUM = str(ROOT / "data" / "demonstrations" / "pendulum.parquet")
-COMMANDS = ("record", "check", "mine", "landscape", "evaluate", "render", "train-expert")
+COMMANDS = (
+    "record",
+    "check",
+    "mine",
+    "landscape",
+    "evaluate",
+    "render",
+    "train-expert",
+    "reproduce",
+)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -49,6 +58,17 @@ def test_check_as_json_agrees_with_the_data(run):
     assert sum(label["share"] for label in document["actions"][0]["labels"]) == pytest.approx(1)
     lowest = demonstrations.observations.min(axis=0)
     assert [feature["min"] for feature in document["features"]] == lowest.tolist()
+
+
+@pytest.mark.parametrize(
+    ("setting", "support", "confidence"), [("filtered", 0.005, 0.95), ("unfiltered", 0, 1)]
+)
+def test_the_papers_two_settings_have_names(setting, support, confidence, run, tmp_path):
+    named, numbered = tmp_path / "named.json", tmp_path / "numbered.json"
+    run("mine", CART, "--setting", setting, "--out", named)
+    run("mine", CART, "--support", support, "--confidence", confidence, "--out", numbered)
+    assert named.read_bytes() == numbered.read_bytes()
+    assert RuleSet.load(named).thresholds.confidence == confidence
 
 
 def test_check_of_continuous_actions_gives_their_bounds(run):
