@@ -55,6 +55,12 @@ PAGES = [
         icon=":material/shield:",
         help="What a shield is worth: agents with the rules and without, over many episodes.",
     ),
+    st.Page(
+        "paper.py",
+        title="Paper",
+        icon=":material/article:",
+        help="The figures and claims of the paper behind the method, made again.",
+    ),
 ]
 # Who knows the other addresses guesses this one.
 GUESSED = st.Page(

@@ -1,0 +1,34 @@
+"""The page Paper in a browser: claims, a figure, one of its parts, and a page to take along."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.walking import no_trace, parameters, settle, visit
+
+
+def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> None:
+    visit(screen, "/paper", "Paper")
+    expect(screen.get_by_text("claims of the paper, our numbers agree with")).to_be_visible()
+    screen.get_by_role("radio", name="Figure 2", exact=True).click()
+    expect(screen.get_by_role("heading", name="Figure 2. Number of rules")).to_be_visible()
+    settle(screen)
+    expect(screen.locator(".js-plotly-plot")).to_have_count(2)
+    screen.get_by_role("radio", name="Bipedal Walker", exact=True).click()
+    expect(screen.get_by_text("Number of rules, Bipedal Walker", exact=True)).to_be_visible()
+    settle(screen)
+    assert parameters(screen)["figure"] == "Figure 2"
+    assert parameters(screen)["part_2"] == "Bipedal Walker"
+    no_trace(screen)
+    with screen.expect_download() as started:
+        screen.get_by_role("button", name="Page (HTML)").click()
+    path = tmp_path / "figure_2.html"
+    started.value.save_as(path)
+    # It needs nothing beside it, and no network.
+    screen.context.set_offline(True)
+    screen.goto(path.as_uri())
+    expect(screen.get_by_role("heading", name="Figure 2. Number of rules")).to_be_visible()
+    expect(screen.locator(".js-plotly-plot .main-svg").first).to_be_visible()
+    assert screen.locator(".js-plotly-plot").count() >= 8
