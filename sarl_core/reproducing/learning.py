@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.rules import FILTERED
 from sarl_core.reproducing.shipped import environment_name, named_rules
-from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge
+from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge, percent
 from sarl_core.rollouts.progress import Progress
 from sarl_core.rollouts.relevance import (
     PAPER_LEARNING,
@@ -133,6 +133,9 @@ def _fewer_violations(found: Relevance) -> Claim:
                 f", after as little as {share_text(_mean(least))} at about {steps:,} steps"
                 if again[number]
                 else ""
+                if falls[number].high < 0
+                else f" (the change lies between {percent(falls[number].low)} and "
+                f"{percent(falls[number].high)}, so it may be none)"
             )
         )
     fall = [interval.high < 0 for interval in falls]

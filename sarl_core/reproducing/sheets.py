@@ -33,6 +33,10 @@ th, td { text-align: left; vertical-align: top; padding: 8px 14px 8px 0;
 td.verdict { white-space: nowrap; font-weight: 600; }
 small { color: #51606c; display: block; }
 code { overflow-wrap: anywhere; }
+@media (max-width: 700px) {
+  thead { display: none; } tr { display: block; padding: 10px 0; border-bottom: 1px solid #d5dde3; }
+  td { display: block; border: none; padding: 3px 0; }
+}
 """
 _COLOURS = {"agrees": "#00694b", "partly": "#8a5a00", "does not agree": "#a83f00"}
 

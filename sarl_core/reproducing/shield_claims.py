@@ -130,8 +130,8 @@ def _as_the_expert_in_parts(returns: Returns, name: str, where: str) -> Claim:
     return Claim(
         paper=said,
         where=where,
-        ours=f"{share_text(share)} of its episodes reach {number(level)}, which three of four of "
-        "the expert's do.",
+        ours=f"{share_text(share)} of its episodes reach {number(level)}, as three quarters of the "
+        "expert's do.",
         verdict=judge(share >= OFTEN, share > 0),
         decided_by=f"Agrees if {percent(OFTEN)} of the episodes reach the expert's lower quartile, "
         "partly if one does.",

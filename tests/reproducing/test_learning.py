@@ -65,6 +65,7 @@ def test_learners_far_apart_leave_a_doubt() -> None:
         frame.loc[own, "broken"] = values.round().astype(np.int64).to_numpy()
     frame["kept"] = frame["applied"] - frame["broken"]
     assert verdicts(frame)[0] == "partly"
+    assert "so it may be none" in LEARNING.claims({"4": frame})[0].ours
 
 
 def test_rules_that_leave_states_out_are_noticed() -> None:
