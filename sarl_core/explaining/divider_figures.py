@@ -17,6 +17,8 @@ from sarl_core.rollouts.divider_study import DividerStudy
 from sarl_core.rollouts.episodes import Episodes
 
 _ROW_HEIGHT = 38
+_DARK_INK, _LIGHT_INK = "#0e161b", "#ffffff"
+_DARKENING = 0.7  # place on the scale from which on its shades are too dark for dark ink
 _LEAST_LABELLED = 0.1  # share of the range below which a percentage finds no room
 
 
@@ -49,6 +51,9 @@ def occupancy_figure(divided: Sequence[Quantisation], *, dark: bool = False) -> 
             textposition="inside",
             insidetextanchor="middle",
             textangle=0,
+            insidetextfont={
+                "color": [_ink(share / highest, dark=dark) for share in each.occupancy.tolist()]
+            },
             constraintext="none",
             cliponaxis=False,
             marker={
@@ -127,7 +132,7 @@ def error_figure(
             texts.append([share_text(share) for share in shares])
     columns = [_intervals(each.divider) for each in quantisations[0]]
     figure = _cells(columns, rows, values, texts, dark=dark, least=0.0)
-    figure.update_traces(hovertemplate="%{y}, %{x}: %{text} of the range<extra></extra>")
+    figure.data[0].hovertemplate = "%{y}, %{x}: %{text} of the range<extra></extra>"
     return figure
 
 
@@ -165,10 +170,9 @@ def snapped_figure(
         )
     columns = [_intervals(divider) for divider in dividers]
     figure = _cells(columns, list(projections), values, texts, dark=dark, row_height=58)
-    figure.update_traces(
-        hovertemplate="%{y}, %{x}<br>typical return and its 95 % interval: %{text}<extra></extra>",
-        hoverongaps=False,
-    )
+    figure.data[
+        0
+    ].hovertemplate = "%{y}, %{x}<br>typical return and its 95 % interval: %{text}<extra></extra>"
     return figure
 
 
@@ -198,17 +202,33 @@ def _cells(
     row_height: int = _ROW_HEIGHT,
 ) -> go.Figure:
     figure = go.Figure()
+    known = [value for row in values for value in row if value is not None]
+    low = min(known, default=0.0) if least is None else least
+    span = (max(known, default=1.0) - low) or 1.0
     figure.add_heatmap(
         x=list(columns),
         y=list(rows),
         z=[list(row) for row in values],
-        zmin=least,
+        zmin=low,
+        zmax=low + span,
         text=[list(row) for row in texts],
-        texttemplate="%{text}",
         colorscale=layer_scale(dark=dark),
         showscale=False,
+        hoverongaps=False,
         xgap=2,
         ygap=2,
+    )
+    # Words of a heatmap have one colour for all; on the shades between they need their own.
+    places = [(x, y) for y in range(len(rows)) for x in range(len(columns))]
+    figure.add_scatter(
+        x=[columns[x] for x, _ in places],
+        y=[rows[y] for _, y in places],
+        mode="text",
+        text=[texts[y][x] for x, y in places],
+        textfont={
+            "color": [_ink(((values[y][x] or 0.0) - low) / span, dark=dark) for x, y in places]
+        },
+        hoverinfo="skip",
     )
     figure.update_layout(**_layout(44 + row_height * len(rows)))
     figure.update_xaxes(side="bottom", fixedrange=True, showgrid=False, zeroline=False)
@@ -220,6 +240,12 @@ def _cells(
         ticklabelstandoff=4,
     )
     return figure
+
+
+def _ink(place: float, *, dark: bool) -> str:
+    """What is legible on a shade, by its place on the scale."""
+    shade = 1.0 - place if dark else place
+    return _LIGHT_INK if shade > _DARKENING else _DARK_INK
 
 
 def _intervals(divider: int) -> str:

@@ -42,3 +42,16 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
         3
     )
     no_trace(screen)
+
+
+def test_the_divider_is_studied(screen: Page) -> None:
+    visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=2", "Thresholds")
+    expect(screen.get_by_text("How far an action moves")).to_be_visible()
+    screen.get_by_role("button", name="Run", exact=True).click()
+    expect(screen.get_by_text("all done already")).to_be_visible()
+    expect(screen.get_by_text("that row is the expert as it is")).to_be_visible()
+    settle(screen)
+    returns = screen.locator(".js-plotly-plot").filter(has_text="clip")
+    expect(returns.locator(".textpoint")).to_have_count(12)
+    assert parameters(screen)["details"] == "Divider"
+    no_trace(screen)

@@ -63,7 +63,7 @@ def test_a_box_is_an_interval_and_what_was_never_shown_is_hatched(
 
 
 def test_errors_fall_with_the_divider(two: tuple[tuple[Quantisation, ...], ...]) -> None:
-    (cells,) = error_figure(two).data
+    cells, _ = error_figure(two).data
     assert list(cells.x) == ["2 intervals", "4 intervals"]
     assert [name.split(",")[1] for name in cells.y] == [" centre", " expert"] * 2
     assert cells.z[0][0] == two[0][0].share_of_width("centre")
@@ -71,7 +71,7 @@ def test_errors_fall_with_the_divider(two: tuple[tuple[Quantisation, ...], ...])
 
 
 def test_every_cell_holds_the_typical_return_and_its_interval(study: DividerStudy) -> None:
-    (cells,) = study_figure(study).data
+    cells, _ = study_figure(study).data
     assert list(cells.y) == ["centre", "clip", "expert"]
     assert list(cells.x) == ["2 intervals", "5 intervals"]
     for row, snapping in enumerate(("centre", "clip", "expert")):
@@ -84,7 +84,19 @@ def test_every_cell_holds_the_typical_return_and_its_interval(study: DividerStud
 
 
 def test_what_has_not_been_run_stays_empty(study: DividerStudy) -> None:
-    (cells,) = snapped_figure((2, 5), {(2, "centre"): study.unchanged}).data
+    cells, _ = snapped_figure((2, 5), {(2, "centre"): study.unchanged}).data
     assert cells.z[0][0] is not None
     assert cells.z[0][1] is None
     assert cells.text[0][1] == ""
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_words_are_light_on_dark_shades_and_dark_on_light_ones(
+    two: tuple[tuple[Quantisation, ...], ...], dark: bool
+) -> None:
+    cells, words = error_figure(two, dark=dark).data
+    assert list(words.text) == [text for row in cells.text for text in row]
+    shades = [z / cells.zmax for row in cells.z for z in row]
+    inks = dict(zip(shades, words.textfont.color, strict=True))
+    assert inks[max(shades)] == ("#0e161b" if dark else "#ffffff")
+    assert inks[min(shades)] == ("#ffffff" if dark and min(shades) < 0.3 else "#0e161b")
