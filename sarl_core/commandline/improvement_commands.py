@@ -122,6 +122,11 @@ def aggregate(
             shown, plan, env_id=env, agent=agent, expert=expert, jobs=jobs, progress=advance
         )
     card = save_aggregation(found, out, command=_command(context))
+    if found.reported is None:
+        raise terminal.StoppedError(
+            f"stopped by Ctrl-C after {len(found.rounds)} of {rounds} rounds; the best rules so "
+            f"far are in {out}, chosen by the episodes of their round only"
+        )
     if as_json:
         terminal.print_json(card)
         return

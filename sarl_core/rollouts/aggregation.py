@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ _SEEDS_A_RUN = 1_000_000  # between two values of the seed
 _SEEDS_A_ROUND = 10_000
 
 _PAIRS_A_ROUND = 25_000  # more states of one round are too alike to be worth their time
+# Rules learn from what was shown at first and from where the latest rules led: what earlier ones
+# got into, the present ones may never meet.
+_ROUNDS_KEPT = 6
 _FIRST_VALIDATION = 16
 _MARKS = 8  # points on the way of a refinement from which the best is chosen
 
@@ -171,7 +174,8 @@ def aggregate(
         watch: Called after every round.
 
     Returns:
-        The best rules. Stopped after a first round, what was finished is given, unreported.
+        The best rules. Stopped after a first round (by `progress`, or by Ctrl-C), what was
+        finished is given, unreported.
 
     Raises:
         InputError: If agent, expert and environment do not fit, or the expert acts at random.
@@ -190,11 +194,11 @@ def aggregate(
         best, mean = run.select(clock)
         trees, refined, mean = run.refine(best, mean, clock)
         reported = run.report(trees, clock)
-    except CancelledError:
+    except (CancelledError, KeyboardInterrupt):
         if not run.rounds:
             raise
         best = int(np.argmax([found.mean_return for found in run.rounds]))
-        return run.result(best, run.trees(best), None, False, None)
+        return run.result(best, run.trees[best], None, False, None)
     return run.result(best, trees, mean, refined, reported)
 
 
@@ -231,6 +235,7 @@ class _Run:
         self.episodes = [start.episodes]
         self.steps = [np.arange(len(start)) if start.steps is None else start.steps]
         self.rounds: list[Round] = []
+        self.trees: list[tuple[PolicyTree, ...]] = []
 
     def planned_units(self) -> int:
         plan = self.plan
@@ -247,19 +252,23 @@ class _Run:
         )
 
     def pairs(self, rounds: int) -> Demonstrations:
-        """What there was before a round (counted from 0)."""
-        kept = slice(rounds + 1)
+        """What a round (counted from 0) learns from."""
+        kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
+
+        def column(parts: list[Any]) -> Any:
+            return np.concatenate([parts[index] for index in kept])
+
         return answered(
             self.env_id,
             self.expert,
-            np.concatenate(self.observations[kept]),
-            cast(Actions, np.concatenate(self.actions[kept])),
-            np.concatenate(self.episodes[kept]),
-            np.concatenate(self.steps[kept]),
+            column(self.observations),
+            column(self.actions),
+            column(self.episodes),
+            column(self.steps),
         )
 
-    def trees(self, index: int) -> tuple[PolicyTree, ...]:
-        """The trees of a round (counted from 0), grown again rather than kept."""
+    def grow(self, index: int) -> tuple[PolicyTree, ...]:
+        """The trees of a round (counted from 0)."""
         pairs = self.pairs(index)
         label_scores = scores(self.expert, pairs.observations)
         ways: dict[str, Any] = {}
@@ -304,7 +313,7 @@ class _Run:
         return first + self.plan.seed * _SEEDS_A_RUN
 
     def round(self, number: int, clock: _Clock) -> None:
-        trees = self.trees(number - 1)
+        trees = self.grow(number - 1)
         rules = self.rules(trees)
         found = self.shielded(
             rules,
@@ -337,6 +346,7 @@ class _Run:
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
             )
         )
+        self.trees.append(trees)
         rows = np.arange(len(table))
         if len(rows) > _PAIRS_A_ROUND:
             generator = np.random.default_rng(self.seed(number))
@@ -348,7 +358,7 @@ class _Run:
 
     def select(self, clock: _Clock) -> tuple[int, float]:
         """The best round (counted from 0), and its mean return over the validation episodes."""
-        candidates = [self.rules(self.trees(index)) for index in range(len(self.rounds))]
+        candidates = [self.rules(trees) for trees in self.trees]
         return self.best_of(candidates, VALIDATION_SEED, clock)
 
     def best_of(self, candidates: list[RuleSet], seed: int, clock: _Clock) -> tuple[int, float]:
@@ -367,7 +377,7 @@ class _Run:
         self, best: int, mean: float, clock: _Clock
     ) -> tuple[tuple[PolicyTree, ...], bool, float]:
         """Move thresholds and labels of the best rules, and keep what is better."""
-        trees = self.trees(best)
+        trees = self.trees[best]
         if not self.plan.generations:
             return trees, False, mean
         marks = refine(
