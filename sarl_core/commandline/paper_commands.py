@@ -33,7 +33,7 @@ def reproduce(
         typer.Option(
             "--figure",
             metavar="N",
-            help="One only: 2 to 7, or table-1.",
+            help="One only: 2 to 7, table-1, or divider.",
             show_default="all",
         ),
     ] = None,

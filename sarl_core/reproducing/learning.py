@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.rules import FILTERED
 from sarl_core.reproducing.shipped import environment_name, named_rules
-from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge, percent
+from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge
+from sarl_core.reproducing.words import percent
 from sarl_core.rollouts.progress import Progress
 from sarl_core.rollouts.relevance import (
     PAPER_LEARNING,

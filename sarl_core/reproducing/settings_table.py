@@ -13,7 +13,8 @@ from sarl_core.reproducing.shipped import (
     environments,
     named_rules,
 )
-from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge, percent
+from sarl_core.reproducing.study import Claim, Drawing, Effort, Frames, Study, judge
+from sarl_core.reproducing.words import percent
 from sarl_core.rollouts.progress import Progress, report
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -19,8 +18,16 @@ from sarl_core.reproducing.shields import (
     dividers_of,
     returns_of,
 )
-from sarl_core.reproducing.study import Claim, Frames, judge, percent
-from sarl_core.rollouts.statistics import Interval, interquartile_mean, summarise
+from sarl_core.reproducing.study import Claim, Frames, judge
+from sarl_core.reproducing.words import (
+    COMPARED,
+    interval,
+    number,
+    part_of_the_way,
+    percent,
+    summary,
+)
+from sarl_core.rollouts.statistics import interquartile_mean
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +41,6 @@ HALF = 0.5  # of the expert's typical return
 OFTEN, _MOSTLY = 0.1, 0.95  # shares of episodes
 _SIMILAR = 0.1  # of the way from the novice to the expert
 _MOST_OF_THE_WAY = 0.8
-COMPARED = "The 95 % intervals of the typical returns (IQM) are compared"
 
 
 def cart_claims(frames: Frames) -> tuple[Claim, ...]:
@@ -295,28 +301,3 @@ def _by_the_shield_alone(returns: Returns) -> Claim:
         f"{percent(_MOST_OF_THE_WAY)} of the way.",
         numbers={"unfiltered": many.iqm, "expert": expert, "way": way},
     )
-
-
-def summary(values: Floats) -> Interval:
-    """`summarise`, worked out once for the same values."""
-    return _summary(values.tobytes())
-
-
-@lru_cache(maxsize=64)
-def _summary(values: bytes) -> Interval:
-    return summarise(np.frombuffer(values))
-
-
-def part_of_the_way(value: float, start: float, goal: float) -> float:
-    """How far a value is on the way from a start (0) to a goal (1); 0 where there is no way."""
-    return (value - start) / (goal - start) if goal != start else 0.0
-
-
-def number(value: float) -> str:
-    """A return for people, without decimals."""
-    return f"{float(value):,.0f}".replace("-", "−") if abs(value) >= 0.5 else "0"
-
-
-def interval(found: Interval) -> str:
-    """A typical return with its 95 % interval, for people."""
-    return f"{number(found.iqm)} ({number(found.low)} to {number(found.high)})"

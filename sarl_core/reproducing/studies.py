@@ -1,8 +1,9 @@
-"""Every figure and table of the paper that holds data, in its order."""
+"""Every figure and table of the paper that holds data, in its order, and what it leaves open."""
 
 from __future__ import annotations
 
 from sarl_core.errors import InputError
+from sarl_core.reproducing.dividing import DIVIDING
 from sarl_core.reproducing.landscapes import COUNT, LENGTH
 from sarl_core.reproducing.learning import LEARNING
 from sarl_core.reproducing.settings_table import SETTINGS
@@ -26,6 +27,7 @@ _ALL = (
         more=" The paper divides each action into 2 intervals; 3 and 5 are here too. A shielded "
         "action becomes the centre of its interval.",
     ),
+    DIVIDING,
 )
 STUDIES: dict[str, Study] = {one.name: one for one in _ALL}
 

@@ -32,6 +32,7 @@ class Effort:
         phases: Phases of learning of each.
         test_steps: Steps of each test between them.
         episodes: Episodes of each way to act in Figures 5 to 7.
+        snapped_episodes: Episodes of each way to divide actions.
     """
 
     quick: bool
@@ -39,10 +40,25 @@ class Effort:
     phases: int
     test_steps: int
     episodes: int
+    snapped_episodes: int
 
 
-FULL = Effort(quick=False, learners=5, phases=100, test_steps=20_000, episodes=100)
-QUICK = Effort(quick=True, learners=2, phases=3, test_steps=2_000, episodes=3)
+FULL = Effort(
+    quick=False,
+    learners=5,
+    phases=100,
+    test_steps=20_000,
+    episodes=100,
+    snapped_episodes=100,
+)
+QUICK = Effort(
+    quick=True,
+    learners=2,
+    phases=3,
+    test_steps=2_000,
+    episodes=3,
+    snapped_episodes=1,
+)
 
 
 @dataclass(frozen=True)
@@ -135,15 +151,3 @@ def judge(agrees: bool, partly: bool = False) -> Verdict:
         The verdict.
     """
     return "agrees" if agrees else "partly" if partly else "does not agree"
-
-
-def percent(share: float) -> str:
-    """A share for a sentence, which may be below 0 or above 1.
-
-    Args:
-        share: As 0.12.
-
-    Returns:
-        As "12 %".
-    """
-    return f"{100 * share:.0f} %".replace("-", "−")

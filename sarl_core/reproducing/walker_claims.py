@@ -5,16 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sarl_core.explaining.language import share_text
-from sarl_core.reproducing.shield_claims import (
-    COMPARED,
-    HALF,
-    OFTEN,
-    Returns,
-    interval,
-    number,
-    part_of_the_way,
-    summary,
-)
+from sarl_core.reproducing.shield_claims import HALF, OFTEN, Returns
 from sarl_core.reproducing.shields import (
     EXPERT,
     FILTERED,
@@ -23,7 +14,15 @@ from sarl_core.reproducing.shields import (
     dividers_of,
     returns_of,
 )
-from sarl_core.reproducing.study import Claim, Frames, judge, percent
+from sarl_core.reproducing.study import Claim, Frames, judge
+from sarl_core.reproducing.words import (
+    COMPARED,
+    interval,
+    number,
+    part_of_the_way,
+    percent,
+    summary,
+)
 from sarl_core.rollouts.statistics import interquartile_mean
 
 if TYPE_CHECKING:

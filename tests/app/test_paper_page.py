@@ -15,16 +15,19 @@ from sarl_core.reproducing.studies import STUDIES
 from sarl_core.reproducing.tables import write_table
 from tests.app.screens import ROUTER, errors, open_page, texts
 from tests.reproducing.frames import landscapes, learning
+from tests.reproducing.test_dividing import table
 from tests.reproducing.test_landscapes import AS_THE_PAPER, SMALL
 from tests.reproducing.test_learning import A_LITTLE, DOWN
 from tests.reproducing.test_report import ENTRY
 from tests.reproducing.test_shields import cart, walker
 
+DIVIDED = table({0: 285, 2: -35, 3: 180}, {0: -150, 2: -400, 3: -150})
 FRAMES = {
     "2": landscapes({"CartPole-v1": AS_THE_PAPER, "LunarLander-v3": SMALL}),
     "4": learning(DOWN, A_LITTLE),
     "5": cart(),
     "7": walker(),
+    "divider": DIVIDED,
 }
 
 
@@ -81,10 +84,10 @@ def test_before_anything_is_reproduced_the_page_says_how(folder: Path) -> None:
 def test_the_claims_come_first_with_their_verdicts(folder: Path) -> None:
     fill(folder, FRAMES)
     app = open_page("paper")
-    assert "Of 22 claims of the paper" in texts(app)
-    assert "agree with **20**, agree partly with **2**, and do not agree with **0**" in texts(app)
+    assert "Of 24 claims of the paper" in texts(app)
+    assert "agree with **21**, agree partly with **2**, and do not agree with **1**" in texts(app)
     shown = rendered(app)
-    assert shown.count("How this is decided") == 22
+    assert shown.count("How this is decided") == 24
     assert "The lone novice's return varies between 8 and 95." in shown.replace("&#x27;", "'")
     assert shown.count("Agrees ") >= 20
 
@@ -94,19 +97,24 @@ def test_claims_are_sorted_by_their_verdict(folder: Path) -> None:
     app = open_page("paper", verdict="Partly")
     assert rendered(app).count("How this is decided") == 2
     app = open_page("paper", verdict="Does not agree")
+    assert rendered(app).count("How this is decided") == 1
+    fill(folder, {"2": FRAMES["2"]})
+    app.run()
     assert rendered(app).count("How this is decided") == 0
     assert "There is no such claim." in texts(app)
 
 
 @pytest.mark.parametrize(
-    ("name", "figures", "claims"), [("2", 2, 4), ("4", 3, 5), ("5", 2, 7), ("7", 2, 6)]
+    ("name", "figures", "claims"),
+    [("2", 2, 4), ("4", 3, 5), ("5", 2, 7), ("7", 2, 6), ("divider", 2, 2)],
 )
 def test_a_figure_stands_beside_its_claims(
     name: str, figures: int, claims: int, folder: Path
 ) -> None:
     fill(folder, FRAMES)
-    app = open_page("paper", figure=f"Figure {name}")
-    assert f"Figure {name}. {STUDIES[name].title}" in texts(app)
+    study = STUDIES[name]
+    app = open_page("paper", figure=study.place)
+    assert f"{study.place}. {study.title}" in texts(app)
     assert len(charts(app)) == figures
     assert rendered(app).count("How this is decided") == claims
     assert ("quick run" in "".join(str(box.value) for box in app.warning)) == (name == "4")
@@ -129,7 +137,7 @@ def test_a_part_can_be_chosen_and_linked_to(folder: Path) -> None:
 def test_junk_in_a_link_falls_back_to_the_defaults(query: dict[str, str], folder: Path) -> None:
     fill(folder, FRAMES)
     app = open_page("paper", **query)
-    assert "Of 22 claims of the paper" in texts(app)
+    assert "Of 24 claims of the paper" in texts(app)
     app = open_page("paper", **({"figure": "Figure 2"} | query))
     assert not app.exception
 
@@ -174,7 +182,7 @@ def test_a_new_run_is_seen_at_once(folder: Path) -> None:
     assert "Of 4 claims" in texts(app)
     fill(folder, FRAMES)
     app.run()
-    assert "Of 22 claims" in texts(app)
+    assert "Of 24 claims" in texts(app)
 
 
 def test_text_of_a_report_is_text(folder: Path) -> None:

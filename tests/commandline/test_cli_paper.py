@@ -26,7 +26,7 @@ def test_help_has_an_example_and_tells_its_options(run):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--figure", "8"), "choose from 2, 3, table-1, 4, 5, 6, 7"),
+        (("--figure", "8"), "choose from 2, 3, table-1, 4, 5, 6, 7, divider"),
         (("--figure", "1"), "drawing of the method"),
         (("--figure", ""), "choose from"),
         (("--figure", "two\nthree"), "choose from"),

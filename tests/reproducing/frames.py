@@ -104,3 +104,49 @@ def episodes(
             )
         )
     return pd.concat(parts, ignore_index=True)
+
+
+def divided(returns: Mapping[str, Mapping[tuple[int, str], ArrayLike]]) -> pd.DataFrame:
+    """The table of the divider study: returns by environment, divider and way to snap."""
+    rows: list[dict[str, object]] = []
+    for env_id, found in returns.items():
+        for (divider, snapping), values in found.items():
+            rows += [
+                {
+                    "environment": env_id,
+                    "what": "return",
+                    "divider": divider,
+                    "snapping": snapping,
+                    "seed": 30_000_000 + number,
+                    "value": value,
+                }
+                for number, value in enumerate(np.asarray(values, dtype=float).tolist())
+            ]
+        for divider in sorted({divider for divider, _ in found if divider}):
+            edges = np.linspace(-1, 1, divider + 1)
+            rows += [
+                {
+                    "environment": env_id,
+                    "what": "interval",
+                    "divider": divider,
+                    "action": "torque",
+                    "interval": label,
+                    "low": edges[label],
+                    "high": edges[label + 1],
+                    "count": 100 if label else 0,
+                    "median": (edges[label] + edges[label + 1]) / 2,
+                }
+                for label in range(divider)
+            ]
+            rows += [
+                {
+                    "environment": env_id,
+                    "what": "error",
+                    "divider": divider,
+                    "action": "torque",
+                    "snapping": snapping,
+                    "value": error,
+                }
+                for snapping, error in (("centre", 0.5 / divider), ("clip", 0.0), ("expert", 0.1))
+            ]
+    return pd.DataFrame(rows)

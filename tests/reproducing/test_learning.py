@@ -106,7 +106,9 @@ def test_figures_have_a_line_for_kept_and_broken_of_each_set() -> None:
 
 
 def test_a_small_study_is_run_as_asked() -> None:
-    effort = Effort(quick=True, learners=2, phases=1, test_steps=150, episodes=1)
+    effort = Effort(
+        quick=True, learners=2, phases=1, test_steps=150, episodes=1, snapped_episodes=1
+    )
     told = []
     frame = LEARNING.measure(effort, lambda done, total: told.append((done, total)))
     assert tuple(frame.columns) == LEARNING.columns

@@ -207,7 +207,7 @@ def test_the_table_goes_by_its_name(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["", "8", "0", "-2", "2.5", "all", "table"])
 def test_what_the_paper_does_not_have_is_refused(name: str) -> None:
-    with pytest.raises(InputError, match="choose from 2, 3, table-1, 4, 5, 6, 7"):
+    with pytest.raises(InputError, match="choose from 2, 3, table-1, 4, 5, 6, 7, divider"):
         find_study(name)
 
 

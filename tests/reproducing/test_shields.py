@@ -11,7 +11,7 @@ from sarl_core.reproducing.studies import STUDIES
 from sarl_core.reproducing.study import FIRST_SEED, Effort, Verdict
 from tests.reproducing.frames import episodes
 
-SMALL = Effort(quick=True, learners=1, phases=1, test_steps=1, episodes=3)
+SMALL = Effort(quick=True, learners=1, phases=1, test_steps=1, episodes=3, snapped_episodes=1)
 
 
 def noisy(mean: float, spread: float, count: int = 40) -> np.ndarray:
