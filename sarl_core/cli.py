@@ -13,6 +13,7 @@ import typer
 from sarl_core.commandline import terminal
 from sarl_core.commandline.demonstration_commands import check, record
 from sarl_core.commandline.improvement_commands import aggregate
+from sarl_core.commandline.learning_commands import learn
 from sarl_core.commandline.paper_commands import reproduce
 from sarl_core.commandline.rollout_commands import evaluate, render, train_expert
 from sarl_core.commandline.rule_commands import landscape, mine
@@ -34,6 +35,7 @@ for command in (
     evaluate,
     render,
     aggregate,
+    learn,
     train_expert,
     reproduce,
 ):

@@ -40,16 +40,16 @@ _PPO: dict[str, dict[str, Any]] = {
 }
 _DQN: dict[str, dict[str, Any]] = {
     "CartPole": {
-        "learning_rate": 0.0023,
+        "learning_rate": 0.0005,
         "batch_size": 64,
         "learning_starts": 1000,
-        "gamma": 0.99,
-        "target_update_interval": 10,
-        "train_freq": 256,
-        "gradient_steps": 128,
-        "exploration_fraction": 0.16,
+        "gamma": 0.98,
+        "target_update_interval": 250,
+        "train_freq": 4,
+        "gradient_steps": 4,
+        "exploration_fraction": 0.2,
         "exploration_final_eps": 0.04,
-        "policy_kwargs": {"net_arch": [256, 256]},
+        "policy_kwargs": {"net_arch": [64, 64]},
     },
     "": {
         "learning_rate": 0.00063,

@@ -1,0 +1,229 @@
+"""A study of learning in plain words, made from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sarl_core.explaining.language import counted, share_text, threshold_text
+from sarl_core.rollouts.learning_files import LearningStudy
+from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
+
+HEADINGS = (
+    "Way to learn",
+    "Crashes while learning",
+    "of episodes",
+    "Changed by rules",
+    "Return while learning",
+    "Return after, shield off",
+    "IQM (95 % interval)",
+    "Crashed after, off",
+    "Return after, shield on",
+    "Verdict",
+)
+
+
+def value_text(value: float) -> str:
+    """A return or a count for people.
+
+    Args:
+        value: Any; NaN where there is none.
+
+    Returns:
+        As "213" or "−191"; "–" for NaN.
+    """
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:,.0f}"
+    return ("0" if text == "-0" else text).replace("-", "−")
+
+
+def verdict(summary: ArmSummary) -> str:
+    """Whether an arm is safe while learning and good afterwards.
+
+    Args:
+        summary: Of one arm.
+
+    Returns:
+        As "safe and good"; "–" where there is nothing to compare with.
+    """
+    if summary.safe is None or summary.good is None:
+        return "–"
+    return {
+        (True, True): "safe and good",
+        (True, False): "safe, not good",
+        (False, True): "good, not safe",
+        (False, False): "neither",
+    }[summary.safe, summary.good]
+
+
+def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
+    """The study as a table.
+
+    Args:
+        summaries: Of `summarise_study`.
+
+    Returns:
+        A row an arm, under `HEADINGS`.
+    """
+    rows: list[tuple[str, ...]] = []
+    for summary in summaries:
+        alone, shielded = summary.alone, summary.shielded
+        spread = (
+            f" ({value_text(min(summary.crashes))}–{value_text(max(summary.crashes))})"
+            if len(summary.crashes) > 1
+            else ""
+        )
+        rows.append(
+            (
+                summary.arm.title,
+                value_text(summary.mean_crashes) + spread,
+                value_text(float(np.mean(summary.episodes))),
+                share_text(summary.intervention_rate) if summary.arm.shielded else "–",
+                value_text(summary.learning_return),
+                _with_worst(alone.mean, alone.means),
+                f"{value_text(alone.returns.iqm)} ({value_text(alone.returns.low)} to "
+                f"{value_text(alone.returns.high)})",
+                share_text(alone.crash_rate),
+                "–" if shielded is None else value_text(shielded.mean),
+                verdict(summary),
+            )
+        )
+    return rows
+
+
+def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
+    """What a study found, in sentences that follow from its numbers.
+
+    Args:
+        study: With finished runs.
+        summaries: Of it.
+
+    Returns:
+        Paragraphs, the most important first; one that says so where nothing is finished.
+    """
+    if not summaries:
+        return ["No run is finished yet."]
+    judged = [summary for summary in summaries if summary.safe is not None]
+    paragraphs = [_answer(judged, summaries), *_others(judged, best(judged)), _alone(summaries)]
+    paragraphs += [_rules(study, summaries), _conditions(study)]
+    return [paragraph for paragraph in paragraphs if paragraph]
+
+
+def _answer(judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]) -> str:
+    if not judged:
+        return (
+            "Whether a way to learn is safe and good shows only beside the same learner without a "
+            "shield: run it too."
+        )
+    found = best(judged)
+    if found is None:
+        return (
+            "No way to learn was both safe while learning and good afterwards without the shield."
+        )
+    alone = reference(summaries, found.arm)
+    assert alone is not None  # else it were not judged
+    after = _with_worst(found.alone.mean, found.alone.means)
+    return (
+        f"Safe while learning and good afterwards: “{found.arm.title}”. While learning it crashed "
+        f"{_times(found.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
+        f"Afterwards, without the shield, it returns {after} and "
+        f"crashes in {share_text(found.alone.crash_rate)} of the episodes; the same learner "
+        f"that never had a shield returns {value_text(alone.alone.mean)} and crashes in "
+        f"{share_text(alone.alone.crash_rate)}."
+    )
+
+
+def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]:
+    """The other arms by what they are."""
+
+    def listed(safe: bool, good: bool) -> str:
+        return _listed(
+            [
+                f"“{summary.arm.title}” ({_times(summary.mean_crashes)}; afterwards "
+                f"{value_text(summary.alone.mean)})"
+                for summary in judged
+                if (summary.safe, summary.good) == (safe, good) and summary is not found
+            ]
+        )
+
+    sentences = []
+    if both := listed(True, True):
+        sentences.append(f"Also safe and good: {both}.")
+    if safe := listed(True, False):
+        sentences.append(
+            f"Safe while learning, but without the shield worse than a learner that never had one: "
+            f"{safe}. There the rules did the work, and the learner did not learn what they did."
+        )
+    if good := listed(False, True):
+        sentences.append(f"Good afterwards, but not safe while learning: {good}.")
+    if neither := listed(False, False):
+        sentences.append(f"Neither safe nor good: {neither}.")
+    return sentences
+
+
+def _alone(summaries: Sequence[ArmSummary]) -> str:
+    alone = [summary for summary in summaries if not summary.arm.shielded]
+    if not alone:
+        return ""
+    return (
+        "Without any shield: "
+        + _listed(
+            [
+                f"“{summary.arm.title}” crashed {_times(summary.mean_crashes)} while learning "
+                f"({value_text(float(np.mean(summary.episodes)))} episodes) and returns "
+                f"{_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
+                for summary in alone
+            ]
+        )
+        + "."
+    )
+
+
+def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
+    """How good the rules are themselves, as far as they decide everything."""
+    covered = [
+        summary.shielded
+        for summary in summaries
+        if summary.shielded is not None and summary.shielded.coverage == 1.0
+    ]
+    if not covered:
+        return ""
+    return (
+        "These rules speak in every state, so with the shield on it is they who act, whatever was "
+        f"learned: return {value_text(covered[0].mean)}, crashes in "
+        f"{share_text(covered[0].crash_rate)} of the episodes."
+    )
+
+
+def _conditions(study: LearningStudy) -> str:
+    rules = study.settings.get("rules")
+    by = (
+        f"{counted(int(rules['count']), 'rule')} (support {threshold_text(rules['support'])}, "
+        f"confidence {threshold_text(rules['confidence'])})"
+        if isinstance(rules, dict)
+        else "no rules"
+    )
+    seeds = len(study.seeds)
+    return (
+        f"{study.env_id}, {by}, {study.steps:,} steps, {counted(seeds, 'learner')} of each kind, "
+        f"{counted(int(study.settings['trial_episodes']), 'episode')} each afterwards. Safe means "
+        f"at most {share_text(SAFE_SHARE)} of the crashes of the same learner without a shield; "
+        "good means at least its mean return, both averaged over the learners."
+        + (" So few learners show large differences only." if seeds < 10 else "")
+    )
+
+
+def _times(count: float) -> str:
+    return "once" if count == 1 else f"{value_text(count)} times"
+
+
+def _with_worst(mean: float, means: Sequence[float]) -> str:
+    if len(means) < 2:
+        return value_text(mean)
+    return f"{value_text(mean)} ({value_text(min(means))} to {value_text(max(means))})"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
