@@ -56,6 +56,12 @@ PAGES = [
         help="What a shield is worth: agents with the rules and without, over many episodes.",
     ),
     st.Page(
+        "learning.py",
+        title="Learning",
+        icon=":material/school:",
+        help="Agents learn under the shield, and show what they are worth without it.",
+    ),
+    st.Page(
         "paper.py",
         title="Paper",
         icon=":material/article:",
