@@ -43,10 +43,10 @@ def walker_claims(frames: Frames) -> tuple[Claim, ...]:
     returns = returns_of(frame, paper)
     claims = [
         _expert_drops(returns),
-        _below_the_expert(returns),
-        _no_help(returns, UNFILTERED),
-        _no_help(returns, FILTERED),
-        _no_fluctuation(returns),
+        _below_the_expert(returns, paper),
+        _no_help(returns, UNFILTERED, paper),
+        _no_help(returns, FILTERED, paper),
+        _no_fluctuation(returns, paper),
     ]
     if finer:
         claims.append(_finer_division(frame, paper, finer))
@@ -70,26 +70,27 @@ def _expert_drops(returns: Returns) -> Claim:
     )
 
 
-def _below_the_expert(returns: Returns) -> Claim:
+def _below_the_expert(returns: Returns, divider: int) -> Claim:
     many, expert = summary(returns[UNFILTERED]), summary(returns[EXPERT])
     return Claim(
         paper="With unfiltered rules the novice is clearly below the expert.",
         where="Figure 7",
-        ours=f"Typical returns: {interval(many)} with the rules, {interval(expert)} for the "
-        "expert.",
+        ours=f"Typical returns with divider {divider}: {interval(many)} with the rules, "
+        f"{interval(expert)} for the expert.",
         verdict=judge(many.high < expert.low, many.iqm < expert.iqm),
         decided_by=f"{COMPARED}; agrees if that with the rules lies below the expert's.",
         numbers={"unfiltered": many.iqm, "expert": expert.iqm},
     )
 
 
-def _no_help(returns: Returns, name: str) -> Claim:
+def _no_help(returns: Returns, name: str, divider: int) -> Claim:
     shielded, novice, expert = (summary(returns[arm]) for arm in (name, NOVICE, EXPERT))
     way = part_of_the_way(shielded.iqm, novice.iqm, expert.iqm)
     return Claim(
         paper=f"With {name} rules there is no improvement over the lone novice.",
         where="Figure 7",
-        ours=f"Typical returns: {interval(shielded)} with the rules, {interval(novice)} without: "
+        ours=f"Typical returns with divider {divider}: {interval(shielded)} with the rules, "
+        f"{interval(novice)} without: "
         f"{percent(way)} of the way to the expert.",
         verdict=judge(shielded.low <= novice.high, way < 0.5),
         decided_by=f"{COMPARED}; agrees if that with the rules does not lie above that without, "
@@ -98,15 +99,15 @@ def _no_help(returns: Returns, name: str) -> Claim:
     )
 
 
-def _no_fluctuation(returns: Returns) -> Claim:
+def _no_fluctuation(returns: Returns, divider: int) -> Claim:
     level = 0.5 * sum(float(interquartile_mean(returns[name])) for name in (NOVICE, EXPERT))
     best = max(float(returns[name].max()) for name in (FILTERED, UNFILTERED))
     shares = [float((returns[name] >= level).mean()) for name in (FILTERED, UNFILTERED)]
     return Claim(
         paper="The curves with rules show no fluctuation upwards.",
         where="text on Figure 7",
-        ours=f"The best of their episodes returns {number(best)}; half of the way from the lone "
-        f"novice to the expert would be {number(level)}.",
+        ours=f"With divider {divider}, the best of their episodes returns {number(best)}; half of "
+        f"the way from the lone novice to the expert would be {number(level)}.",
         verdict=judge(best < level, max(shares) < OFTEN),
         decided_by="Agrees if no episode gets half of the way from the lone novice's typical "
         f"return to the expert's, partly if fewer than {percent(OFTEN)} do.",
