@@ -39,7 +39,7 @@ _SEEDS_A_ROUND = 10_000
 _PAIRS_A_ROUND = 25_000  # more states of one round are too alike to be worth their time
 # Rules learn from what was shown at first and from where the latest rules led: what earlier ones
 # got into, the present ones may never meet.
-_ROUNDS_KEPT = 6
+_ROUNDS_KEPT = 12
 _FIRST_VALIDATION = 16
 _MARKS = 8  # points on the way of a refinement from which the best is chosen
 

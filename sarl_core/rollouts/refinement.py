@@ -29,7 +29,7 @@ _SEED = 40_000_000
 _SEEDS_A_RUN = 1_000_000
 
 _SHAKE = 0.15  # in units of half the spread of a feature where it is asked about
-_STEP = 0.08  # of a generation, in units of the shake
+_STEP = 0.15  # of a generation, in units of the shake
 _MEMORY = (0.9, 0.99)  # of the step's direction and of its size (Adam)
 _SPREAD = (0.1, 0.9)  # quantiles
 _LEAST_SHARE = 0.02  # a label that is shown less often is no alternative
