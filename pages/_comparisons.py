@@ -136,7 +136,9 @@ class Comparing(Job):
 
     def __init__(self, rows: Sequence[Row], episodes: int) -> None:
         self.problems: dict[str, SarlError] = {}
-        self._rows, self._episodes = tuple(rows), episodes
+        # Two names may mean the same, as "filtered" and these very thresholds.
+        self._rows = tuple({row.key: row for row in reversed(rows)}.values())[::-1]
+        self._episodes = episodes
         # Streamlit's caches are asked here: the work's own thread has no session.
         self._results, self._pool = results(), pool()
         super().__init__(self._compare, len(self._rows) * episodes)

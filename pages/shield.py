@@ -258,13 +258,13 @@ except SarlError as error:
 chosen_guards, refused = guards(chosen)
 for sentence in refused:
     st.error(in_full(sentence), icon=":material/error:")
-lines_by_key = {
-    each.row.key: each  # a file uploaded twice is one
+by_name = {
+    (each.row.name, each.row.key): each  # a file uploaded twice is one
     for pilot in chosen_pilots
     for guard in chosen_guards
     for each in [line(chosen, environment, pilot, guard)]
 }
-wanted = list(lines_by_key.values())
+wanted = list(by_name.values())
 if not wanted:
     st.info(
         "Choose at least one agent and one shield; a shield of your own needs its file.",

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, NamedTuple
 
 from sarl_core.errors import InputError, SarlError, WorkError
@@ -24,7 +24,8 @@ _PIECE_SECONDS = 1.0  # what one piece should take: progress is told, and work e
 _FIRST_PIECE = 4
 _LARGEST_PIECE = 32  # environments that `play` steps side by side
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
-_NICENESS = 10  # whoever serves pages goes first
+_LOOK_SECONDS = 2.0  # between two looks at whether the server is still there
+_NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +163,7 @@ class WorkerPool:
             self._processes = ProcessPoolExecutor(
                 self.workers,
                 timeout=_IDLE_SECONDS,
-                initializer=_step_back,
+                initializer=_begin,
                 env={"OMP_NUM_THREADS": "1"},
             )
             return self._processes.submit(*work)
@@ -203,10 +204,18 @@ def _next_piece(task: int, state: _Progress) -> _Piece:
     return piece
 
 
-def _step_back() -> None:
-    """Let other processes go first; for a new process."""
+def _begin() -> None:
+    """Let other processes go first, and end with the one that asks; for a new process."""
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
+    Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """Wait until the server is gone. Killed, it tells nobody."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK_SECONDS)
+    os._exit(0)
 
 
 def _work(

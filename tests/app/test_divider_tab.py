@@ -59,7 +59,7 @@ def test_every_action_is_shown_or_the_chosen_one() -> None:
 def test_the_snapped_expert_is_run_on_request() -> None:
     app = open_tab(data="pendulum", divider_episodes="2")
     app.button(key="run_divider").click().run()
-    for _ in range(600):
+    for _ in range(3_000):
         assert not app.exception, app.exception
         if "cancel_divider" not in [button.key for button in app.button]:
             break

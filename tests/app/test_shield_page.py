@@ -21,7 +21,7 @@ CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
 
 def finished(app: AppTest) -> AppTest:
     """Look in until the work is done, as the browser does every second."""
-    for _ in range(600):
+    for _ in range(3_000):
         assert not app.exception, app.exception
         if "cancel_comparison" not in [button.key for button in app.button]:
             return app
@@ -102,7 +102,7 @@ def test_what_was_finished_before_a_cancel_stays_readable() -> None:
     query = {"data": "bipedal_walker", "episodes": "1000", "agents": "novice"}
     app = open_page("shield", shields="no shield", **query)
     app.button(key="run_comparison").click().run()
-    for _ in range(600):
+    for _ in range(3_000):
         if rows(app):
             break
         time.sleep(0.1)
@@ -237,6 +237,32 @@ def test_a_rule_file_of_another_version_and_a_foreign_policy_are_named() -> None
     run(app)
     assert any("lander.npz" in sentence and "features" in sentence for sentence in errors(app))
     assert list(rows(app)) == ["novice, no shield"]
+
+
+def test_two_names_for_the_same_rules_are_two_rows_and_one_run() -> None:
+    app = open_page("shield", data="cartpole", episodes="3", first_seed="9000", agents="novice")
+    app.pills(key="shields").set_value(["filtered", "at the thresholds"]).run()
+    filtered, same = rows(run(app)).values()
+    assert (filtered["Shield"], same["Shield"]) == ("filtered", "at the thresholds")
+    assert {**filtered, "Shield": ""} == {**same, "Shield": ""}
+
+
+def test_thresholds_that_leave_no_rule_leave_the_agent_alone() -> None:
+    app = open_page(
+        "shield",
+        data="cartpole",
+        episodes="3",
+        first_seed="9100",
+        agents="novice",
+        support="0.9",
+        confidence="1",
+    )
+    app.pills(key="shields").set_value(["no shield", "at the thresholds"]).run()
+    alone, empty = rows(run(app)).values()
+    assert not errors(app)
+    assert empty["Rules"] == "0"
+    assert empty["Covered"] == empty["Changed"] == "0 %"
+    assert empty["Mean return"] == alone["Mean return"]
 
 
 def test_compact_rules_are_offered_where_there_are_some(

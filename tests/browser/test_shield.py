@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.walking import no_trace, parameters, settle, visit
 
+PATIENCE = 240_000  # milliseconds; the processes that run episodes may have to start first
+
 
 def test_a_comparison_is_run_changed_downloaded_and_found_again(
     screen: Page, tmp_path: Path
@@ -16,7 +18,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     visit(screen, "/shield?data=cartpole&episodes=4&first_seed=8000", "Shield")
     expect(screen.get_by_text("press Run")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_text("all done already")).to_be_visible()
+    expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
     settle(screen)
     expect(screen.get_by_text("the typical return of the novice rises")).to_be_visible()
     assert screen.locator(".js-plotly-plot").count() == 2
@@ -48,7 +50,7 @@ def test_the_divider_is_studied(screen: Page) -> None:
     visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=2", "Thresholds")
     expect(screen.get_by_text("How far an action moves")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_text("all done already")).to_be_visible()
+    expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
     expect(screen.get_by_text("that row is the expert as it is")).to_be_visible()
     settle(screen)
     returns = screen.locator(".js-plotly-plot").filter(has_text="clip")
