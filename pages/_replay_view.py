@@ -136,12 +136,12 @@ def go_to(step: int) -> None:
 
 
 @st.fragment
-def step_by_step(replay: Replay, *, linked: bool) -> None:
+def step_by_step(replay: Replay, *, linked: str | None) -> None:
     """The strip, the slider, and everything about the step it stands at.
 
     Args:
         replay: To show.
-        linked: Whether its rules are those of the Rules page.
+        linked: The set under which its rules are found on the Rules page; None if they are not.
     """
     st.subheader("Step by step")
     steps, shielded = replay.shown.steps, replay.shielded is not None
@@ -222,7 +222,7 @@ def step_by_step(replay: Replay, *, linked: bool) -> None:
         describe(view, shielded=shielded, linked=linked)
 
 
-def describe(view: StepView, *, shielded: bool, linked: bool) -> None:
+def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
     """One step in words."""
     for action in view.actions:
         if len(view.actions) > 1:
@@ -244,12 +244,16 @@ def describe(view: StepView, *, shielded: bool, linked: bool) -> None:
             st.html(f"The agent chose {done}.")
         if action.rule:
             st.markdown(f"**Rule {escaped(action.rule_id)}.** {escaped(action.rule)}")
-            if linked:
+            if linked is not None:
                 st.page_link(
                     "rules.py",
                     label="Open this rule",
                     icon=":material/rule:",
-                    query_params={**st.query_params.to_dict(), "rule": action.rule_id},
+                    query_params={
+                        **st.query_params.to_dict(),
+                        "set": linked,
+                        "rule": action.rule_id,
+                    },
                 )
     if shielded:
         st.caption(f"{margin_text(view.margin).capitalize()}.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 
+import _compact
 import _state as state
 import streamlit as st
 from streamlit.errors import StreamlitAPIException
@@ -30,7 +31,7 @@ def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
 
 
 def sidebar(*, thresholds_shown: bool = True) -> None:
-    """The choice of data and the thresholds in force.
+    """The choice of data, and which rules are in force.
 
     Args:
         thresholds_shown: Whether to say which thresholds are in force; a page with their sliders
@@ -61,8 +62,12 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
             f"{counted(len(demonstrations), 'step')} in "
             f"{counted(demonstrations.n_episodes, 'episode')}"
         ]
+        if _compact.in_force():
+            lines.append("**Compact rules** in force")
+            if thresholds_shown:
+                lines.append("Thresholds, set aside:")
         if not thresholds_shown:
-            st.caption(lines[0])
+            st.caption("  \n".join(lines))
             return
         lines += [
             f"Support at least **{thresholds.support:g}**",

@@ -5,13 +5,19 @@ What is clicked in them puts thresholds in force, so the moves are here too.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import _compact
 import _state as state
+import numpy as np
 import streamlit as st
+from _compact import Compact
 from _rule_table import column_config, frame, table_height
 
 from sarl_core.explaining import threshold_figures as figures
 from sarl_core.explaining.colours import MARKER_COLOUR
 from sarl_core.explaining.front_figure import front_figure, thin_front
+from sarl_core.explaining.language import counted
 from sarl_core.explaining.steps import neat_point
 from sarl_core.mining.landscape import Landscape
 from sarl_core.mining.rules import Thresholds
@@ -44,7 +50,15 @@ def move(**thresholds: float) -> None:
     slider does not reach the browser when it asks for another run.
     """
     st.session_state["_moved"] = thresholds
+    if _compact.in_force():
+        leave_compact()
     follow()
+
+
+def leave_compact() -> None:
+    """Go back to the thresholds; for callbacks, and the last thing they do."""
+    _compact.choose(False)
+    st.rerun()  # the ring comes back to the maps, and the sidebar says what is in force
 
 
 def take_click(key: str, grown: Grown) -> None:
@@ -81,10 +95,31 @@ def here(grown: Grown, thresholds: Thresholds, dimension: int | None) -> Landsca
     return point if dimension is None else point.dimensions[dimension]
 
 
+def compact_point(compact: Compact, dimension: int | None) -> Landscape:
+    """The numbers of the compact rules, in the shape of those of one point of the landscape."""
+    rules = compact.counted
+    if dimension is not None:
+        own = rules.of_dimension(dimension)
+        rules = replace(rules, rules=own, actions=(rules.actions[dimension],))
+    nowhere = np.zeros(1)
+    return Landscape(
+        nowhere,
+        nowhere,
+        np.array([[len(rules)]]),
+        np.array([[rules.mean_length]]),
+        np.array([[rules.coverage]]),
+        np.array([[rules.fidelity]]),
+    )
+
+
 def show_maps(
-    grown: Grown, landscape: Landscape, layers: tuple[figures.Layer, figures.Layer]
+    grown: Grown,
+    landscape: Landscape,
+    layers: tuple[figures.Layer, figures.Layer],
+    *,
+    marked: bool,
 ) -> None:
-    """Two maps side by side, with the mark that `controls` moves."""
+    """Two maps side by side, with the mark that `controls` moves, or hides."""
     margin = figures.MARGIN
     st.html(
         "<style>"
@@ -115,7 +150,14 @@ def show_maps(
                         alt=f"{figures.LAYERS[layer].title}, for every minimum support and "
                         "minimum confidence",
                     )
-    st.caption("Click a cell to set both thresholds to it. The ring marks the present ones.")
+    st.caption(
+        "Click a cell to set both thresholds to it. "
+        + (
+            "The ring marks the present ones."
+            if marked
+            else "The compact rules are not cut at thresholds, so no cell is marked."
+        )
+    )
 
 
 def show_surfaces(
@@ -123,6 +165,8 @@ def show_surfaces(
     landscape: Landscape,
     layers: tuple[figures.Layer, figures.Layer],
     dimension: int | None,
+    *,
+    marked: bool,
 ) -> None:
     """The same two layers as the paper draws them."""
     thresholds = state.chosen_thresholds()
@@ -138,7 +182,9 @@ def show_surfaces(
                     thresholds.support,
                     thresholds.confidence,
                     float(getattr(point, layer)[0, 0]),
-                ),
+                )
+                if marked
+                else None,
             )
             st.plotly_chart(
                 figure,
@@ -146,7 +192,7 @@ def show_surfaces(
                 config={"displaylogo": False},
                 alt=f"{figures.LAYERS[layer].title} as a surface",
             )
-    st.caption("Drag to turn. The dot marks the present thresholds.")
+    st.caption("Drag to turn." + (" The dot marks the present thresholds." if marked else ""))
 
 
 def show_largest(
@@ -175,11 +221,37 @@ def show_largest(
         st.caption(f"The {len(shown)} rules with the most support, of {rules:,}.")
 
 
+def show_compact(compact: Compact, dimension: int | None) -> None:
+    """The compact rules with the most support."""
+    rules = [rule for rule in compact.counted.rules if dimension in (None, rule.dimension)]
+    rules.sort(key=lambda rule: -rule.samples)
+    shown = rules[:TABLE_ROWS]
+    st.dataframe(
+        frame(shown, compact.counted),
+        hide_index=True,
+        column_config=column_config(compact.counted),
+        height=table_height(len(shown), 10),
+        key="compact_table",
+        alt="The compact rules with the most support",
+    )
+    told = []
+    if len(rules) > len(shown):
+        told.append(f"The {len(shown)} rules with the most support, of {len(rules):,}.")
+    unreached = sum(not rule.samples for rule in rules)
+    if unreached:
+        are = "is" if unreached == 1 else "are"
+        told.append(f"{counted(unreached, 'rule')} {are} reached by no demonstrated state.")
+    if told:
+        st.caption(" ".join(told))
+
+
 @st.fragment(key="front")
-def show_trade_offs(grown: Grown, dimension: int | None) -> None:
-    """The rule sets that no other one beats."""
+def show_trade_offs(grown: Grown, dimension: int | None, compact: Compact | None) -> None:
+    """The rule sets that no other one beats, and where the one in force is among them."""
     thresholds = state.chosen_thresholds()
-    point = here(grown, thresholds, dimension)
+    point = (
+        here(grown, thresholds, dimension) if compact is None else compact_point(compact, dimension)
+    )
     trees = grown if dimension is None else (grown[dimension],)
     with st.spinner("Looking for the best trade-offs …"):
         front = state.pareto(trees, lift=thresholds.lift, depth=thresholds.max_depth)

@@ -9,16 +9,19 @@ import streamlit as st
 from _choices import (
     AGENTS,
     CHOSEN,
+    COMPACT,
     ENVIRONMENTS,
     NO_RULES,
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
     agent_for,
+    compact_file,
     continuous,
     environment_of,
     rules_for,
 )
+from _compact import THRESHOLDS
 from _replay_view import comparison, numbers, step_by_step
 from _replays import (
     Order,
@@ -34,7 +37,7 @@ from _words import escaped
 from sarl_core.errors import SarlError
 from sarl_core.mining.rules import UNFILTERED, RuleSet
 
-RULE_SETS = (CHOSEN, *PAPERS, OWN_FILE, NO_RULES)
+RULE_SETS = (CHOSEN, *PAPERS, COMPACT, OWN_FILE, NO_RULES)
 
 # --- what is asked for -------------------------------------------------------------------------
 
@@ -64,12 +67,13 @@ def settings() -> Callable[[], Order]:
             )
             rules = st.selectbox(
                 "Rules",
-                RULE_SETS,
+                [name for name in RULE_SETS if name != COMPACT or compact_file().is_file()],
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                "confidence 0.95. Unfiltered: support 0, confidence 1. Own file: rules you "
-                "saved. None: the agent alone.",
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
+                "is shipped for this environment. Own file: rules you saved. None: the agent "
+                "alone.",
             )
             seed = st.number_input(
                 "Seed",
@@ -199,5 +203,7 @@ with st.container(horizontal=True):
         on_click="ignore",
         icon=":material/download:",
     )
-step_by_step(replayed, linked=asked.rules == CHOSEN)
+# Which set the Rules page has to show, to show a rule of this replay.
+SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
+step_by_step(replayed, linked=SHOWN_AS.get(asked.rules))
 comparison(shown)

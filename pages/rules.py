@@ -5,7 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import _compact
 import _state as state
+import numpy as np
 import streamlit as st
 from _rule_table import column_config, frame, table_height
 from _words import escaped
@@ -24,6 +26,7 @@ from sarl_core.explaining.language import (
 from sarl_core.explaining.path_table import path_table
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
+from sarl_core.mining.tree import LEAF
 
 TABLE_ROWS = 8
 FEATURES_SHOWN = 12
@@ -41,12 +44,13 @@ WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
 st.title("Rules")
 demonstrations = state.require_demonstrations()
-grown = state.trees(demonstrations, state.chosen_divider())
+compact = _compact.chosen_compact(demonstrations)
 thresholds = state.chosen_thresholds()
+grown = state.trees(demonstrations, state.chosen_divider()) if compact is None else compact.trees
 
 
 @st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
-def table_of(key: tuple[str, int, object], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], Any]:
+def table_of(key: tuple[object, ...], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], Any]:
     """All rules, the most support first, and the same as a data frame."""
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     return rules, frame(rules, _rule_set)
@@ -118,7 +122,7 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
             width=220,
             label_visibility="collapsed",
         )
-        downloads(rule_set)
+        downloads(rule_set if compact is None else compact.shipped)
     wanted = (words or "").lower().split()
     places = []
     for place, rule in enumerate(rules):
@@ -135,7 +139,11 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
 
 def show_table(rule_set: RuleSet) -> Rule | None:
     """The table of all rules; returns the chosen one."""
-    key = (rule_set.source.digest, rule_set.divider, thresholds)
+    key = (
+        (rule_set.source.digest, rule_set.divider, thresholds)
+        if compact is None
+        else (compact.digest,)
+    )
     rules, table = table_of(key, rule_set)
     shown = matching(rules, rule_set)
     chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
@@ -167,15 +175,23 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     tree = grown[rule.dimension]
     node = node_of(rule)
     with st.container(border=True, key="sentence"):
-        st.markdown(f"#### {escaped(sentence(rule, rule_set))}")
+        reached = rule.samples > 0
+        st.markdown(f"#### {escaped(sentence(rule, rule_set, evidence=reached))}")
         st.caption(
-            f"Rule {rule.id} · support {share_text(rule.support)} · confidence "
-            f"{share_text(rule.confidence)} · lift {rule.lift:.2f} · joint support "
-            f"{share_text(rule.joint_support)} · {counted(rule.length, 'condition')} on "
-            f"{counted(rule.merged_length, 'feature')}",
+            f"Rule {rule.id} · "
+            + (f"{measures(rule)} · " if reached else "")
+            + f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}",
             help=MEASURES,
         )
-        if not rule.conditions:
+        if compact is not None:
+            show_origin(compact.as_shipped(rule), compact.shipped)
+        if not reached:
+            st.info(
+                "No demonstrated state reaches this rule. It is for states that the expert never "
+                "came into by itself and was asked about.",
+                icon=":material/explore:",
+            )
+        if not rule.conditions and compact is None:
             st.info(
                 "This rule has no conditions: over all states the expert's most frequent action "
                 "is already as frequent as the minimum confidence asks, so the tree is cut at "
@@ -193,25 +209,48 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     show_examples(rule)
 
 
+def measures(rule: Rule) -> str:
+    """The numbers of a rule."""
+    return (
+        f"support {share_text(rule.support)} · confidence {share_text(rule.confidence)} · "
+        f"lift {rule.lift:.2f} · joint support {share_text(rule.joint_support)}"
+    )
+
+
+def show_origin(rule: Rule, rule_set: RuleSet) -> None:
+    """The numbers of a compact rule over the pairs it was built from."""
+    built = rule_set.source
+    st.caption(
+        f"Over the {built.steps:,} pairs that the compact set was built from: {measures(rule)}, "
+        f"{counted(rule.samples, 'state')}. Everything below is of the chosen demonstrations."
+    )
+
+
 def show_tree(rule: Rule) -> None:
     """The path lit in the tree."""
     tree = grown[rule.dimension]
     st.subheader("Its place in the tree")
-    view = st.segmented_control(
-        "Tree",
-        [WHOLE_TREE, AROUND],
-        default=WHOLE_TREE,
-        key="tree",
-        bind="query-params",
-        required=True,
-        label_visibility="collapsed",
-    )
-    cut = cut_nodes(
-        tree,
-        supp_min=thresholds.support,
-        conf_min=thresholds.confidence,
-        lift_min=thresholds.lift,
-        max_depth=thresholds.max_depth,
+    view = WHOLE_TREE
+    if rule.samples:
+        view = st.segmented_control(
+            "Tree",
+            [WHOLE_TREE, AROUND],
+            default=WHOLE_TREE,
+            key="tree",
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+        )
+    cut = (
+        np.flatnonzero(tree.feature == LEAF)
+        if compact is not None
+        else cut_nodes(
+            tree,
+            supp_min=thresholds.support,
+            conf_min=thresholds.confidence,
+            lift_min=thresholds.lift,
+            max_depth=thresholds.max_depth,
+        )
     )
     st.plotly_chart(
         figures.tree_figure(tree, cut, node_of(rule), around=view == AROUND, dark=state.is_dark()),
@@ -221,15 +260,24 @@ def show_tree(rule: Rule) -> None:
     )
     st.caption(
         f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. "
-        "Rules are full in colour, what is cut off below them is grey. Drag or scroll to zoom, "
-        "double-click to go back."
+        + (
+            "Rules are full in colour, what is cut off below them is grey. "
+            if compact is None
+            else "Every leaf is a rule, full in colour. "
+        )
+        + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
+        + "Drag or scroll to zoom, double-click to go back."
     )
 
 
 def show_features(rule: Rule) -> None:
     """The interval on each feature against its distribution."""
     st.subheader("What it asks, feature by feature")
-    st.caption("Grey: all states. In colour: the states of the rule. Shaded: the interval.")
+    st.caption(
+        "Grey: all states. "
+        + ("In colour: the states of the rule. " if rule.samples else "")
+        + "Shaded: the interval."
+    )
     colour = label_colour(rule.action)
     found = feature_evidence(demonstrations, grown[rule.dimension], rule)
     for start in range(0, min(len(found), FEATURES_SHOWN), 3):
@@ -251,6 +299,8 @@ def show_examples(rule: Rule) -> None:
     """Some states to which the rule applies."""
     import pandas as pd
 
+    if not rule.samples:
+        return
     columns = example_columns(demonstrations, grown[rule.dimension], rule)
     count = len(columns["Step"])
     st.subheader("Example states" if count > 1 else "The one state it applies to")
@@ -274,7 +324,7 @@ def show_examples(rule: Rule) -> None:
 
 
 with st.spinner("Mining the rules …"):
-    in_force = state.rule_set(grown, thresholds)
+    in_force = state.rule_set(grown, thresholds) if compact is None else compact.counted
 if not in_force.rules:
     nothing_in_force()
 else:

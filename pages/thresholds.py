@@ -7,6 +7,7 @@ it in a place of its own, since every further fragment would cost a run of its o
 
 from __future__ import annotations
 
+import _compact
 import _state as state
 import streamlit as st
 from _divider_view import show_divider
@@ -16,9 +17,12 @@ from _threshold_view import (
     MAPS,
     SURFACES,
     TRADE_OFFS,
+    compact_point,
     follow,
     here,
+    leave_compact,
     move,
+    show_compact,
     show_largest,
     show_maps,
     show_surfaces,
@@ -50,6 +54,7 @@ WHOLE = "All actions"
 st.title("Thresholds")
 demonstrations = state.require_demonstrations()
 grown = state.trees(demonstrations, state.chosen_divider())
+compact = _compact.chosen_compact(demonstrations)
 
 
 # --- what widgets do ---------------------------------------------------------------------------
@@ -69,7 +74,14 @@ def jump(name: str, value: float) -> None:
 def use(setting: Thresholds) -> None:
     """Put a named setting in force."""
     state.choose_thresholds(setting)
+    _compact.choose(False)
     st.rerun()  # lift and depth, which it resets, are part of the maps
+
+
+def use_compact() -> None:
+    """Put the compact rules in force."""
+    _compact.choose(True)
+    st.rerun()  # the maps lose their ring
 
 
 # --- parts of the page -------------------------------------------------------------------------
@@ -113,6 +125,7 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
     thresholds = state.chosen_thresholds()
     # A callback that asks for more than this fragment costs a run; most moves need none.
     alone = table is not None and st.session_state.get("view") != SURFACES
+    moved = leave_compact if compact is not None else "rerun" if alone else follow
     jumps = neat_jumps(grown, thresholds)
     left, middle, right = st.columns([4, 4, 3])
     with left:
@@ -123,7 +136,7 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
             value=FILTERED.support,
             format_func=threshold_text,
             bind="query-params",
-            on_change="rerun" if alone else follow,
+            on_change=moved,
             help="Share of all demonstrated states to which a rule must apply.",
         )
         jump_buttons("support", jumps.support_below, jumps.support_above)
@@ -135,7 +148,7 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
             value=FILTERED.confidence,
             format_func=threshold_text,
             bind="query-params",
-            on_change="rerun" if alone else follow,
+            on_change=moved,
             help="Share of those states in which the expert did what the rule says.",
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
@@ -148,21 +161,28 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
                 key="divider",
                 value=state.MIN_DIVIDER,
                 bind="query-params",
-                on_change=st.rerun,
+                on_change=leave_compact,
                 help="Number of equal intervals each continuous action is divided into.",
             )
         named_settings(thresholds)
-    point = here(grown, thresholds, dimension)
+    point = (
+        here(grown, thresholds, dimension) if compact is None else compact_point(compact, dimension)
+    )
     metrics(point)
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+    if compact is not None:
+        st.html("<style>.st-key-maps [class*='st-key-box_']::after { display: none; }</style>")
     if table is not None:
         with table.container():
-            show_largest(grown, thresholds, point, dimension)
+            if compact is not None:
+                show_compact(compact, dimension)
+            else:
+                show_largest(grown, thresholds, point, dimension)
 
 
 def named_settings(thresholds: Thresholds) -> None:
-    """The paper's two settings, a click each."""
+    """The paper's two settings and, where there are some, the compact rules; a click each."""
     with st.container(horizontal=True, gap="small", horizontal_alignment="right"):
         for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
             st.button(
@@ -170,9 +190,18 @@ def named_settings(thresholds: Thresholds) -> None:
                 key=name.lower(),
                 on_click=use,
                 args=(setting,),
-                type="primary" if thresholds == setting else "secondary",
+                type="primary" if thresholds == setting and compact is None else "secondary",
                 help=f"The paper's setting: support {setting.support:g}, "
                 f"confidence {setting.confidence:g}",
+            )
+        if _compact.offered():
+            st.button(
+                "Compact",
+                key="compact",
+                on_click=use_compact,
+                type="primary" if compact is not None else "secondary",
+                help="A small set that comes with these data: it has a rule for every state, and "
+                "was chosen by what a novice achieves with it",
             )
 
 
@@ -209,6 +238,8 @@ def more() -> None:
             step=0.1,
             key="lift",
             bind="query-params",
+            on_change=_compact.choose,
+            args=(False,),
             help="How many times more often than over all states the expert must have done what "
             "the rule says. 0: no limit.",
         )
@@ -219,6 +250,8 @@ def more() -> None:
             value=0,
             key="depth",
             bind="query-params",
+            on_change=_compact.choose,
+            args=(False,),
             help="Most conditions of a rule. 0: no limit.",
         )
 
@@ -290,9 +323,9 @@ whole = state.landscape(
 )
 landscape = whole if dimension is None else whole.dimensions[dimension]
 if view == SURFACES:
-    show_surfaces(grown, landscape, LAYERS[shown], dimension)
+    show_surfaces(grown, landscape, LAYERS[shown], dimension, marked=compact is None)
 else:
-    show_maps(grown, landscape, LAYERS[shown])
+    show_maps(grown, landscape, LAYERS[shown], marked=compact is None)
 offered = [LARGEST, TRADE_OFFS] if demonstrations.is_discrete else [LARGEST, TRADE_OFFS, DIVIDER]
 largest, trade_offs, *divider = st.tabs(
     offered, key="details", on_change="rerun", bind="query-params"
@@ -300,7 +333,7 @@ largest, trade_offs, *divider = st.tabs(
 table = None
 if trade_offs.open:
     with trade_offs:
-        show_trade_offs(grown, dimension)
+        show_trade_offs(grown, dimension, compact)
 elif divider and divider[0].open:
     with divider[0]:
         show_divider(demonstrations, dimension)

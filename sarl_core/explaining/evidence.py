@@ -27,7 +27,7 @@ class PathStep(NamedTuple):
         support: Share of all pairs that reach it.
         confidence: Share of those with the most frequent label.
         label: That label.
-        shares: Share of each label, (labels,).
+        shares: Share of each label, (labels,); zeros where no pair is.
         is_cut: Whether the rule was cut here.
     """
 
@@ -50,7 +50,7 @@ class FeatureEvidence:
         bounds: What the rule asks of it.
         edges: Of B bins, (B + 1,); values outside count to the outermost.
         everywhere: Share of all states in each bin, (B,).
-        at_rule: Share of the rule's states in each bin, (B,).
+        at_rule: Share of the rule's states in each bin, (B,); zeros where no state is its.
     """
 
     feature: int
@@ -91,7 +91,7 @@ def path_steps(tree: PolicyTree, node: int) -> tuple[PathStep, ...]:
                 support=float(tree.support[here]),
                 confidence=float(tree.confidence[here]),
                 label=int(tree.label[here]),
-                shares=tuple(float(count) / int(tree.samples[here]) for count in counts),
+                shares=tuple(float(count) / max(int(tree.samples[here]), 1) for count in counts),
                 is_cut=here == node,
             )
         )
@@ -134,7 +134,7 @@ def _edges(
 ) -> NDArray[np.float64]:
     step = max(1, len(values) // 50_000)  # a sample is enough to find where the tails begin
     low, high = np.quantile(values[::step], [_TAIL, 1 - _TAIL])
-    low, high = min(low, at_rule.min()), max(high, at_rule.max())
+    low, high = at_rule.min(initial=low), at_rule.max(initial=high)
     inside = [edge for edge in (bounds.low, bounds.high) if np.isfinite(edge)]
     low, high = min(low, *inside), max(high, *inside)
     if not low < high:
@@ -146,7 +146,7 @@ def _shares(values: NDArray[np.float32], edges: NDArray[np.float64]) -> NDArray[
     bins = len(edges) - 1
     scaled = (values.astype(np.float64) - edges[0]) * (bins / (edges[-1] - edges[0]))
     index = np.clip(scaled, 0, bins - 1).astype(np.int64)
-    return np.bincount(index, minlength=bins) / len(values)
+    return np.bincount(index, minlength=bins) / max(len(values), 1)
 
 
 def example_rows(tree: PolicyTree, node: int, count: int = 10) -> NDArray[np.int64]:

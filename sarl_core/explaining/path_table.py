@@ -84,7 +84,7 @@ def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
         rows.append(
             f'<tr class="{"cut" if step.is_cut else ""}"><td>{query}{note}</td>'
             f'<td class="n">{step.samples:,}</td><td class="n s">{share_text(step.support)}</td>'
-            f'<td class="n">{share_text(step.confidence)}</td>'
+            f'<td class="n">{share_text(step.confidence) if step.samples else "–"}</td>'
             f'<td class="bar">{label_mix(step.shares, dimension)}</td></tr>'
         )
     head = "".join(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,14 +52,19 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
         rule_set: Knows the names.
 
     Returns:
-        Column name to one value a rule. Shares are from 0 to 1.
+        Column name to one value a rule. Shares are from 0 to 1; what follows from the states of
+        a rule that has none is NaN.
     """
+
+    def told(rule: Rule, value: float) -> float:
+        return value if rule.samples else math.nan
+
     return {
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
         "Support": [rule.support for rule in rules],
-        "Confidence": [rule.confidence for rule in rules],
-        "Lift": [rule.lift for rule in rules],
+        "Confidence": [told(rule, rule.confidence) for rule in rules],
+        "Lift": [told(rule, rule.lift) for rule in rules],
         "Joint support": [rule.joint_support for rule in rules],
         "States": [rule.samples for rule in rules],
         "Length": [rule.length for rule in rules],

@@ -1,0 +1,240 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.language import sentence, share_text
+from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.rule_tree import recount
+from tests.app.screens import ROUTER, errors, metrics, open_page, texts
+
+DATA = ROUTER.parents[1] / "data" / "demonstrations"
+CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
+WALKER = load_demonstrations(DATA / "bipedal_walker.parquet")
+
+
+def elsewhere(demonstrations: Demonstrations) -> Demonstrations:
+    """The same pairs, and as many where the expert never was: far right, always pushing on."""
+    far = demonstrations.observations + np.float32([10.0, 0.0, 0.0, 0.0])
+    episodes = demonstrations.episodes
+    return Demonstrations(
+        np.concatenate([demonstrations.observations, far]),
+        np.concatenate([demonstrations.actions, np.ones_like(demonstrations.actions)]),
+        np.concatenate([episodes, episodes + int(episodes[-1]) + 1]),
+        feature_names=tuple(feature.name for feature in demonstrations.features),
+        label_names=[demonstrations.action_dimensions[0].labels],
+        env_id=demonstrations.env_id,
+    )
+
+
+@pytest.fixture
+def compact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuleSet:
+    """Compact rules for the cart pole, some of which no demonstrated state reaches."""
+    rules = leaf_rules(grow_budgeted_trees(elsewhere(CARTPOLE), max_rules=8))
+    rules.save(tmp_path / "cartpole_compact.json")
+    walking = leaf_rules(grow_budgeted_trees(WALKER, max_rules=6, divider=3))
+    walking.save(tmp_path / "bipedal_walker_compact.json")
+    open_page("demonstrations", data="cartpole")  # finds the modules of the pages
+    monkeypatch.setattr("_choices.RULES_FOLDER", tmp_path)
+    return RuleSet.load(tmp_path / "cartpole_compact.json")
+
+
+def counted_here(rules: RuleSet) -> RuleSet:
+    return leaf_rules(recount(rules, CARTPOLE))
+
+
+def numbers(rules: RuleSet) -> dict[str, str]:
+    return {
+        "Rules": f"{len(rules):,}",
+        "Mean length": f"{rules.mean_length:.1f}",
+        "Coverage": share_text(rules.coverage, decimals=1),
+        "Fidelity": share_text(rules.fidelity, decimals=1),
+    }
+
+
+def html(app: AppTest) -> str:
+    return "\n".join(part.proto.body for part in app.get("html"))
+
+
+def in_force(app: AppTest) -> bool:
+    return "Compact rules** in force" in texts(app)
+
+
+# --- Thresholds --------------------------------------------------------------------------------
+
+
+def test_the_compact_rules_are_a_click_away_and_counted_here(compact: RuleSet) -> None:
+    app = open_page("thresholds", data="cartpole")
+    assert not in_force(app)
+    assert "display: none" not in html(app)
+    app.button(key="compact").click().run()
+    assert not app.exception
+    assert metrics(app) == numbers(counted_here(compact))
+    assert metrics(app)["Coverage"] == "100 %"
+    assert app.query_params["set"] == "compact"
+    assert in_force(app)
+    assert "display: none" in html(app)
+    assert "no cell is marked" in texts(app)
+    table = app.dataframe[0].value
+    assert len(table) == len(compact)
+    assert table["States"].tolist() == sorted(
+        (rule.samples for rule in counted_here(compact).rules), reverse=True
+    )
+    unreached = sum(not rule.samples for rule in counted_here(compact).rules)
+    assert unreached
+    assert "reached by no demonstrated state" in texts(app)
+    assert table["Confidence"].isna().sum() == unreached
+
+
+def leave_by(app: AppTest, way: str) -> None:
+    if way in ("support", "confidence"):
+        app.select_slider(key=way).set_value({"support": 0.02, "confidence": 0.9}[way]).run()
+    elif way in ("lift", "depth"):
+        app.slider(key=way).set_value({"lift": 1.5, "depth": 6}[way]).run()
+    else:
+        app.button(key=way).click().run()
+    assert not app.exception
+
+
+@pytest.mark.parametrize(
+    ("way", "wanted"),
+    [
+        ("support", {"supp_min": 0.02}),
+        ("confidence", {"conf_min": 0.9}),
+        ("lift", {"lift_min": 1.5}),
+        ("depth", {"max_depth": 6}),
+        ("filtered", {}),
+        ("unfiltered", {"supp_min": 0.0, "conf_min": 1.0}),
+    ],
+)
+def test_whatever_moves_the_thresholds_goes_back_to_them(
+    compact: RuleSet, way: str, wanted: dict[str, float]
+) -> None:
+    app = open_page("thresholds", data="cartpole", set="compact")
+    assert in_force(app)
+    leave_by(app, way)
+    settings = {"supp_min": 0.005, "conf_min": 0.95} | wanted
+    assert metrics(app) == numbers(mine_rules(CARTPOLE, **settings))  # type: ignore[arg-type]
+    assert not in_force(app)
+    assert "set" not in app.query_params
+    assert "display: none" not in html(app)
+
+
+def test_a_jump_goes_back_to_the_thresholds(compact: RuleSet) -> None:
+    app = open_page("thresholds", data="cartpole", set="compact")
+    goal = float(app.button(key="support_above").label)
+    leave_by(app, "support_above")
+    assert app.select_slider(key="support").value == goal
+    assert metrics(app) == numbers(mine_rules(CARTPOLE, supp_min=goal, conf_min=0.95))
+    assert not in_force(app)
+
+
+def test_trade_offs_and_surfaces_know_the_compact_rules(compact: RuleSet) -> None:
+    app = open_page(
+        "thresholds", data="cartpole", set="compact", view="3-D", details="Best trade-offs"
+    )
+    specs = [json.loads(chart.proto.spec) for chart in app.get("plotly_chart")]
+    assert [len(spec["data"]) for spec in specs[:2]] == [1, 1]  # no dot on the surfaces
+    ring = next(trace for trace in specs[2]["data"] if trace.get("name") == "chosen")
+    assert ring["x"] == [len(compact)]
+    assert ring["y"] == [1.0]
+
+
+def test_one_action_of_several_is_looked_at_alone(compact: RuleSet) -> None:
+    app = open_page("thresholds", data="bipedal_walker", set="compact")
+    every = int(metrics(app)["Rules"])
+    name = WALKER.action_dimensions[1].name
+    app.button_group(key="dimension").set_value(name).run()
+    assert 0 < int(metrics(app)["Rules"]) <= 6 < every
+    assert len(app.dataframe[0].value) == int(metrics(app)["Rules"])
+    app.slider(key="divider").set_value(3).run()
+    assert not in_force(app)
+
+
+# --- Rules -------------------------------------------------------------------------------------
+
+
+def test_a_compact_rule_is_explained_on_the_chosen_demonstrations(compact: RuleSet) -> None:
+    here = counted_here(compact)
+    rule = max(here.rules, key=lambda one: one.samples)
+    app = open_page("rules", data="cartpole", set="compact", rule=rule.id)
+    assert len(app.dataframe[0].value) == len(compact)
+    assert sentence(rule, here) in texts(app)
+    shipped = next(one for one in compact.rules if one.id == rule.id)
+    assert shipped.samples != rule.samples or shipped.support != rule.support
+    words = texts(app)
+    assert f"Over the {compact.source.steps:,} pairs that the compact set was built from" in words
+    assert f"support {share_text(shipped.support)}" in words
+    assert html(app).count("<tr") == 1 + 1 + rule.length
+    assert len(app.dataframe[1].value) == min(10, rule.samples)
+    assert len(app.get("plotly_chart")) == 1 + rule.merged_length
+    app.button_group(key="tree").set_value("Around this rule").run()
+    assert not app.exception
+
+
+def test_a_rule_that_no_demonstrated_state_reaches_says_so(compact: RuleSet) -> None:
+    here = counted_here(compact)
+    rule = next(one for one in here.rules if not one.samples)
+    app = open_page("rules", data="cartpole", set="compact", rule=rule.id, tree="Around this rule")
+    assert "No demonstrated state reaches this rule" in texts(app)
+    assert sentence(rule, here, evidence=False) in texts(app)
+    assert "so did the expert" not in "".join(
+        part.value for part in app.markdown if part.value.startswith("####")
+    )
+    assert len(app.get("plotly_chart")) == 1 + rule.merged_length
+    assert len(app.dataframe) == 1
+    assert html(app).count("<tr") == 1 + 1 + rule.length
+
+
+def test_a_link_to_compact_rules_that_are_not_there_shows_the_thresholds(
+    compact: RuleSet, tmp_path: Path
+) -> None:
+    app = open_page("rules", data="lunar_lander", set="compact")
+    assert not in_force(app)
+    assert not errors(app)
+    assert "set" not in app.query_params
+    assert "compact" not in [
+        button.key for button in open_page("thresholds", data="pendulum").button
+    ]
+
+
+@pytest.mark.parametrize("page", ["thresholds", "rules"])
+@pytest.mark.parametrize("damage", ["torn", "cut", "foreign"])
+def test_compact_rules_that_cannot_be_used_are_said_and_the_thresholds_stay(
+    compact: RuleSet, tmp_path: Path, page: str, damage: str
+) -> None:
+    file = tmp_path / "cartpole_compact.json"
+    if damage == "torn":
+        file.write_text(file.read_text()[:100])
+    elif damage == "cut":
+        mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95).save(file)
+    else:
+        replace(compact, rules=compact.rules[:2]).save(file)
+    app = open_page(page, data="cartpole", set="compact")
+    (sentence_shown,) = errors(app)
+    assert "\n" not in sentence_shown
+    filtered = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
+    if page == "thresholds":
+        assert metrics(app) == numbers(filtered)
+    else:
+        assert len(app.dataframe[0].value) == len(filtered)
+
+
+# --- Replay ------------------------------------------------------------------------------------
+
+
+def test_compact_rules_are_replayed_where_there_are_some(compact: RuleSet) -> None:
+    app = open_page("replay", data="cartpole", rules="compact", agent="novice", seed="3")
+    assert app.selectbox(key="rules").value == "compact"
+    app.button(key="run").click().run()
+    assert not app.exception
+    assert not errors(app)
+    assert f"{len(compact):,} rules (compact)" in texts(app)
+    assert metrics(app)["Covered"] == "100 %"
+    assert "compact" not in open_page("replay", data="pendulum").selectbox(key="rules").options
