@@ -137,8 +137,7 @@ def refine(
                 )
                 for structures in shaken
             )
-            ranks = np.empty(len(means))
-            ranks[np.argsort(means)] = np.linspace(-0.5, 0.5, len(means))
+            ranks = _ranks(np.array(means))
             slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
             momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
             size = _MEMORY[1] * size + (1 - _MEMORY[1]) * slope**2
@@ -165,6 +164,16 @@ def pairs_of(pairs: Demonstrations, most: int) -> Demonstrations:
     """The first pairs, whole episodes, at least `most` of them where there are as many."""
     ends = np.cumsum(pairs.episode_lengths)
     return pairs.select(np.arange(1 + int(np.searchsorted(ends, min(most, len(pairs))))))
+
+
+def _ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places from -0.5, the least, to 0.5."""
+    # Equal means share theirs, so that nothing is followed where all do as well as can be.
+    ladder = np.empty(len(means))
+    ladder[np.argsort(means)] = np.linspace(-0.5, 0.5, len(means))
+    _, group, size = np.unique(means, return_inverse=True, return_counts=True)
+    shared: NDArray[np.float64] = (np.bincount(group, weights=ladder) / size)[group]
+    return shared
 
 
 def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:

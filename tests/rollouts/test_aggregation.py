@@ -24,7 +24,7 @@ from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.gaps import find_gaps
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.questions import ask, importance, scores
-from sarl_core.rollouts.refinement import refine
+from sarl_core.rollouts.refinement import _ranks, refine
 from sarl_core.shielding.shield import Shield
 
 DATA = EXPERT_FOLDER.parent / "demonstrations"
@@ -161,6 +161,13 @@ def test_refinement_follows_the_returns(cart):
     assert moved.feature.tolist() == trees[0].feature.tolist()
     assert moved.threshold[0] != trees[0].threshold[0]
     assert mean_return(leaf_rules(marks[-1])) > before - 5
+
+
+def test_where_all_do_alike_nothing_is_followed():
+    assert _ranks(np.array([3.0, 1.0, 2.0])).tolist() == [0.5, -0.5, 0.0]
+    assert np.allclose(_ranks(np.full(6, 500.0)), 0.0)
+    tied = _ranks(np.array([1.0, 7.0, 7.0, 0.0]))
+    assert tied[1] == tied[2] > tied[0] > tied[3]
 
 
 def mean_return(rules: RuleSet) -> float:
