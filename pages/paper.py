@@ -174,7 +174,7 @@ def how_made(entry: Entry) -> None:
     with st.expander("How this was made"):
         versions = ", ".join(f"{name} {version}" for name, version in entry.versions.items())
         st.markdown(
-            f"On {entry.made}, in {entry.seconds:,.0f} seconds of one core, with {versions}."
+            f"On {entry.made}, within {max(1, round(entry.seconds / 60))} min, with {versions}."
         )
         st.code(entry.command.replace("DIR", "docs/paper"), language="sh")
         st.json({"settings": entry.settings, "inputs": entry.inputs}, expanded=2)
