@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import streamlit as st
+from _choices import AGENTS
 from _comparisons import Row
 from _words import escaped
 
@@ -128,10 +129,17 @@ def verdicts(found: Found) -> list[str]:
             pair for pair in shielded[1:][-1:] if clear_change(alone, pair[1]) < 0
         ]
         sentences += [
-            verdict(agent, f"the {rules_name(line.shield)}", alone, episodes)
+            verdict(agent_name(agent), f"the {rules_name(line.shield)}", alone, episodes)
             for line, episodes in told
         ]
     return sentences
+
+
+def agent_name(agent: str) -> str:
+    """An agent in the middle of a sentence, after "the"."""
+    if agent == "untrained":
+        return "untrained agent"
+    return agent if agent in AGENTS else f"agent {agent}"
 
 
 def rules_name(shield: str) -> str:

@@ -138,7 +138,8 @@ def settings() -> Choices:
             key="agents",
             bind="query-params",
             help="Novice: random actions. Expert: the one that is shipped for this environment. "
-            "Untrained: a fresh network, its actions sampled. Own file: policies of yours.",
+            "Untrained: a fresh network, its actions sampled, which is nearly the same as random. "
+            "Own file: policies of yours.",
         )
         policy_files: list[UploadedFile] = []
         if OWN_FILE in agents:

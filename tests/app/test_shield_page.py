@@ -117,7 +117,7 @@ def test_what_was_finished_before_a_cancel_stays_readable() -> None:
 
 
 def test_the_work_goes_on_while_other_pages_are_looked_at() -> None:
-    app = open_page("shield", data="cartpole", episodes="30", first_seed="4000")
+    app = open_page("shield", data="cartpole", episodes="12", first_seed="4000")
     app.button(key="run_comparison").click().run()
     app.switch_page("rules.py").run()
     assert not app.exception
