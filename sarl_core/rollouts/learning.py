@@ -197,7 +197,10 @@ def _learn(
     )
     go_on = tell(before, begun)
     if go_on and begun < steps:
-        learner.learn(steps - begun, callback=recorder, reset_num_timesteps=False)
+        try:
+            learner.learn(steps - begun, callback=recorder, reset_num_timesteps=False)
+        except ValueError as error:  # torch's word for probabilities that are no numbers
+            raise _diverged(learner, error) from error
     keep(recorder.curve())
     if not go_on or recorder.stopped or not tell(recorder.curve(), learner.num_timesteps):
         raise CancelledError(f"stopped after {learner.num_timesteps:,} of {steps:,} steps")
@@ -217,7 +220,17 @@ def _exported(learner: Any, env_id: str, arm: LearningArm) -> MlpPolicy:
             biases=(*policy.biases[:-1], policy.biases[-1] * sharp),
         )
     except InputError as error:
-        raise WorkError(f"the learner has diverged ({error}); try another seed") from error
+        raise _diverged(learner, error) from error
+
+
+def _diverged(learner: Any, error: Exception) -> Exception:
+    """What to say of a learner whose weights are no numbers any more; else the error itself."""
+    if all(bool(value.isfinite().all()) for value in learner.policy.state_dict().values()):
+        return error
+    return WorkError(
+        f"the learner has diverged after {learner.num_timesteps:,} steps, its weights are no "
+        "numbers any more; try another seed"
+    )
 
 
 def _try(

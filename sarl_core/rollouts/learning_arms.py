@@ -172,6 +172,11 @@ def check_learning(
             f"{env_id} takes several discrete actions at once, which no learner here does; "
             "choose an environment with one discrete action, or with continuous ones"
         )
+    if description.is_discrete and any(description.label_first):
+        raise InputError(
+            f"the actions of {env_id} count from {description.label_first[0]} and no learner here "
+            "takes them; wrap the environment so that they count from 0"
+        )
     if arm.discrete_only and not description.is_discrete:
         raise InputError(
             f"the arm {arm.name!r} masks discrete actions and {env_id} takes continuous ones; "
