@@ -12,7 +12,7 @@ import numpy as np
 from sarl_core.errors import InputError
 from sarl_core.rollouts.learning import TRIAL_EPISODES, learn, rules_digest
 from sarl_core.rollouts.learning_arms import LearningArm, check_learning
-from sarl_core.rollouts.learning_curves import LearningCurve
+from sarl_core.rollouts.learning_curves import NO_EPISODES, LearningCurve
 from sarl_core.rollouts.learning_files import (
     FORMAT,
     PLAN,
@@ -189,25 +189,31 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
     """One run, from its checkpoint if there is one."""
     checkpoint = run_path(folder, arm, seed).with_suffix(".pt")
     written = -np.inf
+    latest = LearningRun(arm, seed, 0, NO_EPISODES)
 
     def watch(curve: LearningCurve, done: int) -> None:
-        nonlocal written
+        nonlocal written, latest
+        latest = LearningRun(arm, seed, min(done, plan.steps), curve)
         if time.monotonic() - written > _WRITTEN_EVERY:
-            save_run(folder, LearningRun(arm, seed, min(done, plan.steps), curve))
+            save_run(folder, latest)
             written = time.monotonic()
 
-    result = learn(
-        plan.env_id,
-        plan.rules,
-        arm,
-        steps=plan.steps,
-        seed=seed,
-        projection=plan.projection,
-        episodes=plan.episodes,
-        checkpoint=checkpoint,
-        progress=progress,
-        watch=watch,
-    )
+    try:
+        result = learn(
+            plan.env_id,
+            plan.rules,
+            arm,
+            steps=plan.steps,
+            seed=seed,
+            projection=plan.projection,
+            episodes=plan.episodes,
+            checkpoint=checkpoint,
+            progress=progress,
+            watch=watch,
+        )
+    except CancelledError:
+        save_run(folder, latest)
+        raise
     result.policy.save(policy_path(folder, arm, seed))
     save_run(
         folder,

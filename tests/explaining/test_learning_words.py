@@ -1,0 +1,197 @@
+"""A study of learning in words and figures: they follow from its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core.explaining.learning_figures import (
+    afterwards_figure,
+    arm_colour,
+    curves_figure,
+    outcome_figure,
+)
+from sarl_core.explaining.learning_words import HEADINGS, finding, table_rows, value_text, verdict
+from sarl_core.rollouts.learning_arms import ARMS
+from sarl_core.rollouts.learning_curves import LearningCurve, Trial
+from sarl_core.rollouts.learning_files import LearningRun, LearningStudy
+from sarl_core.rollouts.learning_summary import summarise_study
+
+RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
+
+
+def a_run(arm: str, seed: int, crashes: int, alone: float) -> LearningRun:
+    curve = LearningCurve.from_dict(
+        {
+            "ends": [(index + 1) * 100 for index in range(10)],
+            "returns": [float(index * 10) for index in range(10)],
+            "lengths": [100] * 10,
+            "crashed": [index < crashes for index in range(10)],
+            "interventions": [50 - index for index in range(10)],
+            "covered": [100] * 10,
+            "shielded": [ARMS[arm].shielded] * 10,
+        }
+    )
+    trial = Trial((alone - 1, alone + 1), 1, 0.0, 0.0)
+    return LearningRun(ARMS[arm], seed, 1000, curve, trial, Trial((150.0, 150.0), 0, 0.5, 1.0))
+
+
+def a_study(*runs: LearningRun) -> LearningStudy:
+    arms = tuple(arm for arm in ARMS.values() if any(run.arm == arm for run in runs))
+    seeds = tuple(sorted({run.seed for run in runs}))
+    settings = {"rules": RULES, "trial_episodes": 2}
+    return LearningStudy("LunarLander-v3", 1000, settings, arms, seeds, runs)
+
+
+@pytest.fixture
+def study() -> LearningStudy:
+    return a_study(
+        a_run("none", 0, 10, -190.0),
+        a_run("none", 1, 8, -170.0),
+        a_run("override", 0, 2, -560.0),
+        a_run("override", 1, 2, -580.0),
+        a_run("handover", 0, 3, 210.0),
+        a_run("handover", 1, 1, 190.0),
+        a_run("mask", 0, 9, -200.0),
+        a_run("penalty", 0, 7, 100.0),
+    )
+
+
+def test_the_best_arm_is_named_first_with_its_numbers(study: LearningStudy) -> None:
+    answer = finding(study, summarise_study(study))[0]
+    assert answer.startswith("Safe while learning and good afterwards: “Imitate, then hand over”.")
+    for number in ("2 times", "9 times", "200 (190 to 210)", "−180", "50 %"):
+        assert number in answer
+
+
+def test_the_others_are_sorted_by_what_they_are(study: LearningStudy) -> None:
+    paragraphs = finding(study, summarise_study(study))
+    (safe,) = [text for text in paragraphs if text.startswith("Safe while learning, but")]
+    assert "“Override” (2 times; afterwards −570)" in safe
+    (good,) = [text for text in paragraphs if text.startswith("Good afterwards, but")]
+    assert "penalty" in good
+    (neither,) = [text for text in paragraphs if text.startswith("Neither")]
+    assert "“Mask”" in neither
+    assert not any(text.startswith("Also") for text in paragraphs)
+
+
+def test_conditions_and_what_the_rules_are_worth_are_said(study: LearningStudy) -> None:
+    paragraphs = finding(study, summarise_study(study))
+    assert any("speak in every state" in text and "150" in text for text in paragraphs)
+    assert "3,274 rules (support 0, confidence 1)" in paragraphs[-1]
+    assert "2 learners of each kind" in paragraphs[-1]
+    assert "“No shield” crashed 9 times" in "\n".join(paragraphs)
+
+
+def test_where_no_arm_is_both_that_is_said() -> None:
+    study = a_study(a_run("none", 0, 10, 500.0), a_run("override", 0, 1, 20.0))
+    assert finding(study, summarise_study(study))[0].startswith("No way to learn was both")
+
+
+def test_without_the_learner_alone_there_is_no_verdict() -> None:
+    study = a_study(a_run("override", 0, 1, 20.0))
+    summaries = summarise_study(study)
+    assert "run it too" in finding(study, summaries)[0]
+    assert verdict(summaries[0]) == "–"
+
+
+def test_an_empty_study_says_so() -> None:
+    assert finding(a_study(), ()) == ["No run is finished yet."]
+
+
+def test_the_table_has_a_row_an_arm_under_its_headings(study: LearningStudy) -> None:
+    rows = table_rows(summarise_study(study))
+    assert all(len(row) == len(HEADINGS) for row in rows)
+    table = {row[0]: dict(zip(HEADINGS, row, strict=True)) for row in rows}
+    assert table["No shield"]["Crashes while learning"] == "9 (8–10)"
+    assert table["No shield"]["Changed by rules"] == "–"
+    assert table["Mask"]["Crashes while learning"] == "9"
+    assert table["Override"]["Verdict"] == "safe, not good"
+    assert table["Imitate, then hand over"]["Verdict"] == "safe and good"
+    assert table["Imitate, then hand over"]["Return after, shield off"] == "200 (190 to 210)"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(-191.4, "−191"), (0.2, "0"), (-0.2, "0"), (1234.5, "1,234"), (float("nan"), "–")],
+)
+def test_values_for_people(value: float, text: str) -> None:
+    assert value_text(value) == text
+
+
+def test_each_arm_has_a_colour() -> None:
+    colours = {name: arm_colour(arm) for name, arm in ARMS.items()}
+    shielded = [colour for name, colour in colours.items() if ARMS[name].shielded]
+    assert len(set(shielded)) == len(shielded)
+    assert colours["none"] == colours["none-replay"]
+
+
+def test_curves_are_means_in_bands(study: LearningStudy) -> None:
+    figure = curves_figure(study)
+    lines = [trace for trace in figure.data if trace.mode == "lines" and trace.name]
+    crashes = {trace.name: trace.y for trace in lines if trace.yaxis == "y2"}
+    assert crashes["No shield"][-1] == 9.0  # of 10 and 8
+    assert crashes["Override"][-1] == 2.0
+    changed = {trace.name for trace in lines if trace.yaxis == "y3"}
+    assert "No shield" not in changed
+    assert "Override" in changed
+    assert {trace.name for trace in lines if trace.showlegend} == {arm.title for arm in study.arms}
+
+
+def test_curves_of_a_run_at_work_end_where_it_is() -> None:
+    run = a_run("none", 0, 3, 0.0)
+    curve = LearningCurve.from_dict(
+        {name: column[:5] for name, column in run.curve.to_dict().items()}
+    )
+    half = replace(run, curve=curve, done=500, alone=None, shielded=None)
+    figure = curves_figure(a_study(half))
+    (crashes,) = [trace for trace in figure.data if trace.name and trace.yaxis == "y2"]
+    assert max(crashes.x) == 500
+    assert figure.layout.xaxis.range == (0, 1000)
+
+
+def test_a_run_without_an_episode_draws_nothing_and_breaks_nothing() -> None:
+    run = a_run("none", 0, 3, 0.0)
+    empty = LearningCurve.from_dict({name: [] for name in run.curve.to_dict()})
+    study = a_study(replace(run, curve=empty, done=10, alone=None, shielded=None))
+    assert not curves_figure(study).data
+
+
+def test_outcomes_stand_at_their_means_and_the_corner_is_safe_and_good(
+    study: LearningStudy,
+) -> None:
+    figure = outcome_figure(summarise_study(study))
+    named = {trace.text[0]: trace for trace in figure.data if trace.text}
+    point = named["<b>Imitate, then hand over</b>"]
+    assert (point.x[0], point.y[0]) == (2.0, 200.0)
+    (corner,) = figure.layout.shapes
+    assert (corner.x1, corner.y0) == (4.5, -180.0)
+    assert corner.x0 < point.x[0] < corner.x1
+    assert point.y[0] > corner.y0
+
+
+def test_afterwards_shows_the_shield_off_and_on(study: LearningStudy) -> None:
+    summaries = summarise_study(study)
+    figure = afterwards_figure(summaries)
+    assert len(figure.data) == 2 * len(summaries)
+    on = [trace.x[0] for trace in figure.data if trace.name == "shield on"]
+    assert set(on) == {150.0}
+    assert [trace.showlegend for trace in figure.data].count(True) == 2
+    assert figure.layout.shapes[0].x0 == pytest.approx(np.mean([-190, -170]))
+
+
+def test_figures_of_a_study_without_rules_and_without_a_finished_run() -> None:
+    run = replace(a_run("none", 0, 3, 5.0), shielded=None)
+    assert len(afterwards_figure(summarise_study(a_study(run))).data) == 1
+    assert not outcome_figure(()).data
+
+
+def test_pictures_are_written(study: LearningStudy, tmp_path: Path) -> None:
+    from sarl_core.explaining.learning_figures import save_learning_figures
+
+    save_learning_figures(study, tmp_path)
+    for name in ("outcome", "curves", "afterwards"):
+        assert (tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
