@@ -7,14 +7,13 @@ requests from the time before.
 from __future__ import annotations
 
 import tempfile
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
 from typing import TypeVar
 
 import streamlit as st
+from _kept import Kept
 from _words import in_full
 from streamlit.delta_generator import DeltaGenerator
 
@@ -74,29 +73,6 @@ class Replay:
     def shown(self) -> Episodes:
         """The episode that is gone through step by step."""
         return self.film.episodes[0]
-
-
-class Kept:
-    """The latest few results, shared between sessions, so that memory has a bound."""
-
-    def __init__(self, most: int) -> None:
-        self.most, self.lock = most, Lock()
-        self.results: OrderedDict[object, object] = OrderedDict()
-
-    def get(self, key: object) -> object | None:
-        """A result, if it is still kept."""
-        with self.lock:
-            if key in self.results:
-                self.results.move_to_end(key)
-            return self.results.get(key)
-
-    def put(self, key: object, result: object) -> None:
-        """Keep a result, and let go of the one that was not used for longest."""
-        with self.lock:
-            self.results[key] = result
-            self.results.move_to_end(key)
-            while len(self.results) > self.most:
-                self.results.popitem(last=False)
 
 
 @st.cache_resource

@@ -56,6 +56,12 @@ PAGES = [
         help="What a shield is worth: agents with the rules and without, over many episodes.",
     ),
     st.Page(
+        "improve.py",
+        title="Improve",
+        icon=":material/trending_up:",
+        help="The expert answers where the rules lead, and few rules are made of its answers.",
+    ),
+    st.Page(
         "learning.py",
         title="Learning",
         icon=":material/school:",

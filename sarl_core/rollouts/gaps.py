@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ class Gaps:
         observations: The states, (K, d) float32.
         missing: Action dimensions without a rule, (K, m) bool.
         met: How many states were met in all.
+        episodes: In how many episodes.
     """
 
     feature_names: tuple[str, ...]
@@ -38,6 +40,7 @@ class Gaps:
     observations: NDArray[np.float32]
     missing: NDArray[np.bool_]
     met: int
+    episodes: int
 
     def __len__(self) -> int:
         """Number of states K that need a demonstration."""
@@ -108,4 +111,28 @@ def find_gaps(
         observations=table.observation[rows],
         missing=missing[rows],
         met=len(table),
+        episodes=episodes,
+    )
+
+
+def join_gaps(pieces: Sequence[Gaps]) -> Gaps:
+    """Put the gaps of several runs of one agent behind each other.
+
+    Args:
+        pieces: At least one, of the same rules.
+
+    Returns:
+        All their states, episodes numbered on.
+    """
+    before = np.cumsum([0, *(piece.episodes for piece in pieces)])
+    return Gaps(
+        feature_names=pieces[0].feature_names,
+        episode=np.concatenate(
+            [piece.episode + first for piece, first in zip(pieces, before, strict=False)]
+        ),
+        step=np.concatenate([piece.step for piece in pieces]),
+        observations=np.concatenate([piece.observations for piece in pieces]),
+        missing=np.concatenate([piece.missing for piece in pieces]),
+        met=sum(piece.met for piece in pieces),
+        episodes=sum(piece.episodes for piece in pieces),
     )

@@ -163,7 +163,7 @@ class WorkerPool:
             self._processes = ProcessPoolExecutor(
                 self.workers,
                 timeout=_IDLE_SECONDS,
-                initializer=_begin,
+                initializer=begin_process,
                 env={"OMP_NUM_THREADS": "1"},
             )
             return self._processes.submit(*work)
@@ -204,7 +204,7 @@ def _next_piece(task: int, state: _Progress) -> _Piece:
     return piece
 
 
-def _begin() -> None:
+def begin_process() -> None:
     """Let other processes go first, and end with the one that asks; for a new process."""
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
