@@ -162,7 +162,8 @@ def show_table(rule_set: RuleSet) -> Rule | None:
         selection_default={"selection": {"rows": [] if place is None else [place]}},
         alt="All rules in force",
     )
-    count = f"{len(rules):,} rules" if len(rules) > 1 else "One rule"
+    kind = "" if compact is None else "compact "
+    count = f"{len(rules):,} {kind}rules" if len(rules) > 1 else f"One {kind}rule"
     st.caption(
         (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
         + "Click a heading to sort, the box at the left of a row to see the rule below."
@@ -219,10 +220,13 @@ def measures(rule: Rule) -> str:
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
     """The numbers of a compact rule over the pairs it was built from."""
-    built = rule_set.source
+    built, divided = rule_set.source, ""
+    if rule_set.actions[rule.dimension].is_interval:
+        divided = f" (divider {rule_set.divider})"
     st.caption(
-        f"Over the {built.steps:,} pairs that the compact set was built from: {measures(rule)}, "
-        f"{counted(rule.samples, 'state')}. Everything below is of the chosen demonstrations."
+        f"Over the {built.steps:,} pairs that the compact set was built from{divided}: "
+        f"{measures(rule)}, {counted(rule.samples, 'state')}. Everything else here is of the "
+        "chosen demonstrations."
     )
 
 

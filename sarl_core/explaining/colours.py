@@ -2,7 +2,7 @@
 
 The first seven are those of Okabe and Ito, told apart with every kind of colour vision and legible
 on light and on dark; their vermilion is kept for interventions. Should a label need an eighth, a
-second ring follows.
+second ring follows, and a third for the many intervals of a finely divided action.
 """
 
 from __future__ import annotations
@@ -18,6 +18,15 @@ LABEL_COLOURS = (
     "#7A4FBF",
     "#A0612B",
     "#5F8F3E",
+)
+_MANY_COLOURS = (
+    *LABEL_COLOURS,
+    "#17A2A8",
+    "#B493E6",
+    "#A33B64",
+    "#9CC53B",
+    "#D2A679",
+    "#5566D8",
 )
 INTERVENTION_COLOUR = "#D55E00"  # vermilion
 MARKER_COLOUR = "#D55E00"  # what is chosen: a point, a rule's path, its interval
@@ -42,7 +51,7 @@ def label_colour(index: int) -> str:
     Returns:
         As "#0072B2".
     """
-    return LABEL_COLOURS[index % len(LABEL_COLOURS)]
+    return _MANY_COLOURS[index % len(_MANY_COLOURS)]
 
 
 def faded(colour: str, opacity: float) -> str:
