@@ -33,7 +33,7 @@ SHIPPED = {
 }
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"
-MIN_DIVIDER, MAX_DIVIDER = 2, 10
+MIN_DIVIDER, MAX_DIVIDER = 2, 16
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
 DATA_FOLDER = Path(__file__).parents[1] / "data" / "demonstrations"
