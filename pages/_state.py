@@ -30,6 +30,7 @@ SHIPPED = {
     "cartpole": ("Cart Pole", "CartPole-v1"),
     "pendulum": ("Pendulum", "Pendulum-v1"),
     "bipedal_walker": ("Bipedal Walker", "BipedalWalker-v3"),
+    "lunar_lander_continuous": ("Lunar Lander, continuous", "LunarLanderContinuous-v3"),
 }
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"

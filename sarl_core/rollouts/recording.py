@@ -21,6 +21,7 @@ from sarl_core.rollouts.steps import concatenate
 SHIPPED = {
     "CartPole-v1": "cartpole",
     "LunarLander-v3": "lunar_lander",
+    "LunarLanderContinuous-v3": "lunar_lander_continuous",
     "Pendulum-v1": "pendulum",
     "BipedalWalker-v3": "bipedal_walker",
 }

@@ -88,6 +88,22 @@ RECIPES: dict[str, Recipe] = {
             "clip_range": 0.2,
         },
     ),
+    "LunarLanderContinuous-v3": Recipe(
+        algorithm="PPO",
+        steps=1_500_000,
+        n_envs=16,
+        normalise=False,
+        validation_every=100_000,
+        gamma=0.999,
+        parameters={
+            "n_steps": 1024,
+            "batch_size": 256,
+            "n_epochs": 6,
+            "gae_lambda": 0.98,
+            "learning_rate": "linear:0.0006",
+            "clip_range": 0.2,
+        },
+    ),
     "BipedalWalker-v3": Recipe(
         algorithm="PPO",
         steps=3_000_000,

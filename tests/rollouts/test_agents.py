@@ -92,7 +92,13 @@ def test_an_agent_is_given_back_as_it_is() -> None:
 
 
 def test_the_expert_is_found_by_environment() -> None:
-    shipped = ["BipedalWalker-v3", "CartPole-v1", "LunarLander-v3", "Pendulum-v1"]
+    shipped = [
+        "BipedalWalker-v3",
+        "CartPole-v1",
+        "LunarLander-v3",
+        "LunarLanderContinuous-v3",
+        "Pendulum-v1",
+    ]
     assert list(shipped_experts()) == shipped
     assert make_agent("expert", "gymnasium:CartPole-v1").name == "expert"
     with pytest.raises(InputError, match=", ".join(shipped)):
