@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from bisect import bisect_left
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -119,9 +120,11 @@ def fitted(text: str, size: int, width: int) -> str:
     """
     if text_width(text, size) <= width:
         return text
-    while text and text_width(f"{text}…", size) > width:
-        text = text[:-1].rstrip()
-    return f"{text}…"
+    # The rules of four joints in one sentence are long: halve, and do not count down.
+    count = bisect_left(
+        range(1, len(text)), True, key=lambda n: text_width(f"{text[:n].rstrip()}…", size) > width
+    )
+    return f"{text[:count].rstrip()}…"
 
 
 def wrapped(text: str, size: int, width: int, lines: int) -> list[str]:
