@@ -13,6 +13,7 @@ import tempfile
 import urllib.request
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 DOCS = Path(__file__).parent
@@ -34,26 +35,44 @@ def sarl(*arguments: str) -> None:
     subprocess.run([sys.executable, "-m", "sarl_core", *arguments], cwd=ROOT, check=True)
 
 
+def render(env_id: str, rules: str, out: Path, *options: str) -> None:
+    """A novice under shipped rules, on a seed that nothing was chosen by."""
+    sarl(
+        "render",
+        "--env",
+        env_id,
+        "--agent",
+        "novice",
+        "--rules",
+        f"data/rules/{rules}_compact.json",
+        "--seed",
+        "100000",
+        "--out",
+        str(out),
+        *options,
+    )
+
+
 def replay() -> None:
-    """The GIF: a novice in Lunar Lander, unfiltered rules, side by side."""
+    """The GIF: a novice in Lunar Lander, side by side."""
+    render("LunarLander-v3", "lunar_lander", DOCS / "replay.gif", "--side-by-side")
+
+
+def walker() -> None:
+    """The GIF of Bipedal Walker: the first ten seconds, every third picture, made smaller."""
     with tempfile.TemporaryDirectory() as folder:
-        rules = str(Path(folder) / "rules.json")
-        demonstrations = "data/demonstrations/lunar_lander.parquet"
-        sarl("mine", demonstrations, "--support", "0", "--confidence", "1", "--out", rules)
-        sarl(
-            "render",
-            "--env",
-            "LunarLander-v3",
-            "--agent",
-            "novice",
-            "--rules",
-            rules,
-            "--seed",
-            "1",
-            "--side-by-side",
-            "--out",
-            str(DOCS / "replay.gif"),
-        )
+        whole = Path(folder) / "walker.gif"
+        render("BipedalWalker-v3", "bipedal_walker", whole)
+        with Image.open(whole) as film:
+            pictures = []
+            for number in range(0, 500, 3):
+                film.seek(number)
+                pictures.append(film.convert("RGB").resize((420, 409), Image.Resampling.LANCZOS))
+    palette = pictures[50].quantize(128)
+    first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
+    first.save(
+        DOCS / "walker.gif", save_all=True, append_images=others, duration=60, loop=0, optimize=True
+    )
 
 
 def screenshots() -> None:
