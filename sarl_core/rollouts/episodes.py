@@ -230,7 +230,8 @@ def rollout(
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     seeds = np.arange(seed, seed + episodes, dtype=np.int64)
-    pieces = np.array_split(seeds, min(episodes, jobs * _ROUNDS))
+    # None larger than what runs side by side: who stops a long run need not wait for a part of it.
+    pieces = np.array_split(seeds, min(episodes, max(jobs * _ROUNDS, -(-episodes // batch))))
     done = 0
 
     def finished(count: int) -> None:
