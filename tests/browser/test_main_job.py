@@ -151,7 +151,8 @@ def test_a_clicked_step_is_shown(screen: Page) -> None:
     box = plot.bounding_box()
     assert box is not None
     screen.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-    screen.wait_for_timeout(300)
+    # A figure takes a click only where it has seen the pointer first.
+    screen.locator(".js-plotly-plot .hoverlayer > *").first.wait_for(state="attached")
     screen.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     screen.wait_for_function("() => location.search.includes('step=')")
     settle(screen)
