@@ -86,7 +86,7 @@ class Order:
 
 
 def base() -> Path:
-    """The folder of all studies that visitors asked for."""
+    """The folder of all studies that visitors asked for; SARL_LEARNING names another one."""
     name = f"sarl-explorer-{os.getuid()}" if hasattr(os, "getuid") else "sarl-explorer"
     return Path(os.environ.get("SARL_LEARNING", "") or Path(tempfile.gettempdir()) / name)
 

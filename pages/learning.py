@@ -125,7 +125,8 @@ def show_shipped() -> None:
 def settings() -> learning.Order | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
     with st.container(border=True):
-        with st.grid(4, min_column_width=150, gap="small"):
+        discrete = is_discrete()
+        with st.grid(3 if discrete else 4, min_column_width=150, gap="small"):
             rules = st.selectbox(
                 "Rules",
                 [
@@ -160,7 +161,7 @@ def settings() -> learning.Order | None:
                 help="One may have been lucky; three say more.",
             )
             projection = PROJECTIONS[0]
-            if not is_discrete():
+            if not discrete:
                 projection = st.selectbox(
                     "Replace by",
                     PROJECTIONS,

@@ -91,7 +91,7 @@ def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
     figure.update_xaxes(title={"text": "steps of learning", "standoff": 2}, row=3, col=1)
     for row, title in enumerate(_PANELS, start=1):
         figure.update_yaxes(
-            title={"text": title, "standoff": 4},
+            title={"text": title, "standoff": 8},
             fixedrange=True,
             nticks=6,
             zeroline=False,
@@ -182,7 +182,7 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
         zeroline=False,
     )
     figure.update_yaxes(
-        title={"text": "return afterwards, shield off", "standoff": 4},
+        title={"text": "return afterwards, shield off", "standoff": 8},
         range=[bottom, top],
         fixedrange=True,
         nticks=7,
@@ -372,7 +372,7 @@ def _places(summaries: Sequence[ArmSummary], span: float, width: float) -> list[
 def _layout(height: int) -> dict[str, Any]:
     return {
         "height": height,
-        "margin": {"l": 8, "r": 16, "t": 8, "b": 8},
+        "margin": {"l": 64, "r": 16, "t": 8, "b": 8},
         "dragmode": False,
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",

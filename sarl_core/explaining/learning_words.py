@@ -10,6 +10,8 @@ from sarl_core.explaining.language import counted, share_text, threshold_text
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 
+_NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the rules decide
+
 HEADINGS = (
     "Way to learn",
     "Crashes while learning",
@@ -154,7 +156,7 @@ def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]
     if safe := listed(True, False):
         sentences.append(
             f"Safe while learning, but without the shield worse than a learner that never had one: "
-            f"{safe}. There the rules did the work, and the learner did not learn what they did."
+            f"{safe}. The rules did the work there, and were not learned from."
         )
     if good := listed(False, True):
         sentences.append(f"Good afterwards, but not safe while learning: {good}.")
@@ -186,13 +188,13 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     covered = [
         summary.shielded
         for summary in summaries
-        if summary.shielded is not None and summary.shielded.coverage == 1.0
+        if summary.shielded is not None and summary.shielded.coverage >= _NEARLY_ALL
     ]
     if not covered:
         return ""
     return (
-        "These rules speak in every state, so with the shield on it is they who act, whatever was "
-        f"learned: return {value_text(covered[0].mean)}, crashes in "
+        "These rules speak in nearly every state, so with the shield on it is they who act, "
+        f"whatever was learned: return {value_text(covered[0].mean)}, crashes in "
         f"{share_text(covered[0].crash_rate)} of the episodes."
     )
 

@@ -1,0 +1,325 @@
+"""The Learning page: the shipped study, and studies of a visitor's own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import WorkError, load_demonstrations, mine_rules
+from sarl_core.rollouts.learning_arms import ARMS, arms_named
+from sarl_core.rollouts.learning_files import load_study
+from sarl_core.rollouts.learning_study import LearningPlan, run_study
+from tests.app.screens import errors, open_page, texts
+
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "pages"))  # where the pages find their own modules
+
+import _learning as learning  # noqa: E402  # found by the line above
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Studies of visitors go where nobody else's are."""
+    folder = tmp_path / "visitors"
+    monkeypatch.setenv("SARL_LEARNING", str(folder))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def small_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one study of CartPole, as one is shipped: its tables only."""
+    rules = mine_rules(
+        load_demonstrations(ROOT / "data" / "demonstrations" / "cartpole.parquet"),
+        supp_min=0.0,
+        conf_min=1.0,
+    )
+    folder = tmp_path_factory.mktemp("studies") / "cartpole"
+    plan = LearningPlan("CartPole-v1", rules, arms_named(["none", "mask"]), 600, (0,), episodes=2)
+    run_study(plan, folder)
+    for path in (*(folder / "runs").iterdir(), folder / "rules.json"):
+        path.unlink()
+    (folder / "runs").rmdir()
+    return folder.parent
+
+
+def own(*arms: str, **query: str) -> AppTest:
+    """The form, with some ways to learn chosen."""
+    app = open_page("learning", **{"data": "cartpole", "learn_view": "Your own", **query})
+    if arms:
+        app.pills(key="learn_arms").set_value(list(arms)).run()
+    return app
+
+
+def button(app: AppTest, key: str) -> Any:
+    """A button, or None."""
+    return next((each for each in app.button if each.key == key), None)
+
+
+def until_over(app: AppTest) -> AppTest:
+    """Look again and again, as the page does by itself, until nothing learns any more."""
+    for _ in range(600):
+        app.run()
+        assert not app.exception, app.exception
+        if button(app, "learn_stop") is None:
+            return app
+        time.sleep(0.3)
+    raise AssertionError(texts(app))
+
+
+# --- the shipped study --------------------------------------------------------------------------
+
+
+def test_the_shipped_study_stands_first(small_study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(learning, "STUDIES", small_study)
+    app = open_page("learning", data="cartpole")
+    assert not errors(app)
+    assert len(app.get("plotly_chart")) == 3
+    table = app.dataframe[0].value
+    assert table["Way to learn"].tolist() == ["No shield", "Mask"]
+    shown = texts(app)
+    assert "CartPole-v1, 1,508 rules (support 0, confidence 1), 600 steps" in shown
+    commands = "\n".join(code.value for code in app.code)
+    assert "mine data/demonstrations/cartpole.parquet --support 0 --confidence 1" in commands
+    assert "--arm none --arm mask --steps 600 --seeds 1" in commands
+
+
+def test_for_other_demonstrations_it_says_that_no_study_is_theirs(
+    small_study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(learning, "STUDIES", small_study)
+    app = open_page("learning", data="pendulum")
+    assert "For Pendulum-v1 no study is shipped" in texts(app)
+    assert app.dataframe
+
+
+def test_without_a_shipped_study_it_says_what_can_be_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(learning, "STUDIES", tmp_path / "none")
+    assert "No study is shipped" in texts(open_page("learning"))
+
+
+def test_a_damaged_study_is_one_sentence(
+    small_study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "studies" / "broken"
+    folder.mkdir(parents=True)
+    plan = (small_study / "cartpole" / "plan.json").read_text()
+    (folder / "plan.json").write_text(plan.replace('"version": 1', '"version": 7'))
+    monkeypatch.setattr(learning, "STUDIES", folder.parent)
+    (sentence,) = errors(open_page("learning"))
+    assert "version 7" in sentence
+
+
+def test_what_is_committed_can_be_shown() -> None:
+    plans = list(learning.STUDIES.glob("*/plan.json"))
+    assert plans
+    for plan in plans:
+        study = load_study(plan.parent)
+        assert study.complete
+        assert len(study.seeds) >= 3
+        for name in ("outcome", "curves", "afterwards"):
+            assert (plan.parent / f"{name}.png").is_file()
+
+
+# --- a study of one's own -----------------------------------------------------------------------
+
+
+def test_before_the_start_it_says_what_to_do() -> None:
+    app = own()
+    assert "press Start" in texts(app)
+    assert "3 runs of 20,000 steps in CartPole-v1" in texts(app)
+    assert not app.get("plotly_chart")
+
+
+def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None:
+    app = own("none", "imitate", learn_steps="1000")
+    app.button(key="learn_start").click().run()
+    assert not app.exception
+    assert button(app, "learn_stop") is not None
+    until_over(app)
+    assert not errors(app), errors(app)
+    assert "2 runs of 1,000 steps in CartPole-v1, all finished" in texts(app)
+    assert app.button(key="learn_start").disabled
+    assert app.dataframe[0].value["Way to learn"].tolist() == ["No shield", "Mask and imitate"]
+    assert [each.label for each in app.get("download_button")] == [
+        "Download policy (.npz)",
+        "Download everything (.zip)",
+    ]
+    (folder,) = own_folder.iterdir()
+    assert (folder / "policies" / "imitate-0.npz").is_file()
+    # Whoever asks the same again sees it at once; and one more way to learn takes over the others.
+    again = own("none", "imitate", learn_steps="1000")
+    assert "all finished" in texts(again)
+    before = (folder / "runs" / "imitate-0.json").read_bytes()
+    more = own("none", "imitate", "mask", learn_steps="1000")
+    more.button(key="learn_start").click().run()
+    until_over(more)
+    (other,) = set(own_folder.iterdir()) - {folder}
+    assert (other / "runs" / "imitate-0.json").read_bytes() == before
+    assert "3 runs of 1,000 steps in CartPole-v1, all finished" in texts(more)
+
+
+def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
+    app = own("none", learn_steps="4000")
+    app.button(key="learn_start").click().run()
+    job = app.session_state["_learning"]
+    for _ in range(600):
+        if learning.steps_made(job.order):
+            break
+        time.sleep(0.1)
+    app.button(key="learn_stop").click().run()
+    assert not app.exception
+    assert "Stopped." in texts(app)
+    for _ in range(600):
+        if not learning.trainings()._at_work:
+            break
+        time.sleep(0.1)
+    assert not learning.trainings()._at_work
+    (folder,) = own_folder.iterdir()
+    assert load_study(folder).runs[0].done > 0
+    app.run()
+    assert app.button(key="learn_start").label == "Go on"
+    app.button(key="learn_start").click().run()
+    until_over(app)
+    assert "all finished" in texts(app)
+    assert load_study(folder).runs[0].sittings == 2
+
+
+def test_a_study_that_cannot_be_learned_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    app = own("none", learn_steps="1000")
+    # As when the disk is full, or a package is missing: the process says one line and ends.
+    monkeypatch.setattr(learning.Training, "problem", lambda _: "there is no room left; make some")
+    monkeypatch.setattr(learning.subprocess, "Popen", failing)
+    app.button(key="learn_start").click().run()
+    until_over(app)
+    (sentence,) = errors(app)
+    assert sentence == "There is no room left; make some."
+    assert button(app, "learn_start") is not None
+
+
+def failing(*_: Any, **settings: Any) -> subprocess.Popen[bytes]:
+    return REAL(["false"], stdin=subprocess.PIPE, stderr=settings["stderr"])
+
+
+REAL = subprocess.Popen
+
+
+@pytest.mark.parametrize(
+    ("arms", "query", "fragment"),
+    [
+        ((), {"learn_rules": "own file"}, "rule file has been uploaded"),
+        (("mask",), {"data": "pendulum"}, "continuous"),
+        ((), {"data": "upload"}, "demonstrations do not say"),
+    ],
+)
+def test_what_cannot_be_learned_is_said_in_a_sentence(
+    arms: tuple[str, ...], query: dict[str, str], fragment: str
+) -> None:
+    app = own(*arms, **query)
+    (sentence,) = errors(app)
+    assert fragment in sentence
+    assert "\n" not in sentence
+    assert button(app, "learn_start") is None
+
+
+def test_without_a_way_to_learn_it_asks_for_one() -> None:
+    app = own()
+    app.pills(key="learn_arms").set_value([]).run()
+    (sentence,) = errors(app)
+    assert "choose at least one" in sentence
+
+
+# --- who waits for a process --------------------------------------------------------------------
+
+
+@pytest.fixture
+def waiting_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Instead of learning, a process that ends when its input does, as `learn` would."""
+
+    def start(*_: Any, **settings: Any) -> subprocess.Popen[bytes]:
+        return REAL(["cat"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+
+    monkeypatch.setattr(learning.subprocess, "Popen", start)
+    return
+
+
+def an_order(steps: int = 1000) -> learning.Order:
+    return learning.Order("CartPole-v1", None, "", (ARMS["none"],), steps, 1, "centre")
+
+
+@pytest.mark.usefixtures("waiting_process")
+def test_two_who_ask_the_same_share_a_process_and_the_last_one_ends_it() -> None:
+    everyone = learning.Trainings()
+    first, second = everyone.join(an_order()), everyone.join(an_order())
+    assert first is second
+    everyone.leave(first)
+    assert first.running
+    everyone.leave(second)
+    assert first.process.returncode == 0  # it is gone, and nothing of it is left
+    third = everyone.join(an_order())
+    assert third is not first
+    assert third.running
+    everyone.leave(third)
+
+
+@pytest.mark.usefixtures("waiting_process")
+def test_no_more_learn_at_once_than_the_machine_takes() -> None:
+    everyone = learning.Trainings()
+    at_work = [everyone.join(an_order(1000 + extra)) for extra in range(learning.MOST_TRAININGS)]
+    with pytest.raises(WorkError, match="try again"):
+        everyone.join(an_order(9000))
+    everyone.leave(at_work.pop())
+    at_work.append(everyone.join(an_order(9000)))
+    for training in at_work:
+        everyone.leave(training)
+
+
+@pytest.mark.usefixtures("waiting_process")
+def test_old_folders_go_and_those_in_use_stay(
+    own_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(learning, "MOST_FOLDERS", 2)
+    monkeypatch.setattr(learning, "MOST_TRAININGS", 9)
+    everyone = learning.Trainings()
+    oldest = everyone.join(an_order(1000))
+    for steps in (2000, 3000, 4000):
+        everyone.leave(everyone.join(an_order(steps)))
+    left = set(own_folder.iterdir())
+    assert oldest.folder in left
+    assert an_order(4000).folder in left
+    assert an_order(2000).folder not in left
+    everyone.leave(oldest)
+
+
+def test_a_folder_that_cannot_be_made_is_said(
+    own_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own_folder.write_text("in the way")
+    app = own("none", learn_steps="1000")
+    app.button(key="learn_start").click().run()
+    until_over(app)
+    (sentence,) = errors(app)
+    assert "cannot be made" in sentence
+
+
+def test_orders_differ_in_their_folders_by_all_that_changes_the_numbers() -> None:
+    order = an_order()
+    others = [
+        replace(order, env_id="LunarLander-v3"),
+        replace(order, steps=2000),
+        replace(order, seeds=2),
+        replace(order, rules_digest="other"),
+        replace(order, arms=(ARMS["none-replay"],)),
+        replace(order, projection="clip"),
+    ]
+    assert len({each.folder for each in (order, *others)}) == len(others) + 1
+    assert replace(order).folder == order.folder

@@ -1,0 +1,71 @@
+"""Learning in a browser: live curves, stopping, and nothing left behind when the visitor goes."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.walking import PATIENCE, no_trace, settle, visit
+
+# No other study has as many steps, so that its process is known by them.
+STEPS = 300_000 + os.getpid() % 100_000
+
+
+def at_work() -> list[int]:
+    """The processes that learn for so many steps; one that is dead and not buried counts too."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().split(b"\0")
+        except OSError:  # gone meanwhile
+            continue
+        if b"--stop-with-input" in words and str(STEPS).encode() in words:
+            found.append(int(path.parent.name))
+    return found
+
+
+def wait_until(wanted: int) -> None:
+    for _ in range(1200):
+        if len(at_work()) == wanted:
+            return
+        time.sleep(0.1)
+    raise AssertionError(at_work())
+
+
+def test_curves_grow_while_agents_learn_and_nothing_is_left_when_the_visitor_goes(
+    screen: Page,
+) -> None:
+    visit(screen, f"/learning?data=cartpole&learn_view=Your+own&learn_steps={STEPS}", "Learning")
+    screen.get_by_role("button", name="Start").click()
+    stop = screen.get_by_role("button", name="Stop")
+    expect(stop).to_be_visible()
+    wait_until(1)
+    expect(screen.locator(".js-plotly-plot").first).to_be_visible(timeout=2 * PATIENCE)
+    expect(screen.get_by_text("No shield, learner 1:").first).to_be_visible()
+    no_trace(screen)
+    # Other pages answer meanwhile, and the work goes on.
+    screen.get_by_role("link", name="Thresholds").click()
+    expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()
+    assert len(at_work()) == 1
+    screen.get_by_role("link", name="Learning").click()
+    stop.click()
+    expect(screen.get_by_text("Stopped.")).to_be_visible()
+    wait_until(0)
+    settle(screen)
+    screen.get_by_role("button", name="Go on").click()
+    wait_until(1)
+    no_trace(screen)
+    screen.context.close()  # the visitor goes without a word
+    wait_until(0)
+
+
+def test_the_shipped_study_is_shown(screen: Page) -> None:
+    visit(screen, "/learning?data=lunar_lander", "Learning")
+    expect(screen.locator(".js-plotly-plot").first).to_be_visible()
+    expect(screen.get_by_text("LunarLander-v3, 3,274 rules")).to_be_visible()
+    screen.get_by_role("tab", name="All numbers").click()
+    expect(screen.get_by_test_id("stDataFrame")).to_be_visible()
+    no_trace(screen)
