@@ -75,7 +75,8 @@ def show_study(study: LearningStudy, name: str) -> None:
         )
         st.caption(
             "Means of the learners, in brackets the least and the largest. Crashed: the episode "
-            "ended by failure."
+            "ended by failure. Changed: share of the steps at which the rules changed what the "
+            "learner wanted. After: the shield is off, but in the last column."
         )
     with arms:
         for summary in summaries:

@@ -67,13 +67,15 @@ def learn(
 ) -> None:
     """Let agents learn, with a shield and without, and see what they are worth without it.
 
-    Writes every episode (curves.csv), what came of it (results.json) and what was learned
-    (policies, .npz, each an agent for the other commands). Ctrl-C stops; the same command goes on.
+    Writes every episode (curves.csv), what came of it (results.json, and finding.md in words) and
+    what was learned (policies, .npz, each an agent for the other commands). Ctrl-C stops; the same
+    command goes on.
 
     Example: `python -m sarl_core learn --env LunarLander-v3 --rules rules.json --arm none --arm
     handover --steps 120000 --seeds 3 --out learned`
     """
     with terminal.working("Starting"):
+        from sarl_core.explaining.learning_words import save_finding
         from sarl_core.mining.rules import RuleSet
         from sarl_core.rollouts.learning_arms import arms_named
         from sarl_core.rollouts.learning_study import LearningPlan, run_study
@@ -100,6 +102,7 @@ def learn(
         except CancelledError as error:
             raise terminal.StoppedError(str(error)) from error
     summaries = summarise_study(study)
+    save_finding(study, summaries, out)
     if figures:
         with terminal.working("Drawing"):
             from sarl_core.explaining.learning_figures import save_learning_figures

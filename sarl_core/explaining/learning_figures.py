@@ -91,7 +91,8 @@ def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
     figure.update_xaxes(title={"text": "steps of learning", "standoff": 2}, row=3, col=1)
     for row, title in enumerate(_PANELS, start=1):
         figure.update_yaxes(
-            title={"text": title, "standoff": 8},
+            title={"text": title, "standoff": 14},
+            automargin=True,
             fixedrange=True,
             nticks=6,
             zeroline=False,
@@ -182,7 +183,8 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
         zeroline=False,
     )
     figure.update_yaxes(
-        title={"text": "return afterwards, shield off", "standoff": 8},
+        title={"text": "return afterwards, shield off", "standoff": 14},
+        automargin=True,
         range=[bottom, top],
         fixedrange=True,
         nticks=7,
@@ -219,7 +221,12 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
                 x=[found.iqm],
                 y=[row + shift],
                 mode="markers",
-                marker={"color": colour, "size": 11, "symbol": symbol, "line": {"width": 2}},
+                marker={
+                    "color": colour,
+                    "size": 11,
+                    "symbol": symbol,
+                    "line": {"width": 2, "color": colour},
+                },
                 error_x={
                     "type": "data",
                     "symmetric": False,
@@ -246,7 +253,7 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
         legend={"orientation": "h", "x": 0, "y": 1.01, "xanchor": "left", "yanchor": "bottom"},
     )
     figure.update_xaxes(
-        title={"text": "typical return after learning (IQM, 95 % interval)", "standoff": 2},
+        title={"text": "typical return (IQM, 95 % interval)", "standoff": 2},
         fixedrange=True,
         nticks=7,
         zeroline=False,
@@ -372,7 +379,7 @@ def _places(summaries: Sequence[ArmSummary], span: float, width: float) -> list[
 def _layout(height: int) -> dict[str, Any]:
     return {
         "height": height,
-        "margin": {"l": 64, "r": 16, "t": 8, "b": 8},
+        "margin": {"l": 8, "r": 16, "t": 8, "b": 8},
         "dragmode": False,
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from sarl_core.explaining.language import counted, share_text, threshold_text
+from sarl_core.files import whole_file
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 
@@ -14,15 +16,15 @@ _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the ru
 
 HEADINGS = (
     "Way to learn",
-    "Crashes while learning",
-    "of episodes",
-    "Changed by rules",
-    "Return while learning",
-    "Return after, shield off",
-    "IQM (95 % interval)",
-    "Crashed after, off",
-    "Return after, shield on",
     "Verdict",
+    "Crashes while learning",
+    "Episodes",
+    "Changed",
+    "Return meanwhile",
+    "Return after",
+    "IQM, 95 % interval",
+    "Crashed after",
+    "Shield on",
 )
 
 
@@ -80,6 +82,7 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
         rows.append(
             (
                 summary.arm.title,
+                verdict(summary),
                 value_text(summary.mean_crashes) + spread,
                 value_text(float(np.mean(summary.episodes))),
                 share_text(summary.intervention_rate) if summary.arm.shielded else "–",
@@ -89,7 +92,6 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
                 f"{value_text(alone.returns.high)})",
                 share_text(alone.crash_rate),
                 "–" if shielded is None else value_text(shielded.mean),
-                verdict(summary),
             )
         )
     return rows
@@ -108,9 +110,25 @@ def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
     if not summaries:
         return ["No run is finished yet."]
     judged = [summary for summary in summaries if summary.safe is not None]
-    paragraphs = [_answer(judged, summaries), *_others(judged, best(judged)), _alone(summaries)]
+    paragraphs = [_answer(judged, summaries), *_others(judged, best(judged))]
+    paragraphs.append(_alone(summaries, best(judged)))
     paragraphs += [_rules(study, summaries), _conditions(study)]
     return [paragraph for paragraph in paragraphs if paragraph]
+
+
+def save_finding(study: LearningStudy, summaries: Sequence[ArmSummary], folder: Path) -> None:
+    """Write the finding and the table as ``finding.md``.
+
+    Args:
+        study: With finished runs.
+        summaries: Of it.
+        folder: Where it goes.
+    """
+    rows = [HEADINGS, ["---"] * len(HEADINGS), *table_rows(summaries)]
+    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    text = "\n\n".join([f"# Learning in {study.env_id}", *finding(study, summaries), table])
+    with whole_file(folder / "finding.md") as unfinished:
+        unfinished.write_text(f"{text}\n", encoding="utf-8")
 
 
 def _answer(judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]) -> str:
@@ -165,21 +183,32 @@ def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]
     return sentences
 
 
-def _alone(summaries: Sequence[ArmSummary]) -> str:
+def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
     alone = [summary for summary in summaries if not summary.arm.shielded]
     if not alone:
         return ""
+    told = "Without any shield: " + _listed(
+        [
+            f"“{summary.arm.title}” crashed {_times(summary.mean_crashes)} while learning, in "
+            f"{share_text(sum(summary.crashes) / sum(summary.episodes))} of its episodes, and "
+            f"returns {_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
+            for summary in alone
+        ]
+    )
+    rivals = [
+        summary
+        for summary in alone
+        if found is not None and summary.mean_crashes <= found.mean_crashes
+    ]
+    if not rivals or found is None:
+        return f"{told}."
+    names = _listed([f"“{summary.arm.title}”" for summary in rivals])
+    fewer = all(sum(summary.episodes) < sum(found.episodes) for summary in rivals)
+    share = share_text(sum(found.crashes) / sum(found.episodes))
     return (
-        "Without any shield: "
-        + _listed(
-            [
-                f"“{summary.arm.title}” crashed {_times(summary.mean_crashes)} while learning "
-                f"({value_text(float(np.mean(summary.episodes)))} episodes) and returns "
-                f"{_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
-                for summary in alone
-            ]
-        )
-        + "."
+        f"{told}. Mind that {names} crashed no more often than the best shielded way to learn"
+        f"{', in fewer and longer episodes' if fewer else ''}; of those of “{found.arm.title}” "
+        f"{share} crashed."
     )
 
 

@@ -26,6 +26,9 @@ def test_learn_writes_curves_results_and_policies_that_evaluate_takes(run, cart_
     assert document["finding"]
     assert (out / "curves.csv").is_file()
     assert json.loads((out / "results.json").read_text())["steps"] == 400
+    told = (out / "finding.md").read_text()
+    assert all(paragraph in told for paragraph in document["finding"])
+    assert "| Mask and imitate |" in told
     policy = out / "policies" / "imitate-0.npz"
     assert document["policies"][1] == str(policy)
     evaluated = json.loads(

@@ -83,7 +83,18 @@ def test_conditions_and_what_the_rules_are_worth_are_said(study: LearningStudy) 
     assert any("speak in nearly every state" in text and "150" in text for text in paragraphs)
     assert "3,274 rules (support 0, confidence 1)" in paragraphs[-1]
     assert "2 learners of each kind" in paragraphs[-1]
-    assert "“No shield” crashed 9 times" in "\n".join(paragraphs)
+    (alone,) = [text for text in paragraphs if text.startswith("Without any shield")]
+    assert "“No shield” crashed 9 times while learning, in 90 % of its episodes" in alone
+    assert "Mind" not in alone
+
+
+def test_a_learner_that_is_as_safe_without_a_shield_is_not_passed_over() -> None:
+    study = a_study(
+        a_run("none", 0, 10, -190.0), a_run("handover", 0, 3, 210.0), a_run("none-replay", 0, 3, 0)
+    )
+    paragraphs = finding(study, summarise_study(study))
+    (alone,) = [text for text in paragraphs if text.startswith("Without any shield")]
+    assert "Mind that “No shield, replay” crashed no more often" in alone
 
 
 def test_where_no_arm_is_both_that_is_said() -> None:
@@ -107,11 +118,11 @@ def test_the_table_has_a_row_an_arm_under_its_headings(study: LearningStudy) -> 
     assert all(len(row) == len(HEADINGS) for row in rows)
     table = {row[0]: dict(zip(HEADINGS, row, strict=True)) for row in rows}
     assert table["No shield"]["Crashes while learning"] == "9 (8–10)"
-    assert table["No shield"]["Changed by rules"] == "–"
+    assert table["No shield"]["Changed"] == "–"
     assert table["Mask"]["Crashes while learning"] == "9"
     assert table["Override"]["Verdict"] == "safe, not good"
     assert table["Imitate, then hand over"]["Verdict"] == "safe and good"
-    assert table["Imitate, then hand over"]["Return after, shield off"] == "200 (190 to 210)"
+    assert table["Imitate, then hand over"]["Return after"] == "200 (190 to 210)"
 
 
 @pytest.mark.parametrize(
