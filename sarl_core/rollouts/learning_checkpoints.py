@@ -71,10 +71,10 @@ def save_checkpoint(
     with whole_file(path) as unfinished:
         try:
             torch.save(document, unfinished)
-        except RuntimeError as error:  # torch's word for a disk that is full
+        except RuntimeError as error:  # torch's word for what the disk refused
             raise WorkError(
-                f"{path} cannot be written ({str(error).splitlines()[0]}); make room, or choose "
-                "another place"
+                f"{path} cannot be written, as when a disk is full; make room, or choose another "
+                "place"
             ) from error
 
 
