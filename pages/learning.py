@@ -7,6 +7,7 @@ page, which goes on while other pages are looked at, and ends when the visitor h
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
@@ -18,6 +19,7 @@ from _choices import (
     COMPACT,
     OWN_FILE,
     PROJECTIONS,
+    RULES_FOLDER,
     compact_file,
     environment_of,
     rules_for,
@@ -29,6 +31,8 @@ from _words import escaped, in_full
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.learning import rules_digest
 from sarl_core.rollouts.learning_arms import ARMS
 from sarl_core.rollouts.learning_files import LearningStudy, load_study, policy_path
 from sarl_core.rollouts.learning_study import LearningPlan
@@ -94,29 +98,41 @@ def show_shipped() -> None:
     study = studies[cast(str, name)]
     show_study(study, "shipped")
     with st.expander("Make it again", icon=":material/terminal:"):
-        rules = study.settings.get("rules")
-        if isinstance(rules, dict):
-            data = next(
-                (data for data, (_, env_id) in state.SHIPPED.items() if env_id == study.env_id), ""
-            )
-            st.code(
-                f"python -m sarl_core mine data/demonstrations/{data}.parquet --support "
-                f"{rules['support']:g} --confidence {rules['confidence']:g} --out rules.json",
-                language="sh",
-                wrap_lines=True,
-            )
-        arms = (
-            "--arm all"
-            if len(study.arms) == len(ARMS)
-            else " ".join(f"--arm {arm.name}" for arm in study.arms)
-        )
-        st.code(
-            f"python -m sarl_core learn --env {study.env_id} --rules rules.json {arms} --steps "
-            f"{study.steps} --seeds {len(study.seeds)} --out learned",
-            language="sh",
-            wrap_lines=True,
-        )
+        for command in commands(study):
+            st.code(command, language="sh", wrap_lines=True)
         st.caption("The same versions on the same kind of machine give the same numbers.")
+
+
+def commands(study: LearningStudy) -> list[str]:
+    """The command lines that make a study again."""
+    rules = study.settings.get("rules")
+    first, file = [], ""
+    if isinstance(rules, dict):
+        shipped_file = shipped_rules().get(str(rules["digest"]))
+        file = f" --rules {shipped_file or 'rules.json'}"
+        data = {env_id: data for data, (_, env_id) in state.SHIPPED.items()}.get(study.env_id, "")
+        if shipped_file is None:
+            first = [
+                f"python -m sarl_core mine data/demonstrations/{data}.parquet --support "
+                f"{rules['support']:g} --confidence {rules['confidence']:g} --out rules.json"
+            ]
+    names = ["all"] if len(study.arms) == len(ARMS) else [arm.name for arm in study.arms]
+    arms = " ".join(f"--arm {name}" for name in names)
+    return [
+        *first,
+        f"python -m sarl_core learn --env {study.env_id}{file} {arms} --steps {study.steps} "
+        f"--seeds {len(study.seeds)} --figures --out learned",
+    ]
+
+
+@st.cache_data(show_spinner=False)
+def shipped_rules() -> dict[str, str]:
+    """The shipped rule files, by what tells their rules from others."""
+    found = {}
+    for path in sorted(RULES_FOLDER.glob("*_compact.json")):
+        with suppress(SarlError):
+            found[rules_digest(RuleSet.load(path))] = f"data/rules/{path.name}"
+    return found
 
 
 # --- a study of one's own ----------------------------------------------------------------------

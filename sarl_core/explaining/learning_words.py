@@ -230,12 +230,15 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
 
 def _conditions(study: LearningStudy) -> str:
     rules = study.settings.get("rules")
-    by = (
-        f"{counted(int(rules['count']), 'rule')} (support {threshold_text(rules['support'])}, "
-        f"confidence {threshold_text(rules['confidence'])})"
-        if isinstance(rules, dict)
-        else "no rules"
-    )
+    by = "no rules"
+    if isinstance(rules, dict):
+        cut = (
+            "every leaf of its tree"
+            if rules.get("cut") == "leaves"
+            else f"support {threshold_text(rules['support'])}, confidence "
+            f"{threshold_text(rules['confidence'])}"
+        )
+        by = f"{counted(int(rules['count']), 'rule')} ({cut})"
     seeds = len(study.seeds)
     return (
         f"{study.env_id}, {by}, {study.steps:,} steps, {counted(seeds, 'learner')} of each kind, "

@@ -101,6 +101,7 @@ class LearningPlan:
                 "support": rules.thresholds.support,
                 "confidence": rules.thresholds.confidence,
                 "demonstrations": rules.source.digest,
+                **({} if rules.cut == "thresholds" else {"cut": rules.cut}),
             },
         }
 

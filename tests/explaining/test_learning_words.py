@@ -97,6 +97,12 @@ def test_a_learner_that_is_as_safe_without_a_shield_is_not_passed_over() -> None
     assert "Mind that “No shield, replay” crashed no more often" in alone
 
 
+def test_rules_that_no_threshold_cut_are_called_by_what_they_are() -> None:
+    study = a_study(a_run("none", 0, 1, 2.0))
+    study = replace(study, settings={**study.settings, "rules": {**RULES, "cut": "leaves"}})
+    assert "3,274 rules (every leaf of its tree)" in finding(study, summarise_study(study))[-1]
+
+
 def test_where_no_arm_is_both_that_is_said() -> None:
     study = a_study(a_run("none", 0, 10, 500.0), a_run("override", 0, 1, 20.0))
     assert finding(study, summarise_study(study))[0].startswith("No way to learn was both")
