@@ -75,6 +75,7 @@ def learn(
     handover --steps 120000 --seeds 3 --out learned`
     """
     with terminal.working("Starting"):
+        from sarl_core.demonstrations.environments import describe_environment
         from sarl_core.explaining.learning_words import save_finding
         from sarl_core.mining.rules import RuleSet
         from sarl_core.rollouts.learning_arms import arms_named
@@ -85,7 +86,7 @@ def learn(
         plan = LearningPlan(
             env,
             None if rules is None else RuleSet.load(rules),
-            arms_named(arm or ["handover"]),
+            arms_named(arm or ["handover"], discrete=describe_environment(env).is_discrete),
             steps,
             tuple(range(seed, seed + seeds)),
             projection,

@@ -12,6 +12,7 @@ from sarl_core.files import whole_file
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 
+_SAME = 1.0  # returns that differ by no more are the same
 _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the rules decide
 
 HEADINGS = (
@@ -219,7 +220,8 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
         for summary in summaries
         if summary.shielded is not None and summary.shielded.coverage >= _NEARLY_ALL
     ]
-    if not covered:
+    # Where an interval leaves the learner room, it matters what was learned.
+    if not covered or np.ptp([trials.mean for trials in covered]) > _SAME:
         return ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "

@@ -126,11 +126,12 @@ ARMS: dict[str, LearningArm] = {arm.name: arm for arm in _ALL}
 """Every arm by its name, in the order in which they are shown."""
 
 
-def arms_named(names: Sequence[str]) -> tuple[LearningArm, ...]:
+def arms_named(names: Sequence[str], *, discrete: bool = True) -> tuple[LearningArm, ...]:
     """Arms by their names.
 
     Args:
         names: Of `ARMS`, or "all".
+        discrete: Whether the actions are; "all" leaves out what needs it.
 
     Returns:
         In the order of `ARMS`, each once.
@@ -143,7 +144,12 @@ def arms_named(names: Sequence[str]) -> tuple[LearningArm, ...]:
             raise InputError(f"there is no arm {name!r}; choose all, or {', '.join(ARMS)}")
     if not names:
         raise InputError("no way to learn is chosen; choose at least one")
-    return tuple(arm for arm in _ALL if "all" in names or arm.name in names)
+    everything = "all" in names
+    return tuple(
+        arm
+        for arm in _ALL
+        if arm.name in names or (everything and (discrete or not arm.discrete_only))
+    )
 
 
 def check_learning(

@@ -22,6 +22,11 @@ def test_arms_come_in_their_order_each_once() -> None:
     assert arms_named(["all", "mask"]) == tuple(ARMS.values())
 
 
+def test_all_leaves_out_what_the_actions_do_not_allow() -> None:
+    assert {arm.name for arm in arms_named(["all"], discrete=False)} == set(ARMS) - {"mask"}
+    assert [arm.name for arm in arms_named(["mask"], discrete=False)] == ["mask"]
+
+
 def test_each_arm_is_compared_with_the_same_learner_without_a_shield() -> None:
     for arm in ARMS.values():
         alone = ARMS[arm.alone]
