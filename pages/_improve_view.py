@@ -74,16 +74,13 @@ def show_outcome(outcome: Outcome, *, at_work: bool, changed: bool) -> None:
 def show_report(outcome: Outcome, improved: Aggregation) -> None:
     """What the best rules achieve, in plain words."""
     rules = improved.rule_set
-    per_action = [len(rules.of_dimension(index)) for index in range(len(rules.actions))]
-    size = counted(len(rules), "rule")
-    if len(per_action) > 1:
-        size += f" (at most {max(per_action)} for each of {len(per_action)} actions)"
+    size = size_text([len(rules.of_dimension(index)) for index in range(len(rules.actions))])
     steps = counted(improved.plan.generations, "step")
     refined = f", refined in {steps}" if improved.refined else ""
     if improved.reported is None:
         best = improved.rounds[improved.chosen - 1]
         st.markdown(
-            f"The best so far are the **{size}** of round {improved.chosen}, judged by the "
+            f"The best so far are the {size} of round {improved.chosen}, judged by the "
             f"{counted(len(best.returns), 'episode')} of their round alone: that is little, and "
             "the number is flattered by being the best. Nothing was reported on fresh episodes."
         )
@@ -92,7 +89,7 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
     spread = improved.reported.statistics
     shown = improved.demonstrations
     st.markdown(
-        f"A novice that acts at random, kept to the **{size}** of round "
+        f"A novice that acts at random, kept to the {size} of round "
         f"{improved.chosen}{refined}, reached a mean return of **{spread.mean:,.1f}** over "
         f"{counted(len(returns), 'fresh episode')}, with a standard deviation of "
         f"{spread.std:,.1f} and a least of {float(returns.min()):,.1f}. The rules were chosen on "
@@ -129,6 +126,18 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             ),
         ):
             st.metric(label, value, border=True, height="stretch", help=hint)
+
+
+def size_text(per_action: Sequence[int]) -> str:
+    """How many rules there are, for Markdown.
+
+    Args:
+        per_action: Rules of each action dimension.
+    """
+    size = f"**{counted(sum(per_action), 'rule')}**"
+    if len(per_action) > 1:
+        size += f" (at most {max(per_action)} for each of {len(per_action)} actions)"
+    return size
 
 
 def show_rounds(
@@ -299,33 +308,38 @@ def read_document(path: Path) -> dict[str, Any] | None:
 def show_card(card: dict[str, Any]) -> None:
     """How the shipped compact rules came about."""
     points = card_points(card)
-    reported = card.get("reported")
-    st.subheader("The compact rules that are shipped")
     try:
+        told, chosen, command = card_sentence(card), int(card["chosen_round"]), str(card["command"])
+        reported = card["reported"]
         mean = float(reported["mean"]) if reported else None
-        chosen = int(card["chosen_round"])
-        told = (
-            f"A novice that acts at random, kept to these **{int(card['rules']):,} rules**, "
-            f"reached a mean return of **{mean:,.1f}** over {int(reported['episodes']):,} fresh "
-            f"episodes (deviation {float(reported['std']):,.1f}, least "
-            f"{float(reported['min']):,.1f}). They are those of round {chosen}"
-            + (
-                f", refined in {counted(int(card['generations']), 'step')} afterwards."
-                if card["refined"]
-                else "."
-            )
-            if reported
-            else ""
-        )
-        command = str(card["command"])
+        if not points:
+            raise KeyError("rounds")
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"the card of the compact rules lacks {error}; make the rules again with aggregate"
         ) from error
+    st.subheader("The compact rules that are shipped")
     st.markdown(told)
     with st.popover("The command that made them", icon=":material/terminal:"):
         st.code(command, language="sh", wrap_lines=True)
     show_rounds(points, chosen=chosen, reported=mean, key="card")
+
+
+def card_sentence(card: dict[str, Any]) -> str:
+    """What the rules of a card achieve, for Markdown."""
+    size = size_text([int(count) for count in card["rules_per_dimension"]])
+    afterwards = ""
+    if card["refined"]:
+        afterwards = f", refined in {counted(int(card['generations']), 'step')} afterwards"
+    origin = f"They are those of round {int(card['chosen_round'])}{afterwards}."
+    reported = card["reported"]
+    if not reported:
+        return f"These are {size}. {origin}"
+    return (
+        f"A novice that acts at random, kept to these {size}, reached a mean return of "
+        f"**{float(reported['mean']):,.1f}** over {int(reported['episodes']):,} fresh episodes "
+        f"(deviation {float(reported['std']):,.1f}, least {float(reported['min']):,.1f}). {origin}"
+    )
 
 
 def show_budgets() -> None:

@@ -202,7 +202,7 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
     left, right = st.columns([6, 7], gap="medium")
     with left:
         st.subheader("From the root to the rule")
-        st.html(path_table(path_steps(tree, node), tree.dimension))
+        st.html(path_table(path_steps(tree, node), tree.dimension, leaf=compact is not None))
     with right:
         show_tree(rule)
     if rule.conditions:

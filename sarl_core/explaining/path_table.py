@@ -67,12 +67,15 @@ def label_key(dimension: LabelledDimension) -> str:
     return f'{_STYLE}<div class="sarl-key">{parts}</div>'
 
 
-def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
+def path_table(
+    steps: Sequence[PathStep], dimension: LabelledDimension, *, leaf: bool = False
+) -> str:
     """The way from the root to a rule, node by node.
 
     Args:
         steps: The root first.
         dimension: The labels.
+        leaf: Whether the path ends because the tree does, and not because it was cut.
 
     Returns:
         HTML without script; every name escaped.
@@ -80,7 +83,8 @@ def path_table(steps: Sequence[PathStep], dimension: LabelledDimension) -> str:
     rows = []
     for step in steps:
         query = escape(step.query) if step.query else "all states"
-        note = " – cut here: this is the rule" if step.is_cut else ""
+        end = "a leaf" if leaf else "cut here"
+        note = f" – {end}: this is the rule" if step.is_cut else ""
         rows.append(
             f'<tr class="{"cut" if step.is_cut else ""}"><td>{query}{note}</td>'
             f'<td class="n">{step.samples:,}</td><td class="n s">{share_text(step.support)}</td>'
