@@ -94,7 +94,12 @@ class Recorder(BaseCallback):
         if now - self.told > _TOLD_EVERY:
             self.told = now
             self.stopped = not self.tell(self.curve(), self.num_timesteps)
-        return not self.stopped and self.num_timesteps < self.steps
+        return not self.stopped and (self.num_timesteps < self.steps or self._fills_rollout())
+
+    def _fills_rollout(self) -> bool:
+        """Whether the steps that an on-policy learner will now learn from are complete."""
+        buffer = getattr(self.model, "rollout_buffer", None)
+        return buffer is not None and buffer.pos == buffer.buffer_size - 1
 
     def _note(self, ended: NDArray[np.int64], rewards: NDArray[np.float64], infos: Any) -> None:
         cut = np.array([infos[place].get("TimeLimit.truncated", False) for place in ended])

@@ -15,8 +15,19 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import WorkError, load_demonstrations, mine_rules
 from sarl_core.rollouts.learning_arms import ARMS, arms_named
-from sarl_core.rollouts.learning_files import load_study
-from sarl_core.rollouts.learning_study import LearningPlan, run_study
+from sarl_core.rollouts.learning_curves import LearningCurve, Trial
+from sarl_core.rollouts.learning_files import (
+    LearningRun,
+    LearningStudy,
+    load_run,
+    load_study,
+    make_folder,
+    policy_path,
+    save_run,
+    save_tables,
+    write_json,
+)
+from sarl_core.rollouts.learning_study import LearningPlan
 from tests.app.screens import errors, open_page, texts
 
 ROOT = Path(__file__).parents[2]
@@ -33,6 +44,15 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+def a_run(arm: str) -> LearningRun:
+    """A finished run of ten episodes."""
+    columns = dict.fromkeys(("returns", "lengths"), [60] * 10)
+    columns |= {"crashed": [1] * 10, "interventions": [3] * 10, "covered": [9] * 10}
+    columns |= {"ends": list(range(60, 601, 60)), "shielded": [1] * 10}
+    trial = Trial((9.0, 10.0), 2, 0.0, 0.0)
+    return LearningRun(ARMS[arm], 0, 600, LearningCurve.from_dict(columns), trial, trial)
+
+
 @pytest.fixture(scope="module")
 def small_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one study of CartPole, as one is shipped: its tables only."""
@@ -42,11 +62,12 @@ def small_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         conf_min=1.0,
     )
     folder = tmp_path_factory.mktemp("studies") / "cartpole"
+    folder.mkdir()
     plan = LearningPlan("CartPole-v1", rules, arms_named(["none", "mask"]), 600, (0,), episodes=2)
-    run_study(plan, folder)
-    for path in (*(folder / "runs").iterdir(), folder / "rules.json"):
-        path.unlink()
-    (folder / "runs").rmdir()
+    write_json(folder / "plan.json", plan.settings())
+    runs = (a_run("none"), a_run("mask"))
+    study = LearningStudy("CartPole-v1", 600, plan.settings(), plan.arms, (0,), runs)
+    save_tables(folder, study, {})
     return folder.parent
 
 
@@ -145,16 +166,9 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
     ]
     (folder,) = own_folder.iterdir()
     assert (folder / "policies" / "imitate-0.npz").is_file()
-    # Whoever asks the same again sees it at once; and one more way to learn takes over the others.
+    # Whoever asks the same again sees it at once.
     again = own("none", "imitate", learn_steps="1000")
     assert "all finished" in texts(again)
-    before = (folder / "runs" / "imitate-0.json").read_bytes()
-    more = own("none", "imitate", "mask", learn_steps="1000")
-    more.button(key="learn_start").click().run()
-    until_over(more)
-    (other,) = set(own_folder.iterdir()) - {folder}
-    assert (other / "runs" / "imitate-0.json").read_bytes() == before
-    assert "3 runs of 1,000 steps in CartPole-v1, all finished" in texts(more)
 
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
@@ -287,6 +301,22 @@ def test_old_folders_go_and_those_in_use_stay(
     assert an_order(4000).folder in left
     assert an_order(2000).folder not in left
     everyone.leave(oldest)
+
+
+@pytest.mark.usefixtures("waiting_process")
+def test_finished_runs_under_the_same_conditions_are_taken_over() -> None:
+    before = an_order()
+    make_folder(before.folder)
+    save_run(before.folder, a_run("none"))
+    policy_path(before.folder, ARMS["none"], 0).write_bytes(b"learned")
+    more = replace(before, arms=(ARMS["none"], ARMS["none-replay"]))
+    others = [replace(more, steps=2000), replace(more, rules_digest="other")]
+    everyone = learning.Trainings()
+    for order in (more, *others):
+        everyone.leave(everyone.join(order))
+    assert policy_path(more.folder, ARMS["none"], 0).read_bytes() == b"learned"
+    assert load_run(more.folder / "runs" / "none-0.json").finished
+    assert not any((order.folder / "runs" / "none-0.json").exists() for order in others)
 
 
 def test_a_folder_that_cannot_be_made_is_said(

@@ -21,7 +21,7 @@ from sarl_core.rollouts.policies import MlpPolicy
 from sarl_core.rollouts.progress import CancelledError
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
-STEPS = 800
+STEPS = 480
 Learn = Callable[..., LearningResult]
 
 
@@ -112,7 +112,7 @@ class StopAfter:
 def test_a_stopped_learner_goes_on(cart: Learn, arm: str, tmp_path: Path) -> None:
     checkpoint = tmp_path / "run.pt"
     with pytest.raises(CancelledError, match="stopped after"):
-        cart(arm, checkpoint=checkpoint, progress=StopAfter(300))
+        cart(arm, checkpoint=checkpoint, progress=StopAfter(200))
     curves: list[LearningCurve] = []
     steps: list[int] = []
 
@@ -121,7 +121,7 @@ def test_a_stopped_learner_goes_on(cart: Learn, arm: str, tmp_path: Path) -> Non
         steps.append(done)
 
     result = cart(arm, checkpoint=checkpoint, watch=watch)
-    assert 300 <= steps[0] < STEPS
+    assert 200 <= steps[0] < STEPS
     assert result.sittings == 2
     assert len(curves[0]) > 0
     kept = curves[0].to_dict()
@@ -134,8 +134,11 @@ def test_a_stopped_learner_goes_on(cart: Learn, arm: str, tmp_path: Path) -> Non
 
 def test_a_learner_stopped_in_its_trials_does_not_learn_again(cart: Learn, tmp_path: Path) -> None:
     checkpoint = tmp_path / "run.pt"
+    after = iter([True, True, False])  # the last step, the end of learning, the first trial
     with pytest.raises(CancelledError):
-        cart("none", checkpoint=checkpoint, progress=lambda done, total: done < total)
+        cart(
+            "none", checkpoint=checkpoint, progress=lambda done, total: done < total or next(after)
+        )
     whole = cart("none")
     assert cart("none", checkpoint=checkpoint).alone == whole.alone
 
@@ -143,9 +146,9 @@ def test_a_learner_stopped_in_its_trials_does_not_learn_again(cart: Learn, tmp_p
 def test_what_an_off_policy_learner_remembers_is_kept(cart: Learn, tmp_path: Path) -> None:
     checkpoint = tmp_path / "run.pt"
     with pytest.raises(CancelledError):
-        cart("replay", checkpoint=checkpoint, progress=StopAfter(300))
+        cart("replay", checkpoint=checkpoint, progress=StopAfter(200))
     kept = torch.load(checkpoint, weights_only=True)["memory"]["replay"]
-    assert len(kept["actions"]) == kept["pos"] >= 299
+    assert len(kept["actions"]) == kept["pos"] >= 199
     assert kept["observations"].any()
 
 
@@ -203,6 +206,15 @@ def test_a_full_disk_is_said(cart: Learn, tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(WorkError, match="make room"):
         cart("none", checkpoint=tmp_path / "run.pt")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_last_steps_are_learned_from_too(cart: Learn, monkeypatch: pytest.MonkeyPatch) -> None:
+    learned_from: list[int] = []
+    monkeypatch.setattr(
+        "stable_baselines3.PPO.train", lambda self: learned_from.append(self.num_timesteps)
+    )
+    cart("none", steps=800)
+    assert learned_from == [400, 800]
 
 
 def test_a_learner_that_diverged_is_said(cart: Learn, monkeypatch: pytest.MonkeyPatch) -> None:
