@@ -29,6 +29,7 @@ AGENTS = ("novice", "untrained", "expert", OWN_FILE)
 CHOSEN, NO_RULES, COMPACT = "at the thresholds", "none", "compact"
 PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
+FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
 RULES_FOLDER = Path(__file__).parents[1] / "data" / "rules"
 
 
@@ -55,6 +56,18 @@ def continuous(choice: str | None) -> bool:
         return not describe_environment(environment_of(choice)).is_discrete
     except SarlError:
         return False
+
+
+def demonstrated(env_id: str, seed: int, episodes: int) -> bool:
+    """Whether the chosen demonstrations were recorded on some of these seeds."""
+    demonstrations = state.chosen_demonstrations()
+    return (
+        demonstrations is not None
+        and demonstrations.seed is not None
+        and demonstrations.env_id == env_id
+        and demonstrations.seed < seed + episodes
+        and seed < demonstrations.seed + demonstrations.n_episodes
+    )
 
 
 def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | None, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import _state as state
 import streamlit as st
-from _choices import agent_for, environment_of, has_expert, named_agent
+from _choices import FRESH_SEED, agent_for, environment_of, has_expert, named_agent
 from _comparisons import Row, row_key
 from _run_bar import known, run_bar, working
 from _words import escaped, in_full
@@ -23,7 +23,6 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.divider_study import snapped_agents
 
 PLACE = "divider"
-FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
 MOST_EPISODES = 200
 PLAIN = {"displayModeBar": False}
 

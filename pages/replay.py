@@ -11,6 +11,7 @@ from _choices import (
     CHOSEN,
     COMPACT,
     ENVIRONMENTS,
+    FRESH_SEED,
     NO_RULES,
     OWN_FILE,
     PAPERS,
@@ -18,6 +19,7 @@ from _choices import (
     agent_for,
     compact_file,
     continuous,
+    demonstrated,
     environment_of,
     rules_for,
 )
@@ -79,7 +81,7 @@ def settings() -> Callable[[], Order]:
                 "Seed",
                 0,
                 2**31 - 1,
-                1,
+                FRESH_SEED,
                 key="seed",
                 bind="query-params",
                 help="Both runs start in the same state and draw the same random numbers; the "
@@ -181,6 +183,11 @@ numbers(
     replayed,
     try_unfiltered if unfiltered_differ(asked, replayed.rule_set) else None,
 )
+if asked.rules not in (OWN_FILE, NO_RULES) and demonstrated(asked.env_id, asked.seed, 1):
+    st.caption(
+        ":material/casino: The demonstrations have an episode of this seed, where the rules know "
+        f"the way. A seed such as {FRESH_SEED:,} shows what they bring elsewhere."
+    )
 gif = replayed.film.gif()
 st.image(gif, width="content", alt="The episode, with the rules and without")
 name = f"replay-{asked.env_id.rsplit('/', 1)[-1].rsplit(':', 1)[-1]}-{asked.agent}-{asked.seed}"

@@ -16,12 +16,14 @@ from _choices import (
     CHOSEN,
     COMPACT,
     ENVIRONMENTS,
+    FRESH_SEED,
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
     agent_for,
     compact_file,
     continuous,
+    demonstrated,
     environment_of,
     rules_for,
 )
@@ -44,7 +46,6 @@ NO_SHIELD = "no shield"
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
 RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE)
 MOST_EPISODES = 1_000
-FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
 PLACE = "comparison"
 
 
@@ -210,19 +211,6 @@ def guards(choices: Choices) -> tuple[list[Guard], list[str]]:
     return found, problems
 
 
-def seen_before(choices: Choices, env_id: str) -> bool:
-    """Whether rules are tried on episodes from which they were mined."""
-    demonstrations = state.chosen_demonstrations()
-    return (
-        demonstrations is not None
-        and demonstrations.seed is not None
-        and demonstrations.env_id == env_id
-        and demonstrations.seed < choices.seed + choices.episodes
-        and choices.seed < demonstrations.seed + demonstrations.n_episodes
-        and any(name not in (NO_SHIELD, OWN_FILE) for name in choices.shields)
-    )
-
-
 def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
@@ -272,7 +260,8 @@ if not wanted:
         icon=":material/checklist:",
     )
     st.stop()
-if seen_before(chosen, environment):
+by_rules_mined = any(name not in (NO_SHIELD, OWN_FILE) for name in chosen.shields)
+if by_rules_mined and demonstrated(environment, chosen.seed, chosen.episodes):
     st.warning(
         "Some of these seeds are those of the demonstrations, where the rules know the way. A "
         f"first seed such as {FRESH_SEED:,} shows what they bring elsewhere.",

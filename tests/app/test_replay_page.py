@@ -261,3 +261,13 @@ def test_few_covered_steps_are_said_and_the_unfiltered_rules_offered() -> None:
     assert "settings have changed" not in texts(app)
     assert float(metrics(app)["Covered"].split()[0]) > 30
     assert "try_unfiltered" not in [button.key for button in app.button]
+
+
+def test_on_a_seed_of_the_demonstrations_the_page_says_so() -> None:
+    def said(**query: str) -> str:
+        app = open_page("replay", data="cartpole", rules="unfiltered", **query)
+        app.button(key="run").click().run(timeout=60)
+        return texts(app)
+
+    assert "an episode of this seed" in said(seed="3")
+    assert "an episode of this seed" not in said()
