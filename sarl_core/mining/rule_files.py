@@ -11,6 +11,7 @@ from typing import Any, Literal
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
@@ -160,6 +161,12 @@ def _rule(rule: Rule) -> dict[str, Any]:
     }
     if rule.demonstrated_value is not None:
         entry["demonstrated_value"] = rule.demonstrated_value
+    if rule.pinned:
+        entry["pinned"] = True
+    if rule.box is not None:
+        entry["box"] = {name: list(values) for name, values in rule.box._asdict().items()}
+    if rule.held_out is not None:
+        entry["held_out"] = rule.held_out._asdict()
     return entry
 
 
@@ -225,6 +232,18 @@ class _Reader:
         if not all(isinstance(value, str) for value in values):
             raise self.fail(f"{key!r} holds something that is no text")
         return tuple(values)
+
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        values = self.take(key, list)
+        numeric = all(
+            isinstance(value, (int, float))
+            and not isinstance(value, bool)
+            and -_LARGEST <= value <= _LARGEST
+            for value in values
+        )
+        if not numeric or len(values) != count:
+            raise self.fail(f"{key!r} must be {count} numbers")
+        return tuple(map(float, values))
 
     def finish(self) -> None:
         """Refuse what nobody asked for, by name."""
@@ -355,6 +374,25 @@ def _read_rule(
         enabled=part.take("enabled", bool, True),
         origin=origin,
         demonstrated_value=value,
+        pinned=part.take("pinned", bool, False),
+        box=_read_box(part.part("box"), n_features) if part.has("box") else None,
+        held_out=_read_held_out(part.part("held_out")) if part.has("held_out") else None,
     )
     part.finish()
     return rule
+
+
+def _read_box(part: _Reader, n_features: int) -> DataBox:
+    box = DataBox(*(part.numbers(name, n_features) for name in DataBox._fields))
+    part.finish()
+    for least, low, high, most in zip(*box, strict=True):
+        if not least <= low <= high <= most:
+            raise part.fail("the values are not in the order least, low, high, most")
+    return box
+
+
+def _read_held_out(part: _Reader) -> HeldOut:
+    samples = part.count("samples")
+    found = HeldOut(samples, part.count("correct", high=samples))
+    part.finish()
+    return found

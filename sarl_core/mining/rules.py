@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.landscape import confidence_above
 from sarl_core.mining.tree import PolicyTree, Source, grow_policy_trees
@@ -65,6 +66,10 @@ class Rule:
         origin: Whether it was mined or written by a person.
         demonstrated_value: Of a continuous dimension, the median action shown where it
             applies; None otherwise.
+        pinned: Whether a person has given it its place: it comes before those that were only
+            mined, in the order of the rule set, as manual ones do.
+        box: Where its pairs lay; None where that was not kept.
+        held_out: How it fares on episodes held out; None where there are none.
     """
 
     id: str
@@ -78,6 +83,14 @@ class Rule:
     enabled: bool = True
     origin: Literal["mined", "manual"] = "mined"
     demonstrated_value: float | None = None
+    pinned: bool = False
+    box: DataBox | None = None
+    held_out: HeldOut | None = None
+
+    @property
+    def placed(self) -> bool:
+        """Whether a person wrote it or gave it its place; such rules come first."""
+        return self.pinned or self.origin == "manual"
 
     @property
     def length(self) -> int:

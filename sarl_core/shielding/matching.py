@@ -1,8 +1,8 @@
 """Finding the rule that applies to a state.
 
 Rules mined from one tree share the beginnings of their paths; put together again they are a
-tree, and the rule that applies is found by walking it. Rules that a person wrote may overlap
-others: they are tried one by one, in their order, before the tree is walked.
+tree, and the rule that applies is found by walking it. Rules that a person wrote or pinned may
+overlap others: they are tried one by one, in their order, before the tree is walked.
 """
 
 from __future__ import annotations
@@ -62,13 +62,13 @@ class Matcher:
         Returns:
             A matcher that finds, for every state, what a scan in order would find.
         """
-        manual = [entry for entry in rules if entry[1].origin == "manual"]
-        mined = [entry for entry in rules if entry[1].origin == "mined"]
-        nodes = tree_of(mined)
+        placed = [entry for entry in rules if entry[1].placed]
+        others = [entry for entry in rules if not entry[1].placed]
+        nodes = tree_of(others)
         if nodes is not None:
-            return cls(manual, nodes)
+            return cls(placed, nodes)
         # A file whose mined rules are not of one tree: what its order says, holds.
-        return cls([*manual, *mined], [NOTHING])
+        return cls([*placed, *others], [NOTHING])
 
     def match(self, state: list[float]) -> tuple[int | None, float]:
         """The rule that applies to one state.

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.rule_files import rules_from_json, rules_to_json
 from tests.mining.strategies import labelled_states
 
@@ -68,7 +70,41 @@ def test_continuous_rules_come_back(tmp_path):
     }
 
 
+def test_what_a_rule_carries_comes_back(lander_like):
+    rules = mine_rules(lander_like, supp_min=0.02, conf_min=0.8)
+    d = lander_like.observations.shape[1]
+    box = DataBox((-2.0,) * d, (-1.0,) * d, (0.1,) * d, (float(np.float32(0.3)),) * d)
+    carried = replace(rules.rules[0], pinned=True, box=box, held_out=HeldOut(96, 87))
+    whole = replace(rules, rules=(carried, *rules.rules[1:]))
+    again = rules_from_json(rules_to_json(whole))
+    assert again == whole
+    assert again.rules[0].placed
+    assert not again.rules[1].placed
+
+
+def carrying(key, value):
+    return lambda d: d["rules"][0].update({key: value})
+
+
 BAD = {
+    "a box of other features": (
+        carrying("box", {"least": [0], "low": [0], "high": [0], "most": [0]}),
+        "'least' must be",
+    ),
+    "a box inside out": (
+        lambda d: d["rules"][0].update(
+            box={
+                name: [value] * len(d["features"])
+                for name, value in (("least", 3), ("low", 2), ("high", 1), ("most", 0))
+            }
+        ),
+        "in the order",
+    ),
+    "more held-out pairs right than there are": (
+        carrying("held_out", {"samples": 3, "correct": 4}),
+        "'correct' is 4",
+    ),
+    "a pin that is no yes or no": (carrying("pinned", 1), "'pinned'"),
     "another format": (lambda d: d.update(format="other"), "format"),
     "a later version": (lambda d: d.update(version=2), "version 2"),
     "an unknown key": (lambda d: d.update(colour="red"), "'colour'"),

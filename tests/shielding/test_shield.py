@@ -105,10 +105,14 @@ def test_rules_of_a_person_come_first_in_their_order_and_disabled_ones_not_at_al
         manual("m1", [(0, ">", 0.5)], 1),
         manual("m2", [(0, ">", 0.0), (1, "<=", 0.0)], 2),
     )
+    pin = 2  # a mined rule that was moved behind those of a person, and before the others
+    added = (*added, replace(added[pin], pinned=True))
+    added = (*added[:pin], replace(added[pin], enabled=False), *added[pin + 1 :])
     edited = replace(mined, rules=added)
     shield = Shield(edited)
     states = states_around(added, 8, n=250)
-    order = [len(mined) + 1, len(mined) + 2, *range(len(mined))]
+    others = [index for index in range(len(mined)) if index != pin]
+    order = [len(mined) + 1, len(mined) + 2, len(mined) + 3, *others]
     batch = shield.decide_batch(states, np.zeros(len(states), dtype=int))
     for row, state in enumerate(states):
         place = scan([added[i] for i in order], state, 0)
