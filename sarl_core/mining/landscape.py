@@ -55,6 +55,7 @@ class Landscape:
         fidelity: Share of the covered pairs whose label the rule gives; NaN where none is
             covered.
         dimensions: The same for each action dimension alone; () in such a part itself.
+        held_out_fidelity: As `fidelity`, over pairs held out; None where none were given.
     """
 
     supports: Floats
@@ -64,6 +65,7 @@ class Landscape:
     coverage: Floats
     fidelity: Floats
     dimensions: tuple[Landscape, ...] = ()
+    held_out_fidelity: Floats | None = None
 
 
 def rule_rectangles(
@@ -109,6 +111,7 @@ def threshold_landscape(
     *,
     lift_min: float = 0.0,
     max_depth: int | None = None,
+    held_out: Sequence[NodeCounts] | None = None,
 ) -> Landscape:
     """Count, measure and test the rule sets of every cell of a threshold grid, in one pass.
 
@@ -120,6 +123,7 @@ def threshold_landscape(
         confidences: Minimum confidences, ascending, shape (C,).
         lift_min: Minimum lift of a rule.
         max_depth: Longest rule.
+        held_out: What `count_held_out` counted at the nodes of these trees; None for nothing.
 
     Returns:
         Layers of shape (S, C), for all dimensions and for each.
@@ -131,22 +135,31 @@ def threshold_landscape(
         raise InputError("there is no tree to draw a landscape of; grow the trees first")
     supports = _axis(supports, "supports")
     confidences = _axis(confidences, "confidences")
-    sums = [_sums(tree, supports, confidences, lift_min, max_depth) for tree in trees]
+    counted = [None] * len(trees) if held_out is None else list(held_out)
+    sums = [
+        _sums(tree, supports, confidences, lift_min, max_depth, other)
+        for tree, other in zip(trees, counted, strict=True)
+    ]
     parts = tuple(
         _layers(supports, confidences, one, tree.source.steps)
         for one, tree in zip(sums, trees, strict=True)
     )
     if len(parts) == 1:
         return replace(parts[0], dimensions=parts)
-    total = _Sums(*(np.sum(layer, axis=0) for layer in zip(*sums, strict=True)))
+    total = np.sum(sums, axis=0)
     steps = sum(tree.source.steps for tree in trees)
     return replace(_layers(supports, confidences, total, steps), dimensions=parts)
 
 
-class _Sums(NamedTuple):
-    rules: NDArray[np.int64]
-    length: NDArray[np.int64]
-    covered: NDArray[np.int64]
+class NodeCounts(NamedTuple):
+    """Other pairs at the nodes of a tree.
+
+    Attributes:
+        samples: Pairs that reach each node, (n,).
+        correct: Those of them that carry its label, (n,).
+    """
+
+    samples: NDArray[np.int64]
     correct: NDArray[np.int64]
 
 
@@ -164,7 +177,9 @@ def _sums(
     confidences: Floats,
     lift_min: float,
     max_depth: int | None,
-) -> _Sums:
+    held_out: NodeCounts | None,
+) -> NDArray[np.int64]:
+    """Rules, queries, pairs covered and right; these two held out, if any; (4 or 6, S, C)."""
     rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
     # Row s is inside while s <= support; column c while above < c <= confidence.
     rows = np.searchsorted(supports, rectangles.support, side="right")
@@ -175,10 +190,12 @@ def _sums(
     first, last = first[inside], last[inside]
     width = len(confidences) + 1  # one more column, for rectangles that reach the right edge
     enters, leaves = rows * width + first, rows * width + last
-    planes = np.zeros((4, len(supports), width), dtype=np.int64)
     each = np.ones(len(node), dtype=np.int64)
-    weights = (each, tree.depth[node], tree.samples[node], tree.correct[node])
-    for plane, weight in zip(planes.reshape(4, -1), weights, strict=True):
+    weights = [each, tree.depth[node], tree.samples[node], tree.correct[node]]
+    if held_out is not None:
+        weights += [held_out.samples[node], held_out.correct[node]]
+    planes = np.zeros((len(weights), len(supports), width), dtype=np.int64)
+    for plane, weight in zip(planes.reshape(len(weights), -1), weights, strict=True):
         np.add.at(plane, enters, weight)
         np.subtract.at(plane, leaves, weight)
     # Along confidence from the left; along support from the largest downwards, because every
@@ -186,21 +203,24 @@ def _sums(
     np.cumsum(planes, axis=2, out=planes)
     from_top = planes[:, ::-1]
     np.cumsum(from_top, axis=1, out=from_top)
-    return _Sums(*planes[:, :, :-1])
+    return planes[:, :, :-1]
 
 
-def _layers(supports: Floats, confidences: Floats, sums: _Sums, steps: int) -> Landscape:
+def _layers(
+    supports: Floats, confidences: Floats, sums: NDArray[np.int64], steps: int
+) -> Landscape:
+    rules, length, covered, correct, *held_out = sums
     with np.errstate(invalid="ignore"):
-        fidelity = sums.correct / sums.covered
+        fidelity = correct / covered
+        held_out_fidelity = held_out[1] / held_out[0] if held_out else None
     return Landscape(
         supports=supports,
         confidences=confidences,
-        rule_count=sums.rules,
-        mean_length=np.divide(
-            sums.length, sums.rules, out=np.zeros(sums.rules.shape), where=sums.rules > 0
-        ),
-        coverage=sums.covered / steps,
+        rule_count=rules,
+        mean_length=np.divide(length, rules, out=np.zeros(rules.shape), where=rules > 0),
+        coverage=covered / steps,
         fidelity=fidelity,
+        held_out_fidelity=held_out_fidelity,
     )
 
 

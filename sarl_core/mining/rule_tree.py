@@ -58,22 +58,27 @@ def tree_of(rules: Sequence[Numbered]) -> list[RuleNode] | None:
         place, depth, group = waiting.pop()
         if not group:
             continue
-        if any(rule.length == depth for _, rule in group):
+        first = group[0][1].conditions
+        if len(first) == depth:
             if len(group) > 1:
                 return None
             nodes[place] = NOTHING._replace(rule=group[0][0])
             continue
-        feature, _, threshold = group[0][1].conditions[depth]
-        sides: dict[str, list[Numbered]] = {"<=": [], ">": []}
+        feature, _, threshold = first[depth]
+        below: list[Numbered] = []
+        above: list[Numbered] = []
         for entry in group:
-            condition = entry[1].conditions[depth]
-            if (condition.feature, condition.threshold) != (feature, threshold):
+            conditions = entry[1].conditions
+            if len(conditions) == depth:
                 return None
-            sides[condition.op].append(entry)
+            asked, op, at = conditions[depth]
+            if asked != feature or at != threshold:
+                return None
+            (below if op == "<=" else above).append(entry)
         left, right = len(nodes), len(nodes) + 1
         nodes[place] = RuleNode(feature, threshold, left, right, NO_RULE)
         nodes += [NOTHING, NOTHING]
-        waiting += [(left, depth + 1, sides["<="]), (right, depth + 1, sides[">"])]
+        waiting += [(left, depth + 1, below), (right, depth + 1, above)]
     return nodes
 
 

@@ -323,7 +323,8 @@ def mine_rules(
         divider: Number of intervals of continuous dimensions; trees carry their own.
 
     Returns:
-        The rules, by action dimension and node.
+        The rules, by action dimension and node; with their data boxes where demonstrations were
+        given, since trees alone do not hold the states.
 
     Raises:
         InputError: If a threshold is out of range or there is nothing to mine.
@@ -341,13 +342,18 @@ def mine_rules(
             tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
         )
         rules += rules_at(tree, nodes)
-    return RuleSet(
+    mined = RuleSet(
         rules=tuple(rules),
         actions=tuple(tree.dimension for tree in trees),
         source=trees[0].source,
         thresholds=thresholds,
         divider=trees[0].divider,
     )
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        from sarl_core.mining.envelope import with_boxes  # which knows rules
+
+        return with_boxes(mined, demonstrations_or_trees)
+    return mined
 
 
 def node_of(rule: Rule) -> int:

@@ -1,0 +1,75 @@
+"""Where the pairs of each rule lay: its half-spaces reach further than the data did."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.applying import Applications, applications, require_same_kind
+from sarl_core.mining.evidence import DataBox
+from sarl_core.mining.rules import RuleSet
+
+LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
+
+Floats = NDArray[np.float64]
+
+
+def with_boxes(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
+    """Give every rule the box of the pairs to which it applies.
+
+    Args:
+        rule_set: Its rules.
+        demonstrations: What they were mined from; N pairs.
+
+    Returns:
+        The same rules with `Rule.box`; None for those to which no pair belongs.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    require_same_kind(rule_set, demonstrations)
+    found = applications(rule_set, demonstrations.observations)
+    boxes = _boxes(found, demonstrations.observations, len(rule_set.rules))
+    return replace(
+        rule_set,
+        rules=tuple(
+            replace(rule, box=box) for rule, box in zip(rule_set.rules, boxes, strict=True)
+        ),
+    )
+
+
+def _boxes(
+    found: Applications, observations: NDArray[np.float32], n_rules: int
+) -> list[DataBox | None]:
+    """One sort a feature; the quantiles of all rules are then picked at once."""
+    count = np.bincount(found.rule, minlength=n_rules)
+    there = np.flatnonzero(count)
+    count = count[there]
+    start = np.cumsum(count) - count
+    d = observations.shape[1]
+    corners: Floats = np.empty((4, len(there), d))
+    for feature in range(d):
+        values = observations[found.row, feature]
+        ordered = values[np.lexsort((values, found.rule))].astype(np.float64)
+        corners[0, :, feature] = ordered[start]
+        corners[1, :, feature] = _quantile(ordered, start, count, LOW_QUANTILE)
+        corners[2, :, feature] = _quantile(ordered, start, count, HIGH_QUANTILE)
+        corners[3, :, feature] = ordered[start + count - 1]
+    boxes: list[DataBox | None] = [None] * n_rules
+    for place, sides in zip(there.tolist(), np.moveaxis(corners, 1, 0).tolist(), strict=True):
+        boxes[place] = DataBox(*map(tuple, sides))
+    return boxes
+
+
+def _quantile(
+    ordered: Floats, start: NDArray[np.int64], count: NDArray[np.int64], share: float
+) -> Floats:
+    """Of each group of ascending values, between the two nearest, as NumPy's default."""
+    place = (count - 1) * share
+    below = np.floor(place).astype(np.int64)
+    low = ordered[start + below]
+    high = ordered[start + np.minimum(below + 1, count - 1)]
+    return np.asarray(np.clip(low + (high - low) * (place - below), low, high))
