@@ -12,6 +12,7 @@ import typer
 
 from sarl_core.commandline import terminal
 from sarl_core.commandline.demonstration_commands import check, record
+from sarl_core.commandline.difference_commands import diff
 from sarl_core.commandline.improvement_commands import aggregate
 from sarl_core.commandline.learning_commands import learn
 from sarl_core.commandline.paper_commands import reproduce
@@ -32,6 +33,7 @@ for command in (
     check,
     mine,
     landscape,
+    diff,
     evaluate,
     render,
     aggregate,

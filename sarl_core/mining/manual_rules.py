@@ -1,0 +1,196 @@
+"""A rule written by a person: what it asks and says, checked, and counted on demonstrations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.rules import Bounds, Condition, Operator, Rule, RuleSet
+
+_MOST_NAMES = 8  # as many features as a sentence can name
+
+
+class Ask(NamedTuple):
+    """One condition as a person fills it in.
+
+    Attributes:
+        feature: Its name.
+        op: Whether the feature must be at most the threshold, or above it.
+        threshold: None while there is none.
+    """
+
+    feature: str
+    op: Operator
+    threshold: float | None
+
+
+def manual_rule(
+    rule_set: RuleSet,
+    asks: Sequence[Ask],
+    *,
+    rule_id: str,
+    action: int | None,
+    dimension: int = 0,
+    demonstrations: Demonstrations | None = None,
+) -> Rule:
+    """Make a rule of what a person filled in.
+
+    Args:
+        rule_set: The rules it comes to, or is among under the same id.
+        asks: Conditions, joined by *and*; several on one feature become one interval. Without
+            any, the rule applies always.
+        rule_id: Its name.
+        action: The label, None while none is chosen.
+        dimension: Action dimension it speaks of.
+        demonstrations: What it is counted on. They are left alone where the rule set was mined
+            from others, because the shares of one set are of the same pairs.
+
+    Returns:
+        A rule of origin "manual"; without demonstrations its numbers are 0.
+
+    Raises:
+        InputError: If a condition is wrong, the conditions contradict each other, no action is
+            chosen, or another rule asks and says the same.
+    """
+    if not 0 <= dimension < len(rule_set.actions):
+        raise InputError(
+            f"there is no action dimension {dimension}; the rules have {len(rule_set.actions)}"
+        )
+    conditions = _conditions(rule_set, asks)
+    if action is None:
+        raise InputError("the rule has no action; choose what it says")
+    if not 0 <= action < rule_set.actions[dimension].n_labels:
+        raise InputError(
+            f"{rule_set.actions[dimension].name!r} has no label {action}; choose one of its "
+            f"{rule_set.actions[dimension].n_labels}"
+        )
+    rule = Rule(rule_id, dimension, conditions, action, 0.0, 0.0, 0.0, 0, origin="manual")
+    _refuse_duplicate(rule_set, rule)
+    if demonstrations is None or demonstrations.digest != rule_set.source.digest:
+        return rule
+    return _counted(rule_set, rule, demonstrations)
+
+
+def asks_of(rule: Rule, rule_set: RuleSet) -> tuple[Ask, ...]:
+    """A rule as a person would fill it in.
+
+    Args:
+        rule: Any.
+        rule_set: Knows the names.
+
+    Returns:
+        One or two conditions a feature.
+    """
+    return tuple(
+        Ask(rule_set.source.features[condition.feature].name, condition.op, condition.threshold)
+        for condition in _queries(rule.bounds)
+    )
+
+
+def region_of(rule: Rule) -> tuple[Bounds, ...]:
+    """What a rule asks, the same for all rules that apply to the same states by their bounds.
+
+    Args:
+        rule: Any.
+
+    Returns:
+        Its bounds by feature.
+    """
+    return tuple(sorted(rule.bounds))
+
+
+def _conditions(rule_set: RuleSet, asks: Sequence[Ask]) -> tuple[Condition, ...]:
+    names = [feature.name for feature in rule_set.source.features]
+    found: dict[int, Bounds] = {}
+    for name, op, threshold in asks:
+        if name not in names:
+            listed = ", ".join(names[:_MOST_NAMES]) + (", ..." * (len(names) > _MOST_NAMES))
+            raise InputError(f"there is no feature {name!r}; the features are {listed}")
+        if op not in ("<=", ">"):
+            raise InputError(f"the sign {op!r} is neither '<=' nor '>'; choose one of them")
+        if threshold is None:
+            raise InputError(f"the condition on {name!r} has no number; give one, or remove it")
+        if not math.isfinite(threshold):
+            raise InputError(
+                f"the condition on {name!r} has the number {threshold}; give a finite one"
+            )
+        feature = names.index(name)
+        before = found.get(feature, Bounds(feature, -math.inf, math.inf))
+        found[feature] = (
+            before._replace(high=min(before.high, threshold))
+            if op == "<="
+            else before._replace(low=max(before.low, threshold))
+        )
+    for bounds in found.values():
+        _refuse_empty(bounds, names[bounds.feature])
+    return _queries(found.values())
+
+
+def _queries(bounds: Iterable[Bounds]) -> tuple[Condition, ...]:
+    found = []
+    for feature, low, high in bounds:
+        if math.isfinite(low):
+            found.append(Condition(feature, ">", low))
+        if math.isfinite(high):
+            found.append(Condition(feature, "<=", high))
+    return tuple(found)
+
+
+def _refuse_empty(bounds: Bounds, name: str) -> None:
+    _, low, high = bounds
+    if low >= high:
+        raise InputError(
+            f"{name!r} cannot be above {low:g} and at most {high:g}; change one of the two"
+        )
+    # The largest float32 that is allowed; states are float32, thresholds are not.
+    largest = np.finfo(np.float32).max
+    top = np.float32(np.clip(high, -largest, largest))
+    if float(top) > high:
+        top = np.nextafter(top, np.float32(-np.inf))
+    if not (np.isfinite(top) and float(top) > low):
+        limits = [f"above {low!r}"] * math.isfinite(low) + [f"at most {high!r}"] * math.isfinite(
+            high
+        )
+        raise InputError(
+            f"no value of {name!r} is {' and '.join(limits)}, because states are 32-bit numbers "
+            "and there is none; leave more room"
+        )
+
+
+def _refuse_duplicate(rule_set: RuleSet, rule: Rule) -> None:
+    for other in rule_set.rules:
+        if (
+            other.id != rule.id
+            and (other.dimension, other.action) == (rule.dimension, rule.action)
+            and region_of(other) == region_of(rule)
+        ):
+            instead = "pin it" if other.origin == "mined" else "move it up"
+            if not other.enabled:
+                instead = "switch it on"
+            raise InputError(f"rule {other.id} asks and says the same; {instead} instead")
+
+
+def _counted(rule_set: RuleSet, rule: Rule, demonstrations: Demonstrations) -> Rule:
+    values = demonstrations.action_columns[:, rule.dimension]
+    dimension = rule_set.actions[rule.dimension]
+    carries = dimension.labels_of(values) == rule.action
+    holds = rule.applies(demonstrations.observations)
+    samples = int(holds.sum())
+    if not samples:
+        return rule
+    confidence = float(carries[holds].mean())
+    share = float(carries.mean())
+    return replace(
+        rule,
+        support=samples / len(demonstrations),
+        confidence=confidence,
+        lift=confidence / share if share else 0.0,
+        samples=samples,
+        demonstrated_value=float(np.median(values[holds])) if dimension.is_interval else None,
+    )

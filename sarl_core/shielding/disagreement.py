@@ -1,0 +1,193 @@
+"""On which states two rule sets decide differently."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.mining.difference import Difference, check_comparable, rule_difference
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.deciding import Ground, deciding, ground_of, labels_at, regions
+
+SAMPLED_STATES = 10_000
+_MARGIN = 0.1  # of the thresholds' range, on either side
+
+
+class Kinds(NamedTuple):
+    """In what way two rule sets decide states of one action dimension differently.
+
+    Attributes:
+        contradicting: Both have a rule, and the two say different things.
+        only_first: Only the first has a rule.
+        only_second: Only the second has one.
+    """
+
+    contradicting: int
+    only_first: int
+    only_second: int
+
+
+@dataclass(frozen=True, eq=False)
+class Disagreement:
+    """Two rule sets on the same B states, m action dimensions.
+
+    Attributes:
+        first: A rule set.
+        second: Another.
+        rules: Index of the rule in force in each set, -1 for none, two of (B, m).
+        labels: What each set says, -1 where no rule applies, two of (B, m).
+        difference: Rules added, removed and changed.
+    """
+
+    first: RuleSet
+    second: RuleSet
+    rules: tuple[NDArray[np.int64], NDArray[np.int64]]
+    labels: tuple[NDArray[np.int64], NDArray[np.int64]]
+    difference: Difference
+
+    @property
+    def states(self) -> int:
+        """Number B of states."""
+        return len(self.labels[0])
+
+    @cached_property
+    def differs(self) -> NDArray[np.bool_]:
+        """Where they decide differently, a rule and no rule included, (B, m)."""
+        return np.asarray(self.labels[0] != self.labels[1])
+
+    @cached_property
+    def rows(self) -> NDArray[np.int64]:
+        """States that some action dimension decides differently, ascending."""
+        return np.flatnonzero(self.differs.any(axis=1))
+
+    @property
+    def different(self) -> int:
+        """Number of states that some action dimension decides differently."""
+        return len(self.rows)
+
+    @property
+    def share(self) -> float:
+        """The same as a share; NaN without states."""
+        return self.different / self.states if self.states else float("nan")
+
+    def kinds(self, dimension: int) -> Kinds:
+        """In what way they decide differently.
+
+        Args:
+            dimension: Action dimension.
+
+        Returns:
+            Counts of states.
+        """
+        first, second = (labels[:, dimension] >= 0 for labels in self.labels)
+        differs = self.differs[:, dimension]
+        return Kinds(
+            int((differs & first & second).sum()),
+            int((first & ~second).sum()),
+            int((second & ~first).sum()),
+        )
+
+    def confusion(self, dimension: int) -> NDArray[np.int64]:
+        """How many states the first set says one thing of and the second another.
+
+        Args:
+            dimension: Action dimension.
+
+        Returns:
+            Shape (labels + 1, labels + 1), the first set's label by the second's; the last row
+            and column are for no rule.
+        """
+        size = self.first.actions[dimension].n_labels + 1
+        ours, theirs = (labels[:, dimension] % size for labels in self.labels)
+        counts = np.bincount(ours * size + theirs, minlength=size * size)
+        return counts.reshape(size, size).astype(np.int64)
+
+
+def disagreement(
+    first: RuleSet | Ground, second: RuleSet | Ground, states: NDArray[np.float32] | None = None
+) -> Disagreement:
+    """Compare two rule sets: their rules, and what they decide on the same states.
+
+    Args:
+        first: A rule set, or one that was walked with the states already.
+        second: Another, likewise.
+        states: Shape (B, d), float32; not needed where both were walked.
+
+    Returns:
+        Rules added, removed and changed on the way from the first to the second, and the
+        decisions.
+
+    Raises:
+        InputError: If the two are for different features or actions, or the states are.
+        ValueError: If there are no states, or the two were walked with different ones.
+    """
+    check_comparable(_rules_of(first), _rules_of(second))
+    grounds = [_walked(each, states) for each in (first, second)]
+    if len(grounds[0].states) != len(grounds[1].states):
+        raise ValueError("the two rule sets were walked with different states")
+    rule_sets = [ground.rule_set for ground in grounds]
+    rules = [deciding(ground).first for ground in grounds]
+    labels = [labels_at(ruled, found) for ruled, found in zip(rule_sets, rules, strict=True)]
+    return Disagreement(
+        rule_sets[0],
+        rule_sets[1],
+        (rules[0], rules[1]),
+        (labels[0], labels[1]),
+        rule_difference(
+            rule_sets[0],
+            rule_sets[1],
+            (regions(grounds[0]), regions(grounds[1])),
+            states=len(grounds[0].states),
+        ),
+    )
+
+
+def _rules_of(each: RuleSet | Ground) -> RuleSet:
+    return each.rule_set if isinstance(each, Ground) else each
+
+
+def _walked(each: RuleSet | Ground, states: NDArray[np.float32] | None) -> Ground:
+    if isinstance(each, Ground):
+        return each
+    if states is None:
+        raise ValueError("there are no states to compare the rule sets on")
+    return ground_of(each, states)
+
+
+def sampled_states(
+    rule_sets: Sequence[RuleSet], *, count: int = SAMPLED_STATES, seed: int = 0
+) -> NDArray[np.float32]:
+    """States spread evenly over the range of the thresholds, where there are no demonstrations.
+
+    They say where rule sets differ at all, not how often: an agent does not come by evenly.
+
+    Args:
+        rule_sets: Of the same d features, one or more.
+        count: How many states.
+        seed: The same seed gives the same states.
+
+    Returns:
+        Shape (count, d), float32: each feature uniform from a little below its least threshold to
+        a little above its largest; 0 where nothing asks about it.
+    """
+    width = len(rule_sets[0].source.features)
+    low, high = np.full(width, np.inf), np.full(width, -np.inf)
+    for rule_set in rule_sets:
+        for rule in rule_set.rules:
+            for feature, _, threshold in rule.conditions:
+                low[feature] = min(low[feature], threshold)
+                high[feature] = max(high[feature], threshold)
+    asked = np.isfinite(low)
+    low, high = np.where(asked, low, 0.0), np.where(asked, high, 0.0)
+    # Around a single threshold as much room as it is far from 0, or 1 where it is 0.
+    alone = np.where(low == 0.0, 1.0, np.abs(low))
+    margin = np.where(asked, np.where(high > low, _MARGIN * (high - low), alone), 0.0)
+    largest = float(np.finfo(np.float32).max)
+    low, high = np.clip(low - margin, -largest, largest), np.clip(high + margin, -largest, largest)
+    drawn = np.random.default_rng(seed).random((count, width))
+    return np.asarray(low * (1.0 - drawn) + high * drawn, dtype=np.float32)
