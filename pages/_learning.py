@@ -40,6 +40,7 @@ ROOT = Path(__file__).parents[1]
 STUDIES = ROOT / "docs" / "learning"
 MOST_TRAININGS = 2  # at once, of all visitors: each takes a core
 MOST_FOLDERS = 24  # the oldest go first; one takes a few MB
+LEFT_ALONE = 6 * 3600.0  # seconds without a look before a folder may go
 PATIENCE = 30.0  # seconds that a process gets to save what it has learned
 _LOOKED_AT_EVERY = 0.5  # seconds
 _NICE = 10  # the dashboard answers first
@@ -103,7 +104,11 @@ def study_of(order: Order) -> LearningStudy | None:
     Raises:
         InputError: If its folder is damaged.
     """
-    return load_study(order.folder) if (order.folder / "plan.json").is_file() else None
+    if not (order.folder / "plan.json").is_file():
+        return None
+    with suppress(OSError):
+        os.utime(order.folder)  # somebody looks at it: it stays
+    return load_study(order.folder)
 
 
 class Training:
@@ -123,6 +128,7 @@ class Training:
         self.folder = order.folder
         _tidy_up(keep | {self.folder})
         make_folder(self.folder)
+        _own(self.folder.parent)
         with suppress(OSError):
             self.folder.parent.chmod(0o700)
         _take_over_finished(order)
@@ -303,8 +309,22 @@ def _take_over(source: Path, target: Path, arm: LearningArm, seed: int) -> None:
 
 
 def _tidy_up(keep: set[Path]) -> None:
-    """Remove the studies that nobody has touched for longest."""
+    """Remove the studies that nobody has looked at for longest, and not within the last hours."""
     folders = [folder for folder in base().glob("*-*") if folder.is_dir() and folder not in keep]
-    folders.sort(key=lambda folder: folder.stat().st_mtime)
+    ages = {folder: time.time() - folder.stat().st_mtime for folder in folders}
+    folders.sort(key=lambda folder: -ages[folder])
     for folder in folders[: max(0, len(folders) + 1 - MOST_FOLDERS)]:
-        shutil.rmtree(folder, ignore_errors=True)
+        if ages[folder] > LEFT_ALONE:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _own(folder: Path) -> None:
+    """Refuse a folder for all studies that somebody else on this machine has made.
+
+    Raises:
+        WorkError: If it is not this user's.
+    """
+    if hasattr(os, "getuid") and folder.exists() and folder.stat().st_uid != os.getuid():
+        raise WorkError(
+            f"the folder {folder} belongs to another user; name another one in SARL_LEARNING"
+        )

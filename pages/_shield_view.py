@@ -14,7 +14,7 @@ from _words import escaped
 from sarl_core.explaining.comparison_figures import ArmStyle, returns_figure, typical_figure
 from sarl_core.explaining.comparison_text import clear_change, verdict
 from sarl_core.explaining.language import share_text
-from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate
+from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate, failure_known
 from sarl_core.rollouts.episodes import Episodes
 
 PLAIN = {"displayModeBar": False}
@@ -171,7 +171,8 @@ def column_config() -> dict[str, Any]:
         "Crashes": column.TextColumn(
             alignment="right",
             help="Share of the episodes that ended in failure: a fall, a crash, or whatever else "
-            "ends an episode of this environment before its time. A landing or an arrival is none.",
+            "ends an episode of this environment before its time. A landing or an arrival is none. "
+            "A dash where it is not known which ends are failures.",
         ),
     }
 
@@ -190,7 +191,9 @@ def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
         "Mean return": numbers.mean,
         "Changed": share_text(summary["intervention_rate"]) if rules is not None else "–",
         "Covered": share_text(summary["coverage"]) if rules is not None else "–",
-        "Crashes": share_text(crash_rate(episodes, episodes.env_id)),
+        "Crashes": share_text(crash_rate(episodes, episodes.env_id))
+        if failure_known(episodes.env_id)
+        else "–",
     }
 
 

@@ -199,6 +199,10 @@ def settings() -> learning.Order | None:
         with st.popover("What they do", icon=":material/help:", type="tertiary"):
             for arm in ARMS.values():
                 st.markdown(f"**{arm.title}.** {arm.what}")
+            st.caption(
+                "PPO, DQN and SAC are the usual learners. PPO learns from what it has just done. "
+                "DQN, and SAC where actions are continuous, learn from a memory of all they did."
+            )
         file = (
             st.file_uploader("Rule file (.json)", key="learn_rule_file")
             if rules == OWN_FILE

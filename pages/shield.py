@@ -6,7 +6,7 @@ missing. The work goes on beside the page, in processes of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import _state as state
@@ -178,9 +178,15 @@ def settings() -> Choices:
     )
 
 
+def free_name(name: str, taken: Sequence[str]) -> str:
+    """A name that is not taken: the same, or with a number behind it."""
+    names = (name, *(f"{name} ({number})" for number in range(2, len(taken) + 2)))
+    return next(each for each in names if each not in taken)
+
+
 def pilots(choices: Choices, env_id: str) -> list[Pilot]:
     """The chosen agents."""
-    found = []
+    found: list[Pilot] = []
     for choice in choices.agents:
         place = AGENT_PLACES.index(choice)
         if choice != OWN_FILE:
@@ -188,7 +194,11 @@ def pilots(choices: Choices, env_id: str) -> list[Pilot]:
             found.append(Pilot(choice, place, make, digest))
         for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
             make, digest = agent_for(choice, file, env_id, choices.seed)
-            name = file.name.rsplit(".", 1)[0]
+            if any(pilot.digest == f"own {digest}" for pilot in found):
+                continue  # a file uploaded twice is one
+            name = free_name(
+                file.name.rsplit(".", 1)[0], (*AGENTS, *(pilot.name for pilot in found))
+            )
             found.append(Pilot(name, place + number, make, f"own {digest}"))
     return found
 
@@ -247,13 +257,9 @@ except SarlError as error:
 chosen_guards, refused = guards(chosen)
 for sentence in refused:
     st.error(in_full(sentence), icon=":material/error:")
-by_name = {
-    (each.row.name, each.row.key): each  # a file uploaded twice is one
-    for pilot in chosen_pilots
-    for guard in chosen_guards
-    for each in [line(chosen, environment, pilot, guard)]
-}
-wanted = list(by_name.values())
+wanted = [
+    line(chosen, environment, pilot, guard) for pilot in chosen_pilots for guard in chosen_guards
+]
 if not wanted:
     st.info(
         "Choose at least one agent and one shield; a shield of your own needs its file.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sarl_core.explaining.language import share_text
-from sarl_core.rollouts.comparison import crash_rate
+from sarl_core.rollouts.comparison import crash_rate, failure_known
 from sarl_core.rollouts.episodes import Episodes
 
 
@@ -40,13 +40,17 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
         -1: f"falls from {before} to {after}",
         0: f"does not clearly change ({after}, without them {before})",
     }[clear_change(alone, shielded)]
-    crashes = [crash_rate(episodes, episodes.env_id) for episodes in (shielded, alone)]
-    ends = (
-        f", and {share_text(crashes[0])} instead of {share_text(crashes[1])} of its episodes end "
-        "in a crash"
-        if crashes[0] != crashes[1]
-        else f", and {share_text(crashes[0])} of its episodes end in a crash, as without"
-        if crashes[0]
-        else ""
-    )
-    return f"With {shield} the typical return of the {agent} {change}{ends}."
+    return f"With {shield} the typical return of the {agent} {change}{_crashes(alone, shielded)}."
+
+
+def _crashes(alone: Episodes, shielded: Episodes) -> str:
+    """What to say of the failures; nothing where it is not known which ends are some."""
+    if not failure_known(alone.env_id):
+        return ""
+    before, after = (crash_rate(episodes, episodes.env_id) for episodes in (alone, shielded))
+    if before != after:
+        return (
+            f", and {share_text(after)} instead of {share_text(before)} of its episodes end in a "
+            "crash"
+        )
+    return f", and {share_text(after)} of its episodes end in a crash, as without" if after else ""

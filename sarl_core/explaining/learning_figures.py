@@ -253,7 +253,7 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
         legend={"orientation": "h", "x": 0, "y": 1.01, "xanchor": "left", "yanchor": "bottom"},
     )
     figure.update_xaxes(
-        title={"text": "typical return (IQM, 95 % interval)", "standoff": 2},
+        title={"text": "typical return, 95 % interval", "standoff": 2},
         fixedrange=True,
         nticks=7,
         zeroline=False,

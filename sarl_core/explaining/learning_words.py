@@ -9,6 +9,7 @@ import numpy as np
 
 from sarl_core.explaining.language import counted, share_text, threshold_text
 from sarl_core.files import whole_file
+from sarl_core.rollouts.comparison import failure_known
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 
@@ -23,7 +24,7 @@ HEADINGS = (
     "Changed",
     "Return meanwhile",
     "Return after",
-    "IQM, 95 % interval",
+    "Typical return, 95 % interval",
     "Crashed after",
     "Shield on",
 )
@@ -111,7 +112,7 @@ def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
     if not summaries:
         return ["No run is finished yet."]
     judged = [summary for summary in summaries if summary.safe is not None]
-    paragraphs = [_answer(judged, summaries), *_others(judged, best(judged))]
+    paragraphs = [_answer(study, judged, summaries), *_others(judged, best(judged))]
     paragraphs.append(_alone(summaries, best(judged)))
     paragraphs += [_rules(study, summaries), _conditions(study)]
     return [paragraph for paragraph in paragraphs if paragraph]
@@ -132,7 +133,14 @@ def save_finding(study: LearningStudy, summaries: Sequence[ArmSummary], folder: 
         unfinished.write_text(f"{text}\n", encoding="utf-8")
 
 
-def _answer(judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]) -> str:
+def _answer(
+    study: LearningStudy, judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]
+) -> str:
+    if not failure_known(study.env_id):
+        return (
+            f"Which ends of an episode are failures is not known of {study.env_id}, so which way "
+            "to learn is safe cannot be said."
+        )
     if not judged:
         return (
             "Whether a way to learn is safe and good shows only beside the same learner without a "
@@ -145,14 +153,15 @@ def _answer(judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]) -> st
         )
     alone = reference(summaries, found.arm)
     assert alone is not None  # else it were not judged
-    after = _with_worst(found.alone.mean, found.alone.means)
+    after = value_text(found.alone.halves[1])
     return (
         f"Safe while learning and good afterwards: “{found.arm.title}”. While learning it crashed "
         f"{_times(found.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
         f"crashes in {share_text(found.alone.crash_rate)} of the episodes; the same learner "
-        f"that never had a shield returns {value_text(alone.alone.mean)} and crashes in "
-        f"{share_text(alone.alone.crash_rate)}."
+        f"that never had a shield returns {value_text(alone.alone.halves[1])} and crashes in "
+        f"{share_text(alone.alone.crash_rate)}. (It was chosen by the first half of the episodes "
+        "afterwards; these returns are of the second.)"
     )
 
 
@@ -246,8 +255,9 @@ def _conditions(study: LearningStudy) -> str:
         f"{study.env_id}, {by}, {study.steps:,} steps, {counted(seeds, 'learner')} of each kind, "
         f"{counted(int(study.settings['trial_episodes']), 'episode')} each afterwards. Safe means "
         f"at most {share_text(SAFE_SHARE)} of the crashes of the same learner without a shield; "
-        "good means at least its mean return, both averaged over the learners."
-        + (" So few learners show large differences only." if seeds < 10 else "")
+        "good means at least its mean return, both averaged over the learners. The typical "
+        "return is the mean of the middle half; its interval comes from drawing learners and "
+        "episodes anew." + (" So few learners show large differences only." if seeds < 10 else "")
     )
 
 

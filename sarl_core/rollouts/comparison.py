@@ -15,15 +15,31 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.shielding.projection import Projection
-from sarl_core.shielding.shield import Shield
+from sarl_core.shielding.shield import Outside, Shield
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from sarl_core.mining.rules import RuleSet
 
-# These end an episode for good reasons too; only a failure brings exactly this reward.
-_FAILURE_REWARD = {"LunarLander": -100.0, "BipedalWalker": -100.0}
+_EVERY_END, _NO_END = "every end", "no end"
+# What an end that is no time limit means. Some end for good reasons too; there only a failure
+# brings exactly this reward.
+_FAILURES: dict[str, str | float] = {
+    "LunarLander": -100.0,
+    "BipedalWalker": -100.0,
+    "CarRacing": -100.0,
+    "CartPole": _EVERY_END,
+    "InvertedPendulum": _EVERY_END,
+    "InvertedDoublePendulum": _EVERY_END,
+    "Hopper": _EVERY_END,
+    "Walker2d": _EVERY_END,
+    "Ant": _EVERY_END,
+    "Humanoid": _EVERY_END,
+    "Pendulum": _NO_END,
+    "MountainCar": _NO_END,  # it ends at the flag
+    "Acrobot": _NO_END,  # it ends when it has swung up
+}
 
 
 @dataclass(frozen=True)
@@ -36,6 +52,7 @@ class Arm:
         rules: In force as a shield, None for no shield.
         projection: How the shield replaces a continuous action.
         stochastic: Whether a trained policy is sampled.
+        outside: Whether rules act in states outside the data they were mined from.
     """
 
     name: str
@@ -43,6 +60,7 @@ class Arm:
     rules: RuleSet | None = None
     projection: Projection = "centre"
     stochastic: bool = False
+    outside: Outside = "act"
 
 
 @dataclass(frozen=True)
@@ -146,7 +164,11 @@ def compare_arm(
         InputError: If a number is out of range, or agent, rules and environment do not fit.
         CancelledError: If `progress` returned False.
     """
-    shield = None if arm.rules is None else Shield(arm.rules, projection=arm.projection)
+    shield = (
+        None
+        if arm.rules is None
+        else Shield(arm.rules, projection=arm.projection, outside=arm.outside)
+    )
     return rollout(
         env_id,
         arm.agent,
@@ -179,8 +201,8 @@ def failed(
     """Which ends of episodes are failures.
 
     In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
-    walker arrives; there a failure is an end with a last reward of -100. In CartPole, and in an
-    environment this project knows nothing of, every end that is not a time limit counts as one.
+    walker arrives; there a failure is an end with a last reward of -100. In CartPole every end
+    that is not a time limit is one, in MountainCar none is.
 
     Args:
         env_id: Environment.
@@ -188,13 +210,29 @@ def failed(
         last_rewards: Reward of each episode's last step, (E,).
 
     Returns:
-        Shape (E,).
+        Shape (E,); of an environment in which it is not known, none.
     """
+    meaning = _failure(env_id)
+    if isinstance(meaning, float):
+        return np.asarray(terminated & (last_rewards == meaning))
+    return np.asarray(terminated & (meaning == _EVERY_END))
+
+
+def failure_known(env_id: str) -> bool:
+    """Whether it is known which ends of an environment's episodes are failures.
+
+    Args:
+        env_id: Environment.
+
+    Returns:
+        False for an environment that this project knows nothing of.
+    """
+    return _failure(env_id) is not None
+
+
+def _failure(env_id: str) -> str | float | None:
     family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
-    for name, reward in _FAILURE_REWARD.items():
-        if family.startswith(name):
-            return np.asarray(terminated & (last_rewards == reward))
-    return terminated
+    return next((meaning for name, meaning in _FAILURES.items() if family.startswith(name)), None)
 
 
 def crash_rate(episodes: Episodes, env_id: str) -> float:
@@ -205,8 +243,10 @@ def crash_rate(episodes: Episodes, env_id: str) -> float:
         env_id: Their environment.
 
     Returns:
-        0 to 1.
+        0 to 1; NaN where it is not known which ends are failures.
     """
+    if not failure_known(env_id):
+        return float("nan")
     return float(crashed(episodes, env_id).mean())
 
 
@@ -219,8 +259,9 @@ def comparison_row(arm: Arm, episodes: Episodes) -> dict[str, Any]:
 
     Returns:
         `arm`, `agent`, `rules` (their number, None without a shield), `episodes`, the statistics
-        of `Episodes.summary` (without a shield, `intervention_rate` and `coverage` are None),
-        and `crash_rate`.
+        of `Episodes.summary` (without a shield, `intervention_rate`, `coverage` and
+        `outside_rate` are None),
+        and `crash_rate`, None where it is not known.
     """
     row: dict[str, Any] = {
         "arm": arm.name,
@@ -230,6 +271,8 @@ def comparison_row(arm: Arm, episodes: Episodes) -> dict[str, Any]:
         **episodes.summary(),
         "crash_rate": crash_rate(episodes, episodes.env_id),
     }
+    if not failure_known(episodes.env_id):
+        row["crash_rate"] = None
     if arm.rules is None:
-        row |= {"intervention_rate": None, "coverage": None}
+        row |= {"intervention_rate": None, "coverage": None, "outside_rate": None}
     return row

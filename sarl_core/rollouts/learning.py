@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 TRIAL_SEED = 9_000_000  # of the episodes after learning; no learner has seen them
 TRIAL_EPISODES = 50
 
+
+class DivergedError(WorkError):
+    """The weights of a learner are no numbers any more."""
+
+
 Watch = Callable[[LearningCurve, int], None]
 """Called now and then with the curve so far and the environment steps made."""
 
@@ -227,7 +232,7 @@ def _diverged(learner: Any, error: Exception) -> Exception:
     """What to say of a learner whose weights are no numbers any more; else the error itself."""
     if all(bool(value.isfinite().all()) for value in learner.policy.state_dict().values()):
         return error
-    return WorkError(
+    return DivergedError(
         f"the learner has diverged after {learner.num_timesteps:,} steps, its weights are no "
         "numbers any more; try another seed"
     )

@@ -17,6 +17,9 @@ from sarl_core.errors import InputError
 if TYPE_CHECKING:
     from sarl_core.mining.rules import RuleSet
 
+SEEDS_APART = 100_000  # between learners, so that no two share an episode
+LAST_SEED = 89  # of a learner: the next one would see the episodes that all are tried on
+
 Memory = Literal["proposed", "executed", "masked"]
 """What a policy-gradient learner believes it did: what it proposed; what was executed, with its own
 log-probability; or that in a state with a rule there was nothing to choose."""
@@ -170,8 +173,8 @@ def check_learning(
     """
     if steps < 1:
         raise InputError(f"steps is {steps} and must be at least 1; give a larger number")
-    if seed < 0:
-        raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
+    if not 0 <= seed <= LAST_SEED:
+        raise InputError(f"seed is {seed} and must be from 0 to {LAST_SEED}; give another one")
     description = describe_environment(env_id)
     if len(description.action_shape) and description.is_discrete:
         raise InputError(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from sarl_core.demonstrations.environments import make_environment
-from sarl_core.rollouts.learning_arms import LearningArm
+from sarl_core.rollouts.learning_arms import SEEDS_APART, LearningArm
 from sarl_core.shielding.shield import Shield
 
 if TYPE_CHECKING:
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from stable_baselines3.common.vec_env import VecEnv
 
 _ENVIRONMENTS = 8  # side by side, for PPO
-_SEEDS_APART = 100_000  # between learners, so that no two share an episode
-_LARGEST_SEED = 2**31 - 1
 
 # By the beginning of the environment's id.
 _PPO: dict[str, dict[str, Any]] = {
@@ -105,7 +103,7 @@ def make_learner(
         "policy": "MlpPolicy",
         "env": env,
         "device": "cpu",
-        "seed": seed * _SEEDS_APART % _LARGEST_SEED,
+        "seed": seed * SEEDS_APART,
     }
     if arm.replay:
         continuous = isinstance(env.action_space, Box)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sarl_core.errors import InputError
-from sarl_core.rollouts.learning import TRIAL_EPISODES, learn, rules_digest
+from sarl_core.errors import InputError, WorkError
+from sarl_core.rollouts.learning import TRIAL_EPISODES, DivergedError, learn, rules_digest
 from sarl_core.rollouts.learning_arms import LearningArm, check_learning
 from sarl_core.rollouts.learning_curves import NO_EPISODES, LearningCurve
 from sarl_core.rollouts.learning_files import (
@@ -79,7 +79,8 @@ class LearningPlan:
         if self.episodes < 1:
             raise InputError(f"episodes is {self.episodes} and must be at least 1")
         for arm in self.arms:
-            check_learning(self.env_id, self.rules, arm, steps=self.steps, seed=min(self.seeds))
+            for seed in (min(self.seeds), max(self.seeds)):
+                check_learning(self.env_id, self.rules, arm, steps=self.steps, seed=seed)
 
     def settings(self) -> dict[str, Any]:
         """What the runs share and what was asked for, ready for JSON."""
@@ -134,6 +135,7 @@ def run_study(
     _claim(folder, plan)
     todo = [(seed, arm) for seed in plan.seeds for arm in plan.arms]
     total = len(todo) * plan.steps
+    diverged: list[str] = []
     try:
         for index, (seed, arm) in enumerate(todo):
             before = index * plan.steps
@@ -142,7 +144,10 @@ def run_study(
                 return progress is None or progress(before + done, total) is not False
 
             if not _finished(folder, arm, seed):
-                _one(plan, folder, arm, seed, told)
+                try:
+                    _one(plan, folder, arm, seed, told)
+                except DivergedError as error:
+                    diverged.append(f"{arm.title}, seed {seed}: {error}")
             elif not told(plan.steps, plan.steps):
                 raise CancelledError("stopped")
     except CancelledError as error:
@@ -152,8 +157,16 @@ def run_study(
             f"stopped; {len(study.finished)} of {len(todo)} runs are finished and kept in {folder}"
             ", and the same order goes on from there"
         ) from error
+    except WorkError:
+        _sum_up(folder, load_study(folder))
+        raise
     study = load_study(folder)
     _sum_up(folder, study)
+    if diverged:
+        raise WorkError(
+            f"{len(study.finished)} of {len(todo)} runs are finished and kept in {folder}; "
+            f"{len(diverged)} failed ({diverged[0]})"
+        )
     return study
 
 

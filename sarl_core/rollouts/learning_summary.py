@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from sarl_core.rollouts.comparison import failure_known
 from sarl_core.rollouts.learning_arms import ARMS, LearningArm
 from sarl_core.rollouts.learning_curves import Trial
 from sarl_core.rollouts.learning_files import LearningRun, LearningStudy
-from sarl_core.rollouts.statistics import Interval, summarise
+from sarl_core.rollouts.statistics import Interval, summarise_groups
 
 SAFE_SHARE = 0.5
 """An arm is called safe while learning if it crashes at most this share as often as the learner
@@ -26,13 +28,17 @@ class TrialSummary:
 
     Attributes:
         means: Mean return of each run, R entries.
-        returns: Of all their episodes: mean, and interquartile mean with its 95 % interval.
+        halves: Mean return of the first and of the second half of each run's episodes: what is
+            chosen by the one can be told by the other.
+        returns: Of all their episodes: mean, and interquartile mean with its 95 % interval over
+            learners and episodes.
         crash_rate: Share of all episodes that ended by failure.
         intervention_rate: Mean share of the steps that the rules changed.
         coverage: Mean share of the steps to which a rule applied.
     """
 
     means: tuple[float, ...]
+    halves: tuple[float, float]
     returns: Interval
     crash_rate: float
     intervention_rate: float
@@ -60,7 +66,8 @@ class ArmSummary:
         alone: After learning, without a shield.
         shielded: After learning, with the shield on; None without rules.
         safe: Whether it crashed while learning at most `SAFE_SHARE` times as often as the same
-            learner without a shield; None where that did not run.
+            learner without a shield; None where that did not run, or where it is not known which
+            ends of an episode are failures.
         good: Whether, without a shield after learning, its mean return is at least that of the
             same learner that never had one; likewise.
     """
@@ -113,6 +120,8 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
         One entry an arm that has a finished run, in the study's order.
     """
     found = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
+    if not failure_known(study.env_id):
+        return tuple(found.values())
     return tuple(_judged(summary, found.get(summary.arm.alone)) for summary in found.values())
 
 
@@ -124,10 +133,10 @@ def best(summaries: Sequence[ArmSummary]) -> ArmSummary | None:
 
     Returns:
         Of those that are both, the one with the highest mean return afterwards, without a
-        shield; None if there is none.
+        shield, in the first half of the episodes; None if there is none.
     """
     both = [summary for summary in summaries if summary.safe and summary.good]
-    return max(both, key=lambda summary: summary.alone.mean, default=None)
+    return max(both, key=lambda summary: summary.alone.halves[0], default=None)
 
 
 def _summary(study: LearningStudy, arm: LearningArm) -> ArmSummary:
@@ -164,11 +173,21 @@ def _trials(trials: Sequence[Trial]) -> TrialSummary:
     episodes = sum(len(trial.returns) for trial in trials)
     return TrialSummary(
         means=tuple(trial.mean for trial in trials),
-        returns=summarise(np.concatenate([trial.returns for trial in trials])),
+        halves=(
+            float(np.mean([trial.returns[: (len(trial.returns) + 1) // 2] for trial in trials])),
+            float(np.mean([trial.returns[len(trial.returns) // 2 :] for trial in trials])),
+        ),
+        returns=_returns(tuple(trial.returns for trial in trials)),
         crash_rate=sum(trial.crashes for trial in trials) / episodes,
         intervention_rate=float(np.mean([trial.intervention_rate for trial in trials])),
         coverage=float(np.mean([trial.coverage for trial in trials])),
     )
+
+
+@lru_cache(maxsize=256)
+def _returns(groups: tuple[tuple[float, ...], ...]) -> Interval:
+    """Kept, because who watches a study asks every second, and what is finished stays."""
+    return summarise_groups(groups)
 
 
 def _judged(summary: ArmSummary, alone: ArmSummary | None) -> ArmSummary:
@@ -210,6 +229,7 @@ def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
     returns = trials.returns
     return {
         "means": list(trials.means),
+        "halves": list(trials.halves),
         "mean": trials.mean,
         "std": returns.std,
         "iqm": returns.iqm,

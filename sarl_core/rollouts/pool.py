@@ -38,6 +38,7 @@ class Task:
         shield: Checks them, or None.
         seed: Of the first episode.
         episodes: How many; episode i has seed + i.
+        keep_steps: Whether to keep the record of every step.
     """
 
     env_id: str
@@ -45,6 +46,7 @@ class Task:
     shield: Shield | None
     seed: int
     episodes: int
+    keep_steps: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run.
@@ -64,8 +66,8 @@ class Found(NamedTuple):
 
     Attributes:
         task: Index of the task.
-        result: The next of its episodes, in the order of their seeds, without their steps; or
-            why there are no more.
+        result: The next of its episodes, in the order of their seeds, with their steps where the
+            task keeps them; or why there are no more.
     """
 
     task: int
@@ -153,7 +155,15 @@ class WorkerPool:
         from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
         seed = task.seed + piece.start
-        work = (_work, task.env_id, task.agent, task.shield, seed, piece.episodes)
+        work = (
+            _work,
+            task.env_id,
+            task.agent,
+            task.shield,
+            seed,
+            piece.episodes,
+            task.keep_steps,
+        )
         with self._lock:
             if self._processes is not None:
                 try:
@@ -184,8 +194,7 @@ class WorkerPool:
                     yield Found(piece.task, error)
                 continue
             except BrokenExecutor as error:
-                with self._lock:
-                    self._processes = None  # the next caller gets new ones
+                # Whoever submits next finds them broken and makes new ones.
                 raise WorkError(
                     "a process that ran episodes ended unexpectedly, as when memory runs out; "
                     "run again, with fewer episodes at a time"
@@ -219,13 +228,13 @@ def _end_with(parent: int) -> None:
 
 
 def _work(
-    env_id: str, agent: Agent, shield: Shield | None, seed: int, count: int
+    env_id: str, agent: Agent, shield: Shield | None, seed: int, count: int, keep_steps: bool
 ) -> tuple[Episodes, float]:
     """Run one piece and say how long it took; in a process."""
     start = time.perf_counter()
     try:
         episodes = rollout(
-            env_id, agent, shield=shield, episodes=count, seed=seed, keep_steps=False
+            env_id, agent, shield=shield, episodes=count, seed=seed, keep_steps=keep_steps
         )
     except SarlError:
         raise

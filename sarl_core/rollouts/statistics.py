@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -125,6 +126,41 @@ def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
         low=low,
         high=high,
     )
+
+
+def summarise_groups(groups: Sequence[ArrayLike], *, seed: int = 0) -> Interval:
+    """Mean, deviation and interquartile mean where episodes are of several learners.
+
+    Episodes of one learner are alike. So the interval comes from drawing learners with
+    replacement, and then episodes of each.
+
+    Args:
+        groups: For each of G learners one number an episode, shape (E,), the same for all.
+        seed: Of the resampling; the same seed gives the same interval.
+
+    Returns:
+        The statistics of all episodes together, with that interval.
+
+    Raises:
+        InputError: If there is no value, or one is NaN or infinite.
+    """
+    whole = summarise(
+        np.concatenate([np.asarray(group).reshape(-1) for group in groups]), seed=seed
+    )
+    if len(groups) == 1 or whole.std == 0.0:
+        return whole
+    values = np.array(groups, dtype=np.float64)
+    learners, episodes = values.shape
+    rng = np.random.default_rng(seed)
+    at_once = max(1, _NUMBERS_AT_ONCE // values.size)
+    found = []
+    for start in range(0, _RESAMPLES, at_once):
+        count = min(at_once, _RESAMPLES - start)
+        drawn = rng.integers(learners, size=(count, learners, 1))
+        of_each = rng.integers(episodes, size=(count, learners, episodes))
+        found.append(interquartile_mean(values[drawn, of_each].reshape(count, -1), axis=1))
+    low, high = np.quantile(np.concatenate(found), [0.025, 0.975])
+    return replace(whole, low=float(low), high=float(high))
 
 
 def _bootstrap(array: NDArray[np.float64], seed: int) -> tuple[float, float]:

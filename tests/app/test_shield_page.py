@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.rollouts.comparison import Arm, compare
+from sarl_core.rollouts.policies import MlpPolicy
 from tests.app.screens import errors, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"
@@ -205,14 +207,20 @@ def test_with_nothing_chosen_the_page_says_so() -> None:
     assert not app.button
 
 
-def test_a_policy_and_rules_of_one_s_own() -> None:
+def test_a_policy_and_rules_of_one_s_own(tmp_path: Path) -> None:
     app = open_page(
         "shield", data="lunar_lander", env="CartPole-v1", episodes="2", first_seed="5000"
     )
     app.pills(key="agents").set_value(["own file"]).run()
     app.pills(key="shields").set_value(["no shield", "own file"]).run()
     policy = (DATA / "experts" / "cartpole.npz").read_bytes()
-    app.file_uploader(key="policy_files").set_value([("mine.npz", policy, "")]).run()
+    learned = MlpPolicy.load(DATA / "experts" / "cartpole.npz")
+    # It pushes the other way, and is named as one of the agents that are always there.
+    turned = (*learned.weights[:-1], -learned.weights[-1])
+    replace(learned, weights=turned).save(tmp_path / "novice.npz")
+    other = (tmp_path / "novice.npz").read_bytes()
+    files = [("mine.npz", policy, ""), ("again.npz", policy, ""), ("novice.npz", other, "")]
+    app.file_uploader(key="policy_files").set_value(files).run()
     rules = mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0)
     app.file_uploader(key="rule_file").set_value(
         ("r.json", rules_to_json(rules).encode(), "")
@@ -221,6 +229,8 @@ def test_a_policy_and_rules_of_one_s_own() -> None:
     assert not errors(app)
     assert rows(app)["mine, no shield"]["Mean return"] == 500.0
     assert rows(app)["mine, own file"]["Rules"] == f"{len(rules):,}"
+    assert rows(app)["novice (2), no shield"]["Mean return"] < 50.0
+    assert not any(name.startswith("again") for name in rows(app))  # one file, uploaded twice
 
 
 def test_a_rule_file_of_another_version_and_a_foreign_policy_are_named() -> None:

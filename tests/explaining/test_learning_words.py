@@ -63,7 +63,7 @@ def study() -> LearningStudy:
 def test_the_best_arm_is_named_first_with_its_numbers(study: LearningStudy) -> None:
     answer = finding(study, summarise_study(study))[0]
     assert answer.startswith("Safe while learning and good afterwards: “Imitate, then hand over”.")
-    for number in ("2 times", "9 times", "200 (190 to 210)", "−180", "50 %"):
+    for number in ("2 times", "9 times", "201", "−179", "50 %"):
         assert number in answer
 
 

@@ -7,8 +7,18 @@ import numpy as np
 import pytest
 
 from sarl_core.errors import InputError
+from sarl_core.explaining.comparison_text import verdict
 from sarl_core.mining.rules import RuleSet, mine_rules
-from sarl_core.rollouts.comparison import Arm, Comparison, compare, compare_arm, crash_rate, crashed
+from sarl_core.rollouts.comparison import (
+    Arm,
+    Comparison,
+    compare,
+    compare_arm,
+    comparison_row,
+    crash_rate,
+    crashed,
+    failure_known,
+)
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.recording import record
@@ -91,7 +101,24 @@ def test_progress_counts_over_all_arms_and_stops() -> None:
 def test_in_an_environment_that_knows_only_failure_every_end_is_one() -> None:
     episodes = ended([True, False, True], [1.0, 1.0, -100.0])
     assert crashed(episodes, CARTPOLE).tolist() == [True, False, True]
-    assert crash_rate(episodes, "Unknown-v0") == pytest.approx(2 / 3)
+    assert crash_rate(episodes, CARTPOLE) == pytest.approx(2 / 3)
+
+
+@pytest.mark.parametrize("env_id", ["MountainCar-v0", "MountainCarContinuous-v0", "Acrobot-v1"])
+def test_who_reaches_the_goal_has_not_crashed(env_id: str) -> None:
+    episodes = ended([True, False, True], [0.0, -1.0, 100.0])
+    assert crash_rate(episodes, env_id) == 0.0
+
+
+def test_where_failures_are_not_known_none_is_claimed() -> None:
+    lengths = np.array([5, 5, 5])
+    episodes = replace(
+        ended([True, False, True], [1.0, 1.0, -100.0]), env_id="my:Unknown-v0", lengths=lengths
+    )
+    assert not failure_known(episodes.env_id)
+    assert np.isnan(crash_rate(episodes, episodes.env_id))
+    assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
+    assert "crash" not in verdict("novice", "the rules", episodes, episodes)
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stable_baselines3 import PPO
 
-from sarl_core import InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core import InputError, RuleSet, WorkError, load_demonstrations, mine_rules
+from sarl_core.rollouts.learning import LearningResult, learn
 from sarl_core.rollouts.learning_arms import ARMS, arms_named
 from sarl_core.rollouts.learning_curves import LearningCurve, Trial
 from sarl_core.rollouts.learning_files import (
@@ -140,6 +142,7 @@ def test_a_folder_that_cannot_be_made_is_said(plan: LearningPlan, tmp_path: Path
         ({"arms": ()}, "nothing to learn"),
         ({"seeds": ()}, "nothing to learn"),
         ({"episodes": 0}, "episodes is 0"),
+        ({"seeds": (0, 90)}, "seed is 90"),  # it would see what all are tried on
         ({"env_id": "LunarLander-v3"}, "4 features"),
     ],
 )
@@ -175,6 +178,41 @@ def test_a_run_of_another_version_or_with_a_part_missing_is_refused(
 
 
 # --- what a study says --------------------------------------------------------------------------
+
+
+def test_one_that_diverges_is_told_and_the_others_run(
+    plan: LearningPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverge(self: PPO) -> None:
+        self.policy.action_net.weight.data.fill_(float("nan"))
+
+    monkeypatch.setattr("stable_baselines3.PPO.train", diverge)  # of "none"; not of "imitate"
+    with pytest.raises(
+        WorkError, match=r"1 of 2 runs are finished .* 1 failed \(No shield"
+    ) as told:
+        run_study(replace(plan, seeds=(0,)), tmp_path)
+    assert "\n" not in str(told.value)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert [summary["arm"] for summary in results["summary"]] == ["imitate"]
+
+
+def test_when_the_disk_is_full_what_is_finished_is_summed_up(
+    plan: LearningPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = []
+
+    def second_fails(*arguments: object, **settings: object) -> LearningResult:
+        begun.append(arguments)
+        if len(begun) > 1:
+            raise WorkError("the disk is full")
+        return learn(*arguments, **settings)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("sarl_core.rollouts.learning_study.learn", second_fails)
+    with pytest.raises(WorkError, match="full"):
+        run_study(plan, tmp_path)
+    assert len(begun) == 2
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert [summary["arm"] for summary in results["summary"]] == ["none"]
 
 
 def a_run(arm: str, seed: int, crashes: int, alone: float, steps: int = 1000) -> LearningRun:
@@ -253,6 +291,30 @@ def test_the_best_is_the_one_that_returns_most_of_those_that_are_both() -> None:
     found = best(summaries)
     assert found is not None
     assert found.arm.name == "imitate"
+
+
+def test_the_best_is_chosen_by_other_episodes_than_it_is_told_by() -> None:
+    def returns(arm: str, first: float, second: float) -> LearningRun:
+        trial = Trial((first, first, second, second), 0, 0.0, 0.0)
+        return replace(a_run(arm, 0, 1, 0.0), alone=trial)
+
+    summaries = summarise_study(
+        a_study(
+            replace(returns("none", 0.0, 0.0), curve=a_run("none", 0, 9, 0.0).curve),
+            returns("mask", 30.0, 10.0),
+            returns("imitate", 10.0, 90.0),  # the higher mean, by luck that was not asked
+        )
+    )
+    found = best(summaries)
+    assert found is not None
+    assert (found.arm.name, found.alone.halves) == ("mask", (30.0, 10.0))
+
+
+def test_where_failures_are_not_known_nothing_is_called_safe() -> None:
+    study = replace(
+        a_study(a_run("none", 0, 9, 1.0), a_run("mask", 0, 1, 9.0)), env_id="module:Unknown-v0"
+    )
+    assert [summary.safe for summary in summarise_study(study)] == [None, None]
 
 
 def test_seeds_are_averaged_and_shown() -> None:

@@ -2,7 +2,12 @@ import numpy as np
 import pytest
 
 from sarl_core.errors import InputError
-from sarl_core.rollouts.statistics import interquartile_mean, mean_interval, summarise
+from sarl_core.rollouts.statistics import (
+    interquartile_mean,
+    mean_interval,
+    summarise,
+    summarise_groups,
+)
 
 
 def test_known_values() -> None:
@@ -50,6 +55,30 @@ def test_same_seed_same_interval() -> None:
     values = np.random.default_rng(0).normal(size=30)
     assert summarise(values, seed=1) == summarise(values, seed=1)
     assert summarise(values, seed=1) != summarise(values, seed=2)
+
+
+def test_where_learners_differ_more_episodes_of_each_make_nothing_surer() -> None:
+    rng = np.random.default_rng(3)
+    levels = [0.0, 100.0, 200.0]
+
+    def width(episodes: int) -> tuple[float, float]:
+        groups = [level + rng.normal(size=episodes) for level in levels]
+        apart, together = summarise_groups(groups), summarise(np.concatenate(groups))
+        assert (apart.mean, apart.std, apart.iqm) == (together.mean, together.std, together.iqm)
+        return apart.high - apart.low, together.high - together.low
+
+    (few_apart, few_together), (many_apart, many_together) = width(20), width(500)
+    assert many_together < few_together / 3  # taken for independent, they would say too much
+    assert many_apart > 0.8 * few_apart
+
+
+def test_learners_that_are_alike_are_as_good_as_one() -> None:
+    values = np.random.default_rng(5).normal(size=300)
+    apart, together = summarise_groups(values.reshape(3, 100)), summarise(values)
+    # Drawn twice, they vary twice: by the root of two, give or take what three groups differ.
+    assert 1.0 < (apart.high - apart.low) / (together.high - together.low) < 2.0
+    assert summarise_groups([values]) == together
+    assert summarise_groups([[4.0, 4.0], [4.0, 4.0]]).low == 4.0
 
 
 @pytest.mark.parametrize("values", [[], [1.0, np.nan], [np.inf]])
