@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.mining.rules import RuleSet
     from sarl_core.rollouts.rendering import Replay
+    from sarl_core.shielding.shield import Shield
 
 _RULES_SHOWN = 5
 
@@ -242,12 +243,13 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
     )
 
 
-def print_episodes(document: dict[str, Any], title: str) -> None:
+def print_episodes(document: dict[str, Any], title: str, shield: Shield | None = None) -> None:
     """Print what `Episodes.to_dict` holds.
 
     Args:
         document: What it gave.
         title: Above the table.
+        shield: In force, or None.
     """
     from sarl_core.explaining.language import share_text
 
@@ -261,9 +263,24 @@ def print_episodes(document: dict[str, Any], title: str) -> None:
             ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
             ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
+            *(
+                []
+                if shield is None
+                else [("interventions outside the data", _outside(summary, shield))]
+            ),
             ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
         ]
     )
+
+
+def _outside(summary: dict[str, float], shield: Shield) -> str:
+    """How many interventions lie outside the rules' data."""
+    from sarl_core.explaining.language import share_text
+
+    if not shield.keeps_boxes:
+        return "not known: this rule file keeps no data boxes"
+    left = ", where the action was left as it is" if shield.outside == "abstain" else ""
+    return f"{share_text(summary['outside_rate'])} of the interventions{left}"
 
 
 def _episode(row: dict[str, Any]) -> tuple[str, ...]:

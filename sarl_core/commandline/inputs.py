@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from sarl_core.errors import InputError
+
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.shielding.shield import Shield
@@ -29,23 +31,33 @@ def read_demonstrations(file: Path, env_id: str | None) -> Demonstrations:
 
 
 def read_shield(
-    rules: Path | None, projection: Literal["centre", "clip", "expert"]
+    rules: Path | None,
+    projection: Literal["centre", "clip", "expert"],
+    outside: Literal["act", "abstain"] = "act",
 ) -> Shield | None:
     """Read a rule file into a shield.
 
     Args:
         rules: Of the option ``--rules``, or None.
         projection: What becomes of a continuous action that breaks a rule.
+        outside: What a rule does in a state outside its data.
 
     Returns:
         The shield, or None without rules.
 
     Raises:
-        InputError: If the file cannot be read or is no rule file.
+        InputError: If the file cannot be read, is no rule file, or keeps no data boxes where
+            rules are to abstain outside them.
     """
     if rules is None:
         return None
     from sarl_core.mining.rules import RuleSet
     from sarl_core.shielding.shield import Shield
 
-    return Shield(RuleSet.load(rules), projection=projection)
+    shield = Shield(RuleSet.load(rules), projection=projection, outside=outside)
+    if outside == "abstain" and not shield.keeps_boxes:
+        raise InputError(
+            f"{rules}: this rule file keeps no data boxes, so --outside abstain would do nothing; "
+            "mine the rules again, or leave the option out"
+        )
+    return shield

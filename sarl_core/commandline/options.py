@@ -61,6 +61,14 @@ ProjectionName = Annotated[
         "rule's interval, the nearest value in it, or the expert's median.",
     ),
 ]
+OutsideName = Annotated[
+    Literal["act", "abstain"],
+    typer.Option(
+        "--outside",
+        help="What a rule does in a state outside the data it was mined from: change the action "
+        "all the same, or leave it to the agent.",
+    ),
+]
 Divider = Annotated[
     int,
     typer.Option(

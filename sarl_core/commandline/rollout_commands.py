@@ -13,6 +13,7 @@ from sarl_core.commandline.options import (
     AgentName,
     Env,
     Json,
+    OutsideName,
     ProjectionName,
     Rules,
     Seed,
@@ -36,6 +37,7 @@ def evaluate(
     ] = 0,
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
     as_json: Json = False,
 ) -> None:
     """Run episodes, shielded or not: returns, lengths, interventions, coverage.
@@ -46,10 +48,11 @@ def evaluate(
     with terminal.working("Running episodes") as advance:
         from sarl_core.rollouts.episodes import rollout
 
+        shield = read_shield(rules, projection, outside)
         found = rollout(
             env,
             agent,
-            shield=read_shield(rules, projection),
+            shield=shield,
             episodes=episodes,
             seed=seed,
             stochastic=stochastic,
@@ -63,7 +66,7 @@ def evaluate(
     from sarl_core.commandline.answers import print_episodes
 
     shielded = "unshielded" if rules is None else f"shielded by {rules}"
-    print_episodes(document, f"{found.agent} in {env}, {shielded}")
+    print_episodes(document, f"{found.agent} in {env}, {shielded}", shield)
 
 
 def render(
@@ -89,6 +92,7 @@ def render(
     ] = False,
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
     as_json: Json = False,
 ) -> None:
     """Play one episode and save it as a moving picture, in real time.
@@ -97,7 +101,7 @@ def render(
     --seed 1 --side-by-side --out replay.gif`
     """
     terminal.check_output(out, (".gif", ".mp4"))
-    shield = read_shield(rules, projection)
+    shield = read_shield(rules, projection, outside)
     if both and shield is None:
         raise InputError("--side-by-side compares with a shield; give --rules, or leave it out")
     with terminal.working("Playing") as advance:

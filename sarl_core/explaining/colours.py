@@ -29,6 +29,7 @@ _MANY_COLOURS = (
     "#5566D8",
 )
 INTERVENTION_COLOUR = "#D55E00"  # vermilion
+OUTSIDE_COLOUR = "#C2185B"  # where the data behind a rule does not reach
 MARKER_COLOUR = "#D55E00"  # what is chosen: a point, a rule's path, its interval
 MUTED_COLOUR = "#8796A3"  # what is there for comparison
 LAYER_SCALE = (

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.explaining.colours import OUTSIDE_COLOUR
 from sarl_core.explaining.language import action_text, number_text, sentence
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Track
@@ -52,12 +53,15 @@ class StepView:
         actions: One entry an action dimension.
         margin: Distance to the nearest threshold, inf where none was looked at.
         state: Name, value and unit of each feature.
+        outside: Whether the state lies outside the data of a rule that the agent's action
+            breaks.
     """
 
     step: int
     actions: tuple[ActionView, ...]
     margin: float
     state: tuple[tuple[str, str, str], ...]
+    outside: bool = False
 
     @property
     def intervened(self) -> bool:
@@ -109,8 +113,8 @@ def tracks(
         shielded: Whether a shield was there; without one there is one row a dimension.
 
     Returns:
-        For each dimension what the agent wanted and what was done, and at last the
-        interventions.
+        For each dimension what the agent wanted and what was done, then the interventions, and
+        at last, where there are any, those outside the data of their rules.
     """
     found = []
     for index, dimension in enumerate(dimensions):
@@ -125,6 +129,9 @@ def tracks(
     if shielded:
         marks = np.where(steps.intervened, 0.0, np.nan)
         found.append(Track("changed", marks, None))
+        if steps.outside.any():
+            beyond = np.where(steps.outside, 0.0, np.nan)
+            found.append(Track("outside data", beyond, None, OUTSIDE_COLOUR))
     return tuple(found)
 
 
@@ -168,7 +175,13 @@ def step_view(
         (feature.name, number_text(float(value)), feature.unit)
         for feature, value in zip(features, steps.observation[row], strict=True)
     )
-    return StepView(int(steps.step[row]), tuple(views), float(steps.margin[row]), state)
+    return StepView(
+        int(steps.step[row]),
+        tuple(views),
+        float(steps.margin[row]),
+        state,
+        bool(steps.outside[row]),
+    )
 
 
 def step_texts(
@@ -203,6 +216,8 @@ def step_texts(
             if rule_set is not None:
                 known = f"rule {plain(rule_set.rules[rule].id)}" if rule >= 0 else ""
                 line.append(known or "no rule applies")
+    for row in np.flatnonzero(steps.outside).tolist():
+        lines[row].append("outside the data behind the rule")
     return tuple("<br>".join(line) for line in lines)
 
 

@@ -28,11 +28,13 @@ class Track:
         name: What the row shows, as "agent wanted".
         labels: Shape (T,), NaN where there is none.
         dimension: Whose labels these are; None for a row of marks.
+        colour: Of the marks.
     """
 
     name: str
     labels: NDArray[np.float64]
     dimension: LabelledDimension | None
+    colour: str = INTERVENTION_COLOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,7 @@ def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current
             z=track.labels[None, :],
             zmin=-0.5,
             zmax=n_labels - 0.5,
-            colorscale=_steps_of_colour(n_labels, marks=track.dimension is None),
+            colorscale=_steps_of_colour(track, n_labels),
             showscale=False,
             hoverinfo="skip",
             ygap=5,
@@ -243,11 +245,11 @@ def _spread(count: int) -> NDArray[np.float64]:
     return np.asarray((numbers * golden % 1.0 - 0.5) * 0.42)
 
 
-def _steps_of_colour(n_labels: int, *, marks: bool) -> list[list[Any]]:
+def _steps_of_colour(track: Track, n_labels: int) -> list[list[Any]]:
     """A colour scale of plain steps, one a label."""
     scale: list[list[Any]] = []
     for label in range(n_labels):
-        colour = INTERVENTION_COLOUR if marks else label_colour(label)
+        colour = track.colour if track.dimension is None else label_colour(label)
         scale += [[label / n_labels, colour], [(label + 1) / n_labels, colour]]
     return scale
 

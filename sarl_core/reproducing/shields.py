@@ -136,10 +136,12 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
             rows = frame[
                 (frame["arm"] == arm.name) & frame["divider"].isin((_AS_THEY_ARE, divider))
             ]
+            summary = episodes.summary()
+            del summary["outside_rate"]  # the table does not hold what it is made of
             one = {
                 "rules": int(rows["rule_count"].iloc[0]),
                 "episodes": len(episodes),
-                **episodes.summary(),
+                **summary,
                 "least": float(episodes.returns.min()),
                 "greatest": float(episodes.returns.max()),
                 "crash_rate": float(rows["crashed"].mean()),

@@ -7,7 +7,7 @@ does not depend on what runs beside it, nor on the number of processes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +49,12 @@ class Episodes:
         truncated: Whether a limit ended it, (E,) bool.
         last_rewards: Reward of each episode's last step, which tells a crash, (E,) float64.
         steps: Every step, or None where they were not kept.
+        flips: How often the shield switched on or off, (E,) int64, or None where it was not
+            counted.
+        outside: Steps at which the proposed action breaks a rule whose data the state lies
+            outside of, (E,) int64; none where not given.
+        withheld: Those of them at which no action was changed, because rules abstain there,
+            (E,) int64; none where not given.
     """
 
     env_id: str
@@ -62,9 +68,15 @@ class Episodes:
     truncated: NDArray[np.bool_]
     last_rewards: NDArray[np.float64]
     steps: StepTable | None = None
+    flips: NDArray[np.int64] | None = None
+    outside: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    withheld: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
+        for name in ("outside", "withheld"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.zeros(len(self.seeds), dtype=np.int64))
         for column in fields(self):
             value = getattr(self, column.name)
             if isinstance(value, np.ndarray):
@@ -95,6 +107,8 @@ class Episodes:
         if self.steps is not None:
             ends = np.searchsorted(self.steps.episode, [start, stop])
             changed["steps"] = self.steps.take(slice(*ends.tolist())).numbered_from(-start)
+        if self.flips is not None:
+            changed["flips"] = self.flips[start:stop]
         return replace(self, **changed)
 
     @cached_property
@@ -107,10 +121,12 @@ class Episodes:
 
         Returns:
             `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all
-            steps `intervention_rate` and `coverage`.
+            steps `intervention_rate` and `coverage`; and `outside_rate`, the share of the
+            interventions, those that were withheld with them, outside the rules' data.
         """
         returns = self.statistics
         steps = float(self.lengths.sum())
+        broken = int(self.interventions.sum() + self.withheld.sum())
         return {
             "mean": returns.mean,
             "std": returns.std,
@@ -119,6 +135,7 @@ class Episodes:
             "iqm_high": returns.high,
             "intervention_rate": float(self.interventions.sum()) / steps,
             "coverage": float(self.covered.sum()) / steps,
+            "outside_rate": float(self.outside.sum()) / max(broken, 1),
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -138,7 +155,7 @@ class Episodes:
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """One row an episode: seed, return, length, interventions, covered, how it ended."""
+        """One row an episode: its columns, and how it ended."""
         import pandas as pd
 
         return pd.DataFrame(
@@ -151,12 +168,16 @@ class Episodes:
                 "terminated": self.terminated,
                 "truncated": self.truncated,
                 "last_reward": self.last_rewards,
+                "outside": self.outside,
+                "withheld": self.withheld,
             }
         )
 
 
 _COLUMNS = tuple(
-    column.name for column in fields(Episodes) if column.name not in ("env_id", "agent", "steps")
+    column.name
+    for column in fields(Episodes)
+    if column.name not in ("env_id", "agent", "steps", "flips")
 )
 
 
@@ -164,7 +185,7 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
     """Put episodes of one agent in one environment behind each other.
 
     Args:
-        pieces: At least one; if one has no steps, the whole has none.
+        pieces: At least one; if one has no steps, the whole has none; so with flips.
 
     Returns:
         All their episodes, in the order given.
@@ -181,7 +202,9 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
             tables.append(piece.steps.numbered_from(before))
         before += len(piece)
     steps = concatenate(tables) if len(tables) == len(pieces) else None
-    return replace(pieces[0], steps=steps, **columns)
+    counted = [piece.flips for piece in pieces if piece.flips is not None]
+    flips = np.concatenate(counted) if len(counted) == len(pieces) else None
+    return replace(pieces[0], steps=steps, flips=flips, **columns)
 
 
 def rollout(

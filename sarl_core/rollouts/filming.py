@@ -15,6 +15,7 @@ from sarl_core.errors import InputError, WorkError
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.film import Film
+from sarl_core.rollouts.flips import count_flips
 from sarl_core.rollouts.spaces import SpaceAdapter, adapt
 from sarl_core.rollouts.steps import StepTable
 
@@ -63,6 +64,7 @@ class _Row(NamedTuple):
     intervened: bool
     margin: float
     reward: float
+    outside: bool
 
 
 def film_episode(
@@ -121,6 +123,9 @@ def film_episode(
         truncated=np.array([bool(truncated)]),
         last_rewards=steps.reward[-1:].copy(),
         steps=steps,
+        outside=np.array([int(steps.outside.sum())]),
+        withheld=np.array([int((steps.outside & ~steps.intervened).sum())]),
+        flips=count_flips(steps.intervened, steps.episode),
     )
 
 
@@ -141,7 +146,8 @@ def _film_step(
     record = info.get("shield")
     if record is None:
         rules = [-1] * adapter.n_dimensions
-        row = _Row(0, step, state, proposed[0], proposed[0], rules, False, np.inf, float(reward))
+        action = proposed[0]
+        row = _Row(0, step, state, action, action, rules, False, np.inf, float(reward), False)
     else:
         rules = [-1 if rule is None else rule for rule in record.rules]
         row = _Row(
@@ -154,6 +160,7 @@ def _film_step(
             record.intervened,
             record.margin,
             float(reward),
+            record.outside,
         )
     return row, following, bool(terminated), bool(truncated)
 
@@ -175,6 +182,7 @@ def _table(rows: list[_Row], adapter: SpaceAdapter) -> StepTable:
         intervened=np.array(columns.intervened, dtype=np.bool_),
         margin=np.array(columns.margin, dtype=np.float64),
         reward=np.array(columns.reward, dtype=np.float64),
+        outside=np.array(columns.outside, dtype=np.bool_),
     )
 
 

@@ -49,6 +49,7 @@ class HandoverVecEnv(ShieldedVecEnv):
             rules=np.where(self.enforced[:, None], decision.rules, -1),
             intervened=decision.intervened & self.enforced,
             margin=decision.margin,
+            outside=decision.outside & self.enforced,
         )
 
 

@@ -129,13 +129,12 @@ class Panel:
         )
         if self.shielded:
             changed = int(self.steps.intervened.sum())
-            canvas.text(
-                _MARGIN,
-                top + 42,
-                f"The shield changed {changed} of {count} actions.",
-                14,
-                INKS.quiet,
-            )
+            lines = [f"The shield changed {changed} of {count} actions."]
+            outside = int(self.steps.outside.sum())
+            if outside:
+                lines.append(f"At {outside} steps the state was outside the data behind the rule.")
+            for line, text in enumerate(lines):
+                canvas.text(_MARGIN, top + 42 + 20 * line, text, 14, INKS.quiet)
 
     @cached_property
     def _edges(self) -> NDArray[np.int64]:
@@ -196,8 +195,16 @@ class Panel:
                 "No rule applies to this state: the action stays as it is.",
                 False,
             )
+        outside = bool(self.steps.outside[step])
         if not self.steps.intervened[step]:
             reason = "; ".join(self.describe_rule(rule) for rule in rules)
+            if outside:
+                return Caption(
+                    "ABSTAINS",
+                    action_text(self.description, executed),
+                    f"Outside the data behind it, the rule leaves the action as it is: {reason}",
+                    True,
+                )
             return Caption("AGREES", action_text(self.description, executed), reason, True)
         changed = [index for index in range(len(proposed)) if proposed[index] != executed[index]]
         reasons = [self.describe_rule(int(self.steps.rules[step, index])) for index in changed]
@@ -205,7 +212,7 @@ class Panel:
             "CHANGED",
             f"{action_text(self.description, proposed, changed)} → "
             f"{action_text(self.description, executed, changed, named=len(changed) > 1)}",
-            "; ".join(reasons),
+            ("Outside the data behind it: " if outside else "") + "; ".join(reasons),
             True,
         )
 
@@ -214,7 +221,7 @@ class Caption(NamedTuple):
     """What the lower strip says.
 
     Attributes:
-        mark: CHANGED, AGREES, NO RULE, or "" without a shield.
+        mark: CHANGED, AGREES, ABSTAINS, NO RULE, or "" without a shield.
         action: What is done; where it was changed, also what was proposed.
         reason: The rule in force.
         has_rule: Whether `reason` is a rule.

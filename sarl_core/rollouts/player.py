@@ -29,6 +29,9 @@ class Outcome(NamedTuple):
     truncated: NDArray[np.bool_]
     last_rewards: NDArray[np.float64]
     steps: StepTable | None
+    flips: NDArray[np.int64]
+    outside: NDArray[np.int64]
+    withheld: NDArray[np.int64]
 
 
 class Choice(NamedTuple):
@@ -39,6 +42,7 @@ class Choice(NamedTuple):
     rules: NDArray[np.int64]
     intervened: NDArray[np.bool_]
     margin: NDArray[np.float64]
+    outside: NDArray[np.bool_]
 
 
 @dataclass
@@ -115,6 +119,9 @@ class _Run:
         self.returns, self.last_rewards = np.zeros((2, count))
         self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
         self.terminated, self.truncated = np.zeros((2, count), dtype=np.bool_)
+        self.flips = np.zeros(count, dtype=np.int64)
+        self.on = np.zeros(count, dtype=np.bool_)  # whether the shield changed the latest action
+        self.outside, self.withheld = np.zeros((2, count), dtype=np.int64)
         self.chunks: list[tuple[NDArray[Any], ...]] = []
 
     def start(self) -> None:
@@ -166,14 +173,20 @@ class _Run:
                     choice.intervened,
                     choice.margin,
                     rewards,
+                    choice.outside,
                 )
             )
         self.returns[episodes] += rewards
         self.last_rewards[episodes] = rewards
-        self.lengths[episodes] += 1
         if self.shield is not None:
+            switched = (choice.intervened != self.on[episodes]) & (self.lengths[episodes] > 0)
+            self.flips[episodes] += switched
+            self.on[episodes] = choice.intervened
             self.interventions[episodes] += choice.intervened
             self.covered[episodes] += (choice.rules >= 0).any(axis=1)
+            self.outside[episodes] += choice.outside
+            self.withheld[episodes] += choice.outside & ~choice.intervened
+        self.lengths[episodes] += 1
         self.states = following
         return self._end(ended, episodes)
 
@@ -212,6 +225,9 @@ class _Run:
             self.truncated,
             self.last_rewards,
             steps,
+            self.flips,
+            self.outside,
+            self.withheld,
         )
 
 
@@ -242,13 +258,8 @@ def choose(
     proposed = agent.act(states, uniforms)
     if shield is None:
         none = np.full(proposed.shape, -1, dtype=np.int64)
-        return Choice(
-            proposed,
-            proposed,
-            none,
-            np.zeros(len(states), dtype=np.bool_),
-            np.full(len(states), np.inf),
-        )
+        never = np.zeros(len(states), dtype=np.bool_)
+        return Choice(proposed, proposed, none, never, np.full(len(states), np.inf), never)
     decision = shield.decide_batch(states, adapter.shaped(proposed))
     return Choice(
         proposed,
@@ -256,6 +267,7 @@ def choose(
         decision.rules,
         decision.intervened,
         decision.margin,
+        decision.outside,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,8 @@ class StepTable:
         intervened: Whether the shield changed the action, (T,) bool.
         margin: Distance to the nearest threshold on the paths walked, inf without one, (T,).
         reward: What the environment gave, (T,) float64.
+        outside: Whether the state lies outside the data of a rule that the proposed action
+            breaks, (T,) bool; nowhere where not given.
     """
 
     episode: NDArray[np.int64]
@@ -40,9 +42,12 @@ class StepTable:
     intervened: NDArray[np.bool_]
     margin: NDArray[np.float64]
     reward: NDArray[np.float64]
+    outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
+        if not len(self.outside):
+            object.__setattr__(self, "outside", np.zeros(len(self.step), dtype=np.bool_))
         for column in fields(self):
             getattr(self, column.name).flags.writeable = False
 
@@ -106,7 +111,8 @@ class StepTable:
 
         Returns:
             Columns `episode`, `step`, `obs_<name>`..., `proposed_<i>`..., `executed_<i>`...,
-            `rule_<i>`..., `intervened`, `margin`, `reward`; without `_<i>` where there is one.
+            `rule_<i>`..., `intervened`, `outside`, `margin`, `reward`; without `_<i>` where there
+            is one.
         """
         import pandas as pd
 
@@ -122,7 +128,12 @@ class StepTable:
             for index in range(values.shape[1]):
                 key = title if values.shape[1] == 1 else f"{title}_{index}"
                 columns[key] = values[:, index]
-        columns |= {"intervened": self.intervened, "margin": self.margin, "reward": self.reward}
+        columns |= {
+            "intervened": self.intervened,
+            "outside": self.outside,
+            "margin": self.margin,
+            "reward": self.reward,
+        }
         return pd.DataFrame(columns)
 
 

@@ -5,17 +5,21 @@ It is post-posed and learned from data: it guarantees nothing beyond doing what 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.boxes import Boxes
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements
 
-__all__ = ["BatchDecision", "Decision", "Projection", "Shield"]
+__all__ = ["BatchDecision", "Decision", "Outside", "Projection", "Shield"]
+
+Outside = Literal["act", "abstain"]
+"""What a rule does with a state that lies outside the data it was mined from."""
 
 
 class Decision(NamedTuple):
@@ -29,6 +33,8 @@ class Decision(NamedTuple):
         intervened: Whether the shield changed the action.
         margin: Distance of the state to the nearest threshold on the paths walked, in the
             feature's own unit; inf where there is no threshold.
+        outside: Whether the state lies outside the data of a rule that the proposed action
+            breaks: of one that changed it, or, where rules abstain, would have.
     """
 
     executed: Any
@@ -36,6 +42,7 @@ class Decision(NamedTuple):
     rules: tuple[int | None, ...]
     intervened: bool
     margin: float
+    outside: bool = False
 
 
 class BatchDecision(NamedTuple):
@@ -47,6 +54,7 @@ class BatchDecision(NamedTuple):
         rules: Index of the rule in force or -1, (B, m) int64.
         intervened: Shape (B,).
         margin: Shape (B,).
+        outside: Shape (B,).
     """
 
     executed: NDArray[Any]
@@ -54,6 +62,7 @@ class BatchDecision(NamedTuple):
     rules: NDArray[np.int64]
     intervened: NDArray[np.bool_]
     margin: NDArray[np.float64]
+    outside: NDArray[np.bool_]
 
 
 class Shield:
@@ -64,9 +73,16 @@ class Shield:
     Attributes:
         rule_set: The rules.
         projection: How a continuous action is replaced.
+        outside: Whether a rule acts on states outside the data it was mined from.
     """
 
-    def __init__(self, rule_set: RuleSet, *, projection: Projection = "centre") -> None:
+    def __init__(
+        self,
+        rule_set: RuleSet,
+        *,
+        projection: Projection = "centre",
+        outside: Outside = "act",
+    ) -> None:
         """Prepare for deciding.
 
         Args:
@@ -74,17 +90,25 @@ class Shield:
             projection: A continuous action that breaks a rule becomes the ``centre`` of the
                 rule's interval, is moved to the nearest value in it (``clip``), or becomes what
                 the ``expert`` showed there (the median).
+            outside: Whether a rule changes the action (``act``) or leaves it as it is
+                (``abstain``) in a state outside the rule's data box. A rule without a box acts
+                everywhere.
 
         Raises:
-            InputError: If the projection is unknown, or the rules hold no demonstrated values
-                that ``expert`` could use.
+            InputError: If the projection or `outside` is unknown, or the rules hold no
+                demonstrated values that ``expert`` could use.
         """
         if projection not in get_args(Projection):
             raise InputError(
                 f"the projection {projection!r} is none of centre, clip, expert; choose one"
             )
+        if outside not in get_args(Outside):
+            raise InputError(
+                f"what to do outside the data, {outside!r}, is neither act nor abstain; choose one"
+            )
         self.rule_set = rule_set
         self.projection = projection
+        self.outside: Outside = outside
         self._actions = rule_set.actions
         self._n_features = len(rule_set.source.features)
         self._matchers = tuple(
@@ -100,6 +124,8 @@ class Shield:
         self._labels = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
         self._label_list: list[int] = self._labels.tolist()
         self._replace = replacements(rule_set, projection)
+        self._boxes = Boxes(rule_set.rules, self._n_features)
+        self._abstains = outside == "abstain"
         self._single = len(self._actions) == 1 and not self._actions[0].is_interval
         self._first = self._actions[0].first
 
@@ -126,13 +152,17 @@ class Shield:
             wanted = self._label_list[rule] + self._first
             if action == wanted:
                 return Decision(action, action, (rule,), False, margin)
-            return Decision(_like(action, wanted), action, (rule,), True, margin)
+            outside = self._boxes.leaves_out(rule, state)
+            if outside and self._abstains:
+                return Decision(action, action, (rule,), False, margin, True)
+            return Decision(_like(action, wanted), action, (rule,), True, margin, outside)
         return self._decide_each(state, action)
 
     def _decide_each(self, state: list[float], action: Any) -> Decision:
         values = np.asarray(action)
         flat = values.reshape(-1)
         executed = None
+        outside = False
         found: list[int | None] = []
         nearest = float("inf")
         for dimension, matcher in enumerate(self._matchers):
@@ -143,12 +173,16 @@ class Shield:
                 continue
             value = flat[dimension]
             if self._actions[dimension].label_of(float(value)) != self._label_list[rule]:
+                if self._boxes.leaves_out(rule, state):
+                    outside = True
+                    if self._abstains:
+                        continue
                 executed = flat.copy() if executed is None else executed
                 executed[dimension] = self._replace.one(rule, float(value))
         if executed is None:
-            return Decision(action, action, tuple(found), False, nearest)
+            return Decision(action, action, tuple(found), False, nearest, outside)
         changed = executed.reshape(values.shape)
-        return Decision(changed, action, tuple(found), True, nearest)
+        return Decision(changed, action, tuple(found), True, nearest, outside)
 
     def decide_batch(self, observations: ArrayLike, actions: ArrayLike) -> BatchDecision:
         """Check many actions at once, each exactly as `decide` would.
@@ -178,6 +212,7 @@ class Shield:
         margin = np.full(len(states), np.inf)
         executed = flat
         intervened = np.zeros(len(states), dtype=np.bool_)
+        outside = np.zeros(len(states), dtype=np.bool_)
         for dimension, matcher in enumerate(self._matchers):
             rules[:, dimension], near = matcher.match_batch(states)
             margin = np.minimum(margin, near)
@@ -185,13 +220,24 @@ class Shield:
             ruled = np.flatnonzero(rules[:, dimension] >= 0)
             labels = self._actions[dimension].labels_of(column[ruled])
             broken = ruled[labels != self._labels[rules[ruled, dimension]]]
+            beyond = self._boxes.leave_out(rules[broken, dimension], states[broken])
+            outside[broken[beyond]] = True
+            if self._abstains:
+                broken = broken[~beyond]
             if len(broken):
                 executed = flat.copy() if executed is flat else executed
                 executed[broken, dimension] = self._replace.many(
                     rules[broken, dimension], column[broken]
                 )
                 intervened[broken] = True
-        return BatchDecision(executed.reshape(proposed.shape), proposed, rules, intervened, margin)
+        return BatchDecision(
+            executed.reshape(proposed.shape), proposed, rules, intervened, margin, outside
+        )
+
+    @property
+    def keeps_boxes(self) -> bool:
+        """Whether any of the rules says where its pairs lay; else none is ever outside."""
+        return self._boxes.count > 0
 
     def _wrong_width(self, got: int) -> InputError:
         env_id = self.rule_set.source.env_id or "another environment"

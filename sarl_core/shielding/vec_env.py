@@ -83,6 +83,7 @@ class ShieldedVecEnv(VecEnvWrapper):
                 tuple(int(rule) if rule >= 0 else None for rule in decision.rules[i]),
                 bool(decision.intervened[i]),
                 float(decision.margin[i]),
+                bool(decision.outside[i]),
             )
         if self.penalty:
             rewards = rewards - self.penalty * decision.intervened.astype(rewards.dtype)

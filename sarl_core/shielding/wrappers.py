@@ -25,6 +25,7 @@ class StepRecord(NamedTuple):
         rules: For each action dimension the index of the rule in force, or None.
         intervened: Whether the shield changed the action.
         margin: Distance to the nearest threshold on the paths walked.
+        outside: Whether the state lies outside the data of a rule that the action breaks.
     """
 
     episode: int
@@ -35,6 +36,7 @@ class StepRecord(NamedTuple):
     rules: tuple[int | None, ...]
     intervened: bool
     margin: float
+    outside: bool = False
 
 
 class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
@@ -93,6 +95,7 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             decision.rules,
             decision.intervened,
             decision.margin,
+            decision.outside,
         )
         if decision.intervened and self.penalty:
             reward = float(reward) - self.penalty

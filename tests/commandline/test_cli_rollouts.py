@@ -44,6 +44,7 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
         "iqm_high",
         "intervention_rate",
         "coverage",
+        "outside_rate",
     }
     assert summary["mean"] == np.mean([episode["return"] for episode in document["episodes"]])
     assert summary["intervention_rate"] > 0

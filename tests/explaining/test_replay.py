@@ -70,12 +70,17 @@ def test_a_step_that_was_not_changed_says_one_action(
 def test_the_strip_marks_exactly_the_interventions(replayed: tuple[RuleSet, StepTable]) -> None:
     rules, steps = replayed
     rows = tracks(steps, rules.actions, shielded=True)
-    assert [row.name for row in rows] == ["wanted", "done", "changed"]
-    assert (~np.isnan(rows[-1].labels) == steps.intervened).all()
+    beyond = steps.outside.any()
+    names = ["wanted", "done", "changed", *(["outside data"] if beyond else [])]
+    assert [row.name for row in rows] == names
+    assert (~np.isnan(rows[2].labels) == steps.intervened).all()
+    if beyond:
+        assert (~np.isnan(rows[3].labels) == steps.outside).all()
+        assert rows[3].colour != rows[2].colour
     assert ((rows[0].labels != rows[1].labels) == steps.intervened).all()
     figure = intervention_strip(rows, step_texts(steps, rules.actions, rules), current=0)
     points = figure.data[-1]
-    assert points.customdata[:, 0].tolist() == list(range(len(steps))) * 3
+    assert points.customdata[:, 0].tolist() == list(range(len(steps))) * len(rows)
     assert figure.layout.hoverdistance == -1
     assert len(tracks(steps, rules.actions, shielded=False)) == 1
 
@@ -86,6 +91,20 @@ def test_tooltips_name_the_rule_and_the_change(replayed: tuple[RuleSet, StepTabl
         assert text.startswith(f"step {row}<br>")
         assert ("wanted" in text) == bool(steps.intervened[row])
         assert ("no rule applies" in text) == (steps.rules[row, 0] < 0)
+        assert ("outside the data" in text) == bool(steps.outside[row])
+
+
+def test_a_step_says_that_its_state_lies_outside_the_data() -> None:
+    rules, steps = played("pendulum")
+    beyond = np.flatnonzero(steps.outside)
+    assert 0 < len(beyond) < steps.intervened.sum()
+    for row in (int(beyond[0]), int(np.flatnonzero(~steps.outside)[0])):
+        view = step_view(steps, row, rules.actions, rules.source.features, rules)
+        rule = rules.rules[int(steps.rules[row, 0])]
+        assert rule.box is not None
+        state = steps.observation[row].astype(float)
+        inside = (state >= rule.box.least) & (state <= rule.box.most)
+        assert view.outside == bool(steps.intervened[row] and not inside.all())
 
 
 def test_labels_come_from_the_environment_where_they_are_discrete() -> None:

@@ -25,6 +25,7 @@ COLUMNS = (
     "intervened",
     "margin",
     "reward",
+    "outside",
 )
 
 
@@ -166,6 +167,7 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
         "iqm_high",
         "intervention_rate",
         "coverage",
+        "outside_rate",
     ]
     assert summary["mean"] == found.returns.mean()
     assert found.steps is not None
@@ -191,6 +193,7 @@ def test_frames(shields: dict[str, Shield]) -> None:
         "executed",
         "rule",
         "intervened",
+        "outside",
         "margin",
         "reward",
     ]

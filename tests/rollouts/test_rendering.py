@@ -69,6 +69,7 @@ def test_renders_the_episode_that_rollout_plays(
         "intervened",
         "margin",
         "reward",
+        "outside",
     ):
         assert getattr(rendered.steps, name).tobytes() == getattr(played.steps, name).tobytes()
 
@@ -145,7 +146,7 @@ def test_captions_say_what_the_step_was(pair: Replay) -> None:
     shielded, plain = pair.panels
     steps = shielded.steps
     names = ("do nothing", "fire left engine", "fire main engine", "fire right engine")
-    step = int(np.flatnonzero(steps.intervened)[3])
+    step = int(np.flatnonzero(steps.intervened & ~steps.outside)[3])
     caption = shielded.caption(step)
     assert caption.mark == "CHANGED"
     assert caption.action == (
@@ -155,6 +156,11 @@ def test_captions_say_what_the_step_was(pair: Replay) -> None:
     assert names[steps.executed[step, 0]] in caption.reason
     agreeing = int(np.flatnonzero(steps.covered & ~steps.intervened)[0])
     assert shielded.caption(agreeing).mark == "AGREES"
+    beyond = replace(shielded, steps=replace(steps, outside=np.ones_like(steps.outside)))
+    assert beyond.caption(step) == caption._replace(
+        reason=f"Outside the data behind it: {caption.reason}"
+    )
+    assert beyond.caption(agreeing).mark == "ABSTAINS"
     without = replace(steps, rules=np.full_like(steps.rules, -1))
     assert replace(shielded, steps=without).caption(agreeing).mark == "NO RULE"
     assert plain.caption(0).mark == ""

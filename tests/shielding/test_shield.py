@@ -266,7 +266,7 @@ def test_bad_input_is_said_in_a_sentence(lander_like):
     with pytest.raises(InputError, match="3 action values for 2 states"):
         Shield(rules).decide_batch(np.zeros((2, 8)), [0, 1, 0])
     empty = RuleSet((), rules.actions, rules.source, rules.thresholds)
-    assert Shield(empty).decide(np.zeros(8), 1) == (1, 1, (None,), False, float("inf"))
+    assert Shield(empty).decide(np.zeros(8), 1) == (1, 1, (None,), False, float("inf"), False)
     assert len(Shield(empty).decide_batch(np.zeros((0, 8)), np.zeros(0, dtype=int)).executed) == 0
 
 
