@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -72,6 +73,8 @@ class _Session:
     async def _drawn(self, figure: go.Figure) -> bytes:
         import kaleido
 
+        # It logs a trace for a message cut in two, reads the next one, and draws all the same.
+        logging.getLogger("choreographer").setLevel(logging.CRITICAL)
         if self.browser is None:
             # Formulas would make the browser ask a server for MathJax; there are none.
             self.browser = await kaleido.Kaleido(n=1, mathjax=False).__aenter__()
