@@ -151,9 +151,9 @@ def _refuse_empty(bounds: Bounds, name: str) -> None:
     # The largest float32 that is allowed; states are float32, thresholds are not.
     largest = np.finfo(np.float32).max
     top = np.float32(np.clip(high, -largest, largest))
-    if float(top) > high:
+    if float(top) > high >= -largest:
         top = np.nextafter(top, np.float32(-np.inf))
-    if not (np.isfinite(top) and float(top) > low):
+    if not low < float(top) <= high:
         limits = [f"above {low!r}"] * math.isfinite(low) + [f"at most {high!r}"] * math.isfinite(
             high
         )

@@ -1,0 +1,252 @@
+"""Decisions of edited rule sets, their effects, and where two sets disagree: by brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
+from sarl_core.mining.editing import Add, Move, Pin, Switch, apply
+from sarl_core.mining.manual_rules import Ask, manual_rule
+from sarl_core.mining.rules import Condition, Rule
+from sarl_core.shielding.deciding import deciding, ground_of, labels_at, regions
+from sarl_core.shielding.disagreement import disagreement, sampled_states
+from sarl_core.shielding.effects import change, expert_labels, verdicts
+
+
+def walk(n: int = 250) -> Demonstrations:
+    """Three features, two discrete action dimensions."""
+    rng = np.random.default_rng(11)
+    states = (rng.integers(0, 40, (n, 3)) / 40).astype(np.float32)
+    first = (states[:, 0] > 0.5).astype(int) + (states[:, 1] > 0.3)
+    second = (states[:, 2] > 0.6).astype(int)
+    noise = rng.random(n) < 0.15
+    first[noise] = rng.integers(0, 3, int(noise.sum()))
+    return Demonstrations(
+        states,
+        np.stack([first, second], axis=1),
+        np.zeros(n, dtype=int),
+        feature_names=("a", "b", "c"),
+    )
+
+
+DATA = walk()
+FINE = mine_rules(DATA, supp_min=0.0, conf_min=1.0)
+COARSE = mine_rules(DATA, supp_min=0.05, conf_min=0.8)
+STATES = np.random.default_rng(2).random((120, 3)).astype(np.float32)
+
+
+def holds(rule: Rule, state) -> bool:
+    return all(
+        (float(state[feature]) <= threshold) == (op == "<=")
+        for feature, op, threshold in rule.conditions
+    )
+
+
+def in_order(rule_set: RuleSet, state, dimension: int) -> list[int]:
+    """Every rule that applies, in the order in which a shield tries them."""
+    numbered = list(enumerate(rule_set.rules))
+    tried = [pair for pair in numbered if pair[1].placed]
+    tried += [pair for pair in numbered if not pair[1].placed]
+    return [
+        index
+        for index, rule in tried
+        if rule.enabled and rule.dimension == dimension and holds(rule, state)
+    ]
+
+
+def added(asks: list[Ask], action: int, dimension: int, number: int) -> Add:
+    return Add(
+        manual_rule(FINE, asks, rule_id=f"manual.{number}", action=action, dimension=dimension)
+    )
+
+
+EDITS = [
+    added([Ask("a", ">", 0.2), Ask("b", "<=", 0.7)], 1, 0, 1),
+    Pin(COARSE.rules[0]),
+    Switch(FINE.rules[3].id, False),
+    added([Ask("a", ">", 0.4)], 0, 0, 2),
+    Pin(FINE.rules[1]),
+    Switch("manual.2", False),
+    added([], 1, 1, 3),
+    Move("manual.2", up=True),
+    Switch(COARSE.rules[0].id, False),
+    Switch("manual.2", True),
+]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.sampled_from(EDITS), unique=True, max_size=8), st.booleans())
+def test_an_edit_decides_as_a_shield_and_as_a_scan_in_order(edits, fine):
+    base = FINE if fine else COARSE
+    edited = apply(base, edits)
+    found = deciding(ground_of(base, STATES), edited)
+    shield = Shield(edited).decide_batch(STATES, np.zeros((len(STATES), 2), dtype=np.int64))
+    assert np.array_equal(found.first, shield.rules)
+    for row, state in enumerate(STATES):
+        for dimension in range(2):
+            tried = [*in_order(edited, state, dimension), -1, -1]
+            assert found.first[row, dimension] == tried[0]
+            assert found.second[row, dimension] == tried[1]
+
+
+def test_rules_of_no_tree_are_tried_in_the_order_of_the_file():
+    rules = tuple(
+        Rule(f"0.{n}", 0, (Condition(feature, op, threshold),), n % 2, 0.1, 1.0, 1.0, 5)
+        for n, (feature, op, threshold) in enumerate(
+            [(0, ">", 0.5), (1, "<=", 0.6), (0, "<=", 0.8), (2, ">", 0.1)]
+        )
+    )
+    loose = RuleSet(rules, FINE.actions, FINE.source, FINE.thresholds)
+    ground = ground_of(loose, STATES)
+    assert ground.in_trees == (False, True)
+    for edits in ([], [Switch("0.0", False)], [Pin(rules[3]), Switch("0.1", False)]):
+        edited = apply(loose, edits)
+        found = deciding(ground, edited)
+        for row, state in enumerate(STATES):
+            tried = [*in_order(edited, state, 0), -1, -1]
+            assert found.first[row].tolist() == [tried[0], -1]
+            assert found.second[row, 0] == tried[1]
+
+
+def test_a_region_is_where_a_rule_applies_whatever_comes_before_it():
+    edited = apply(FINE, EDITS)
+    rules, rows = regions(ground_of(edited, STATES))
+    expected = {
+        (index, row)
+        for index, rule in enumerate(edited.rules)
+        for row, state in enumerate(STATES)
+        if holds(rule, state)
+    }
+    assert set(zip(rules.tolist(), rows.tolist(), strict=True)) == expected
+    assert len(rules) == len(expected)
+
+
+def test_effects_are_what_counting_one_by_one_gives():
+    edited = apply(FINE, EDITS)
+    ground = ground_of(FINE, DATA.observations)
+    expert = expert_labels(FINE, DATA)
+    assert expert.tolist() == DATA.actions.tolist()
+    found = verdicts(ground, edited, expert)
+    covered = right = 0
+    decided = [0] * len(edited)
+    conflicts: dict[tuple[int, int], list[int]] = {}
+    for row, state in enumerate(DATA.observations):
+        for dimension in range(2):
+            tried = in_order(edited, state, dimension)
+            if not tried:
+                continue
+            covered += 1
+            decided[tried[0]] += 1
+            right += edited.rules[tried[0]].action == DATA.actions[row, dimension]
+            if len(tried) > 1 and edited.rules[tried[0]].placed:
+                pair = (tried[0], tried[1])
+                if len({edited.rules[one].action for one in pair}) == 2:
+                    conflicts.setdefault(pair, []).append(row)
+    assert found.coverage == pytest.approx(covered / (2 * len(DATA)))
+    assert found.fidelity == pytest.approx(right / covered)
+    assert found.decided.tolist() == decided
+    assert {(one.rule, one.other): one.states for one in found.conflicts} == {
+        pair: len(rows) for pair, rows in conflicts.items()
+    }
+    assert conflicts
+    for one in found.conflicts:
+        rows = conflicts[one.rule, one.other]
+        dimension = edited.rules[one.rule].dimension
+        assert one.example in rows
+        did = [DATA.actions[row, dimension] for row in rows]
+        assert one.right == did.count(edited.rules[one.rule].action)
+        assert one.other_right == did.count(edited.rules[one.other].action)
+    assert sorted((one.states for one in found.conflicts), reverse=True) == [
+        one.states for one in found.conflicts
+    ]
+
+
+def test_a_change_counts_states_and_not_dimensions():
+    ground = ground_of(COARSE, DATA.observations)
+    before = verdicts(ground, COARSE)
+    after = verdicts(ground, apply(COARSE, EDITS))
+    found = change(before, after)
+    old, new = before.labels.tolist(), after.labels.tolist()
+    pairs = list(zip(old, new, strict=True))
+    assert found.states == len(DATA)
+    assert found.different == sum(one != other for one, other in pairs)
+    assert found.by_dimension == tuple(
+        sum(one[at] != other[at] for one, other in pairs) for at in range(2)
+    )
+    assert found.newly_covered == sum(
+        any(was < 0 <= now for was, now in zip(*pair, strict=True)) for pair in pairs
+    )
+    assert found.newly_uncovered == sum(
+        any(now < 0 <= was for was, now in zip(*pair, strict=True)) for pair in pairs
+    )
+    assert change(before, before) == (len(DATA), 0, (0, 0), 0, 0)
+    assert np.isnan(before.fidelity)
+    assert before.conflicts == ()
+
+
+def test_states_of_another_width_are_refused():
+    with pytest.raises(InputError, match="3 features and the states have 2"):
+        ground_of(FINE, np.zeros((4, 2), dtype=np.float32))
+
+
+# --- two sets ----------------------------------------------------------------------------------
+
+
+def test_two_sets_disagree_where_their_shields_do():
+    edited = apply(COARSE, EDITS)
+    found = disagreement(FINE, edited, STATES)
+    nothing = np.zeros((len(STATES), 2), dtype=np.int64)
+    says = [
+        labels_at(one, Shield(one).decide_batch(STATES, nothing).rules) for one in (FINE, edited)
+    ]
+    differing = [row for row in range(len(STATES)) if (says[0][row] != says[1][row]).any()]
+    assert found.rows.tolist() == differing
+    assert found.different == len(differing)
+    assert found.share == pytest.approx(len(differing) / len(STATES))
+    for dimension in range(2):
+        labels = [one[:, dimension].tolist() for one in says]
+        n = FINE.actions[dimension].n_labels
+        expected = [[0] * (n + 1) for _ in range(n + 1)]
+        for one, other in zip(*labels, strict=True):
+            expected[one][other] += 1  # -1, no rule, is the last
+        assert found.confusion(dimension).tolist() == expected
+        kinds = found.kinds(dimension)
+        assert sum(kinds) == int(found.differs[:, dimension].sum())
+        assert kinds.only_first == sum(row[-1] for row in expected[:-1])
+        assert kinds.only_second == sum(expected[-1][:-1])
+
+
+def test_a_set_agrees_with_itself():
+    found = disagreement(FINE, FINE, STATES)
+    assert (found.different, found.share) == (0, 0.0)
+    assert found.difference.same == len(FINE)
+    assert found.difference.added == found.difference.removed == found.difference.changed == ()
+
+
+def test_sampled_states_lie_around_the_thresholds_and_come_again():
+    states = sampled_states([FINE, COARSE], count=500)
+    assert states.shape == (500, 3)
+    assert states.dtype == np.float32
+    assert np.array_equal(states, sampled_states([FINE, COARSE], count=500))
+    for feature in range(3):
+        asked = [
+            condition.threshold
+            for rule in FINE.rules + COARSE.rules
+            for condition in rule.conditions
+            if condition.feature == feature
+        ]
+        width = max(asked) - min(asked)
+        assert states[:, feature].min() < min(asked) < max(asked) < states[:, feature].max()
+        assert min(asked) - 0.11 * width < states[:, feature].min()
+        assert states[:, feature].max() < max(asked) + 0.11 * width
+
+
+def test_a_feature_with_one_threshold_or_none_is_sampled_too():
+    rule = Rule("0.1", 0, (Condition(1, ">", 4.0),), 0, 0.1, 1.0, 1.0, 5)
+    lone = RuleSet((rule,), FINE.actions, FINE.source, FINE.thresholds)
+    states = sampled_states([lone], count=200)
+    assert (states[:, [0, 2]] == 0).all()
+    assert 0 < (states[:, 1] > 4).mean() < 1
