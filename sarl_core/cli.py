@@ -1,4 +1,4 @@
-"""The command line, put together (DESIGN section 5); each command stands in `commandline`.
+"""The command line, put together; each command stands in `commandline`.
 
 What is heavy is imported where it is used, so that ``--help`` answers at once.
 """

@@ -115,7 +115,7 @@ class LabelledDimension:
 def label_dimensions(
     demonstrations: Demonstrations, divider: int = 2
 ) -> tuple[LabelledDimension, ...]:
-    """What the labels of demonstrations are (DESIGN 3.1; the paper's divider).
+    """What the labels of demonstrations are (the paper's divider).
 
     Args:
         demonstrations: The actions and their bounds.

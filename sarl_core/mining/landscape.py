@@ -1,4 +1,4 @@
-"""The rule set at every threshold at once (DESIGN 3.6).
+"""The rule set at every threshold at once.
 
 Support shrinks along a path. So node v is a rule at (s, c) exactly when s <= support(v) and
 c lies above the confidence of all its ancestors and not above its own: a rectangle. Whatever is

@@ -248,7 +248,7 @@ class RuleSet:
         return tuple(rule for rule in self.rules if rule.dimension == dimension)
 
     def save(self, path: str | Path) -> None:
-        """Write the rule file (DESIGN section 5); it appears whole or not at all.
+        """Write the rule file; it appears whole or not at all.
 
         Args:
             path: A `.json` file.
@@ -312,7 +312,7 @@ def mine_rules(
     max_depth: int | None = None,
     divider: int = 2,
 ) -> RuleSet:
-    """Mine a rule set (the paper's Algorithm 1; DESIGN 3.4).
+    """Mine a rule set (the paper's Algorithm 1).
 
     Args:
         demonstrations_or_trees: N pairs, or trees grown from them.

@@ -117,7 +117,7 @@ class Episodes:
         return summarise(self.returns)
 
     def summary(self) -> dict[str, float]:
-        """What the episodes say together (DESIGN 5, ``evaluate --json``).
+        """What the episodes say together (``evaluate --json``).
 
         Returns:
             `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all

@@ -1,4 +1,4 @@
-"""The record of every step of several episodes, column by column (DESIGN 3.9)."""
+"""The record of every step of several episodes, column by column."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an action that breaks a rule becomes (DESIGN 3.8)."""
+"""What an action that breaks a rule becomes (the paper's Algorithm 2)."""
 
 from __future__ import annotations
 

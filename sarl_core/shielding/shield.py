@@ -23,7 +23,7 @@ Outside = Literal["act", "abstain"]
 
 
 class Decision(NamedTuple):
-    """What the shield made of one action; the heart of the flight recorder (DESIGN 3.9).
+    """What the shield made of one action; the heart of the flight recorder.
 
     Attributes:
         executed: The action to execute; the proposed object itself if it breaks no rule.

@@ -13,7 +13,7 @@ from sarl_core.shielding.shield import Shield
 
 
 class StepRecord(NamedTuple):
-    """The record of one shielded step (DESIGN 3.9), in ``info["shield"]``.
+    """The record of one shielded step, in ``info["shield"]``.
 
     Attributes:
         episode: Index of the episode, counted from the last reset with a seed, so that the same

@@ -1,6 +1,6 @@
 """Algorithm 1 as the paper writes it: a loop over paths and nodes, on scikit-learn's own tree.
 
-Written from the paper and DESIGN 3.4, without a look at `sarl_core.mining`, so that an error
+Written from the paper's Algorithm 1, without a look at `sarl_core.mining`, so that an error
 would have to be made twice.
 """
 

@@ -35,7 +35,7 @@ def as_set(rules):
 
 
 def labels_by_hand(demonstrations, divider):
-    """Interval indices, by comparing with the edges one after the other (DESIGN 3.1)."""
+    """Interval indices, by comparing with the edges one after the other (the paper's divider)."""
     if demonstrations.is_discrete:
         return demonstrations.actions.reshape(-1)
     low, high = demonstrations.action_low[0], demonstrations.action_high[0]
