@@ -1,0 +1,301 @@
+"""Running an ablation: piece by piece, in any process, going on where it was called off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from sarl_core.errors import InputError, SarlError
+from sarl_core.rollouts.ablation import MOST_RULES, Ablation, rules_to_take_out, spans
+from sarl_core.rollouts.agents import Agent, make_agent
+from sarl_core.rollouts.comparison import crashed
+from sarl_core.rollouts.episodes import Episodes, join, rollout
+from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.pool import Found, Task, WorkerPool
+from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rule
+from sarl_core.shielding.shield import Shield
+
+LEAST_EPISODES = 2  # a difference that was seen once says nothing about the next
+
+_TOGETHER = 8  # rules; a shield without each of them is made and sent to the processes
+
+Runner = Callable[[Sequence[Task]], Iterator[Found]]
+"""Runs tasks, as `WorkerPool.run` does."""
+
+
+class Step(NamedTuple):
+    """How far an ablation is.
+
+    Attributes:
+        done: Episodes known.
+        total: Episodes that have to be known, as far as can be told.
+        text: What is being done.
+    """
+
+    done: int
+    total: int
+    text: str
+
+
+class AblationRecord:
+    """All that has been run of an ablation; more episodes and more rules go on from there.
+
+    Attributes:
+        env_id: Environment.
+        agent: Chooses the actions.
+        shield: With all its rules.
+        seed: Of the first episode.
+    """
+
+    def __init__(self, env_id: str, agent: Agent, shield: Shield, seed: int) -> None:
+        """Begin with nothing.
+
+        Args:
+            env_id: What ``gymnasium.make`` takes.
+            agent: Chooses the actions.
+            shield: With all its rules.
+            seed: Of the first episode; episode i has seed + i.
+
+        Raises:
+            InputError: If the environment cannot be used, or the shield is not for it.
+        """
+        check_environment(env_id, shield)
+        self.env_id, self.agent, self.shield, self.seed = env_id, agent, shield, seed
+        self._lock = Lock()
+        self._base: Episodes | None = None
+        self._use: RuleUse | None = None
+        # For each rule that was taken out: episode to its return, and whether it failed.
+        self._without: dict[int, dict[int, tuple[float, bool]]] = {}
+        self._latest: tuple[tuple[int, int, int], Ablation] | None = None
+
+    def run(self, episodes: int, most: int, runner: Runner) -> Iterator[Step]:
+        """Run what is not known yet. Who stops iterating keeps what is finished.
+
+        Args:
+            episodes: How many, E.
+            most: Rules to take out at most.
+            runner: Runs the episodes.
+
+        Yields:
+            How far it is, after every piece.
+
+        Raises:
+            SarlError: If episodes cannot be run.
+        """
+        yield from self._run_base(episodes, runner)
+        use = self._use
+        assert use is not None
+        use = use.part(0, episodes)
+        chosen, _ = rules_to_take_out(use, most)
+        matters = {rule: np.flatnonzero(use.matters[rule]).tolist() for rule in chosen}
+        total = episodes + sum(map(len, matters.values()))
+        done = episodes + sum(
+            episode in self._known(rule) for rule in chosen for episode in matters[rule]
+        )
+        yield Step(done, total, "Taking rules out …")
+        missing = [rule for rule in chosen if not self._known(rule).keys() >= set(matters[rule])]
+        for first in range(0, len(missing), _TOGETHER):
+            tasks, owners = self._tasks(missing[first : first + _TOGETHER], use)
+            for piece in _pieces(runner(tasks)):
+                rule = owners[piece.task]
+                assert isinstance(piece.result, Episodes)
+                self._keep(rule, piece.result)
+                done += len(piece.result)
+                place = chosen.index(rule) + 1
+                yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+
+    def _run_base(self, episodes: int, runner: Runner) -> Iterator[Step]:
+        have = len(self._base) if self._base is not None else 0
+        yield Step(min(have, episodes), episodes, "With all rules …")
+        if have >= episodes:
+            return
+        task = Task(
+            self.env_id,
+            self.agent,
+            self.shield,
+            self.seed + have,
+            episodes - have,
+            keep_steps=True,
+        )
+        for piece in _pieces(runner([task])):
+            assert isinstance(piece.result, Episodes)
+            self._extend(piece.result)
+            have += len(piece.result)
+            yield Step(have, episodes, f"With all rules: {have} of {episodes} episodes")
+
+    def _extend(self, fresh: Episodes) -> None:
+        """Take in more episodes under all rules; another caller may have done so already."""
+        use = rule_use(fresh, self.shield)
+        with self._lock:
+            have = len(self._base) if self._base is not None else 0
+            known = self.seed + have - int(fresh.seeds[0])
+            if not 0 <= known < len(fresh):
+                return
+            bare = replace(fresh, steps=None).part(known, len(fresh))
+            use = use.part(known, len(fresh))
+            if self._base is None or self._use is None:
+                self._base, self._use = bare, use
+            else:
+                self._base, self._use = join([self._base, bare]), join_use([self._use, use])
+
+    def _known(self, rule: int) -> dict[int, tuple[float, bool]]:
+        with self._lock:
+            return dict(self._without.get(rule, {}))
+
+    def _tasks(self, rules: Sequence[int], use: RuleUse) -> tuple[list[Task], list[int]]:
+        """The episodes to run without some rules, and which task is of which rule."""
+        tasks, owners = [], []
+        for rule in rules:
+            known = self._known(rule)
+            wanted = [
+                bool(matters) and episode not in known
+                for episode, matters in enumerate(use.matters[rule].tolist())
+            ]
+            shield = without_rule(self.shield, rule)
+            for start, count in spans(wanted):
+                tasks.append(Task(self.env_id, self.agent, shield, self.seed + start, count))
+                owners.append(rule)
+        return tasks, owners
+
+    def _keep(self, rule: int, found: Episodes) -> None:
+        places = (found.seeds - self.seed).tolist()
+        outcomes = zip(found.returns.tolist(), crashed(found, self.env_id).tolist(), strict=True)
+        with self._lock:
+            self._without.setdefault(rule, {}).update(zip(places, outcomes, strict=True))
+
+    def result(self, episodes: int, most: int) -> Ablation | None:
+        """What is known of so many episodes and rules.
+
+        Args:
+            episodes: How many, E.
+            most: Rules to take out at most.
+
+        Returns:
+            The ablation, with the rules that are finished; None while the episodes under all rules
+            are not. The same object as the last time if nothing has been added.
+        """
+        with self._lock:
+            if self._base is None or self._use is None or len(self._base) < episodes:
+                return None
+            key = (episodes, most, sum(map(len, self._without.values())))
+            if self._latest is not None and self._latest[0] == key:
+                return self._latest[1]
+            base, use = self._base.part(0, episodes), self._use.part(0, episodes)
+            chosen, rest = rules_to_take_out(use, most)
+            finished, returns, failed, played = [], [], [], 0
+            for rule in chosen:
+                known = self._without.get(rule, {})
+                places = np.flatnonzero(use.matters[rule]).tolist()
+                if not all(place in known for place in places):
+                    continue
+                finished.append(rule)
+                played += len(places)
+                returns.append(base.returns.copy())
+                failed.append(crashed(base, self.env_id).copy())
+                for place in places:
+                    returns[-1][place], failed[-1][place] = known[place]
+            shape = (len(finished), episodes)
+            found = Ablation(
+                shield=self.shield,
+                base=base,
+                use=use,
+                rules=tuple(finished),
+                returns=np.array(returns, dtype=np.float64).reshape(shape),
+                failed=np.array(failed, dtype=np.bool_).reshape(shape),
+                left_out=(*(rule for rule in chosen if rule not in finished), *rest),
+                played=played,
+            )
+            self._latest = key, found
+            return found
+
+
+def ablate(
+    env_id: str,
+    agent: str | Path | Agent,
+    shield: Shield,
+    *,
+    episodes: int = 50,
+    seed: int = 0,
+    most: int = MOST_RULES,
+    stochastic: bool = False,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Ablation:
+    """Take the rules of a shield out one by one, and run the same episodes again.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: An agent, or what `make_agent` takes.
+        shield: With all its rules.
+        episodes: How many, E; at least 2.
+        seed: Episode i starts from seed + i, with every rule taken out and with none, and draws
+            the same random numbers.
+        most: Rules to take out at most: those that change the most actions.
+        stochastic: Whether a trained policy is sampled.
+        jobs: Processes; changes the speed, never the result.
+        progress: Called with (episodes done, in all, as far as can be told); returning False
+            stops.
+
+    Returns:
+        The ablation; the same arguments give the same one, bit for bit.
+
+    Raises:
+        InputError: If a number is out of range, or agent, shield and environment do not fit.
+        CancelledError: If `progress` returned False.
+    """
+    for name, value, least in (
+        ("episodes", episodes, LEAST_EPISODES),
+        ("seed", seed, 0),
+        ("most", most, 1),
+        ("jobs", jobs, 1),
+    ):
+        if value < least:
+            raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+    actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
+    record = AblationRecord(env_id, actor, shield, seed)
+    pool = WorkerPool(jobs) if jobs > 1 else None
+    try:
+        for done, total, _ in record.run(episodes, most, run_here if pool is None else pool.run):
+            report(progress, done, total)
+    finally:
+        if pool is not None:
+            pool.close()
+    found = record.result(episodes, most)
+    assert found is not None
+    return found
+
+
+def run_here(tasks: Sequence[Task]) -> Iterator[Found]:
+    """Run tasks one after the other, in this process.
+
+    Args:
+        tasks: What to run.
+
+    Yields:
+        Each when it is finished.
+    """
+    for index, task in enumerate(tasks):
+        yield Found(
+            index,
+            rollout(
+                task.env_id,
+                task.agent,
+                shield=task.shield,
+                episodes=task.episodes,
+                seed=task.seed,
+                keep_steps=task.keep_steps,
+            ),
+        )
+
+
+def _pieces(found: Iterator[Found]) -> Iterator[Found]:
+    for piece in found:
+        if isinstance(piece.result, SarlError):
+            raise piece.result
+        yield piece
