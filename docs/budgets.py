@@ -18,8 +18,9 @@ sys.path.insert(0, str(FOLDER))
 
 from sarl_core.demonstrations.formats import load_demonstrations  # noqa: E402
 from sarl_core.files import whole_file  # noqa: E402
-from sarl_core.rollouts.aggregation import Plan, aggregate  # noqa: E402
+from sarl_core.rollouts.aggregation import aggregate  # noqa: E402
 from sarl_core.rollouts.aggregation_files import aggregation_card  # noqa: E402
+from sarl_core.rollouts.aggregation_plan import Plan  # noqa: E402
 
 OUT = FOLDER / "data" / "rules" / "budgets.json"
 PLANS = {
@@ -42,6 +43,8 @@ def main(jobs: int) -> None:
             if any(point["budget"] == budget for point in points):
                 continue
             found = aggregate(shown, replace(plan, max_rules=budget), jobs=jobs)
+            if not found.is_finished:
+                sys.exit(f"stopped; the points before are in {OUT}")
             card = aggregation_card(found, command="python docs/budgets.py")
             points.append(
                 {

@@ -78,11 +78,10 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
     steps = counted(improved.plan.generations, "step")
     refined = f", refined in {steps}" if improved.refined else ""
     if improved.reported is None:
-        best = improved.rounds[improved.chosen - 1]
         st.markdown(
-            f"The best so far are the {size} of round {improved.chosen}, judged by the "
-            f"{counted(len(best.returns), 'episode')} of their round alone: that is little, and "
-            "the number is flattered by being the best. Nothing was reported on fresh episodes."
+            f"The best so far are the {size} of round {improved.chosen}"
+            f"{', partly refined' if improved.refined else ''}. {how_chosen(improved)} Nothing was "
+            "reported on fresh episodes."
         )
         return
     returns = improved.reported.returns
@@ -126,6 +125,25 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             ),
         ):
             st.metric(label, value, border=True, height="stretch", help=hint)
+
+
+def how_chosen(improved: Aggregation) -> str:
+    """By what the rules of a stopped run are the best, in a sentence."""
+    if improved.validation_mean is not None:
+        return (
+            "They were chosen by episodes played for that alone, with a mean return of "
+            f"{improved.validation_mean:,.1f}; that number is flattered by being the best."
+        )
+    if improved.refined:
+        return (
+            "The round was chosen by episodes played for that alone. How far its rules were "
+            "refined was judged by the episodes of the refinement: that is little."
+        )
+    best = improved.rounds[improved.chosen - 1]
+    return (
+        f"They are judged by the {counted(len(best.returns), 'episode')} of their round alone: "
+        "that is little, and the number is flattered by being the best."
+    )
 
 
 def size_text(per_action: Sequence[int]) -> str:
@@ -176,9 +194,9 @@ def show_rounds(
                 "Mean return": point.mean,
                 "Deviation": point.std,
                 "Coverage": point.coverage,
-                "Otherwise": point.disagreement,
+                "Expert disagrees": point.disagreement,
                 "Rules": point.rules,
-                "Pairs": point.pairs,
+                "Demonstrations": point.pairs,
                 "Chosen": point.number == chosen,
             }
             for point in points
@@ -194,12 +212,12 @@ def show_rounds(
             "Coverage": st.column_config.NumberColumn(
                 format="percent", help="Share of the states met in which some rule applied"
             ),
-            "Otherwise": st.column_config.NumberColumn(
+            "Expert disagrees": st.column_config.NumberColumn(
                 format="percent",
                 help="Share of the rules' decisions in which the expert would do otherwise",
             ),
             "Rules": st.column_config.NumberColumn(format="localized"),
-            "Pairs": st.column_config.NumberColumn(
+            "Demonstrations": st.column_config.NumberColumn(
                 format="localized", help="State-action pairs that its rules were made of"
             ),
         },
@@ -209,6 +227,8 @@ def show_rounds(
 def take_away(outcome: Outcome, improved: Aggregation) -> None:
     """The rules, their card and the demonstrations, to keep and to go on with."""
     name = f"{outcome.order.env_id.rsplit('/', 1)[-1]}-{len(improved.rule_set)}-rules"
+    if not improved.is_finished:
+        name += ".stopped"
     in_use = state.uploaded() is improved.demonstrations
     with st.container(horizontal=True):
         st.button(

@@ -17,13 +17,13 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import counted
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent
-from sarl_core.rollouts.aggregation import Aggregation, Plan, Round, aggregate
-from sarl_core.rollouts.gaps import Gaps, find_gaps, join_gaps
+from sarl_core.rollouts.aggregation import Aggregation, Round, aggregate
+from sarl_core.rollouts.aggregation_plan import Plan
+from sarl_core.rollouts.gaps import Gaps, gaps_so_far
 from sarl_core.rollouts.pool import begin_process
 from sarl_core.rollouts.progress import CancelledError
 
 KEPT = 6  # a finished run holds up to some ten megabytes of demonstrations
-_PIECE = 8  # episodes after which a search for gaps can be stopped, with what it has found
 _SOON = 0.03  # share of the work from which on the rest can be guessed
 
 
@@ -155,7 +155,7 @@ class Working(Job):
             watch=watch,
         )
         self.outcome = Outcome(order, found.rounds, found)
-        return found.reported is not None
+        return found.is_finished
 
     def _phase(self) -> str:
         plan, finished = self.order.plan, len(self.outcome.rounds)
@@ -176,28 +176,24 @@ class Working(Job):
         return f" · about {counted(max(1, round(left / 60)), 'minute')} left"
 
     def _find_gaps(self) -> bool:
-        order, pieces = self.order, list[Gaps]()
+        order = self.order
         assert order.rules is not None
-        episodes = order.plan.episodes
-        for start in range(0, episodes, _PIECE):
-            count = min(_PIECE, episodes - start)
-            self.text = f"{start} of {counted(episodes, 'episode')}"
 
-            def progress(done: int, _: int, start: int = start) -> bool:
-                self.done = start + done
-                self.text = f"{self.done} of {counted(episodes, 'episode')}{self._time_left()}"
-                return self.wanted()
+        def progress(done: int, total: int) -> bool:
+            self.done = done
+            self.text = f"{done} of {counted(total, 'episode')}{self._time_left()}"
+            return self.wanted()
 
-            found = find_gaps(
-                order.env_id,
-                order.rules,
-                episodes=count,
-                seed=order.plan.seed + start,
-                jobs=min(jobs(), count),
-                progress=progress,
-            )
-            pieces.append(found)
-            self.outcome = Outcome(order, gaps=join_gaps(pieces))
+        progress(0, order.plan.episodes)
+        for found in gaps_so_far(
+            order.env_id,
+            order.rules,
+            episodes=order.plan.episodes,
+            seed=order.plan.seed,
+            jobs=jobs(),
+            progress=progress,
+        ):
+            self.outcome = Outcome(order, gaps=found)
         return True
 
 

@@ -30,14 +30,15 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
 from sarl_core.mining.budget import MIN_RULES
 from sarl_core.mining.rules import Thresholds
-from sarl_core.rollouts.aggregation import Plan
+from sarl_core.rollouts.aggregation_plan import Plan
 from sarl_core.rollouts.refinement import generation_cost
+from sarl_core.rollouts.seeds import FRESH
 
 SHIPPED_EXPERT, NOBODY = "shipped", "nobody"
 EVERY_LEAF, AT_THRESHOLDS = "every leaf", "at the thresholds"
 MOST = 1_000  # of rules, episodes and steps; what needs more is for the command line
 MOST_ROUNDS = 200
-GAPS_SEED, GAPS_SEEDS_A_RUN = 100_000, MOST  # far from those the demonstrations were recorded with
+GAPS_SEEDS_A_RUN = MOST
 JOB = "_job_improve"
 
 
@@ -233,7 +234,7 @@ def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) ->
         episodes=choices.episodes,
         thresholds=rules.thresholds,
         divider=choices.divider,
-        seed=GAPS_SEED + choices.seed * GAPS_SEEDS_A_RUN,
+        seed=FRESH + choices.seed * GAPS_SEEDS_A_RUN,
     )
     key = digest_of(repr((demonstrations.digest, env_id, plan, NOBODY)).encode())
     return Order(key, demonstrations, env_id, plan, None, rules, "")

@@ -23,7 +23,9 @@ from sarl_core.errors import InputError
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.mining.rules import Thresholds
-    from sarl_core.rollouts.aggregation import Plan
+    from sarl_core.rollouts.aggregation import Aggregation
+    from sarl_core.rollouts.aggregation_plan import Plan
+    from sarl_core.rollouts.gaps import Gaps
 
 _NOBODY = "none"
 
@@ -97,7 +99,7 @@ def aggregate(
     nobody = expert == _NOBODY
     terminal.check_output(out, (".csv",) if nobody else (".json",))
     with terminal.working("Starting"):
-        from sarl_core.rollouts.aggregation import Plan
+        from sarl_core.rollouts.aggregation_plan import Plan
 
         plan = Plan(
             max_rules=max_rules,
@@ -121,17 +123,14 @@ def aggregate(
         found = run(
             shown, plan, env_id=env, agent=agent, expert=expert, jobs=jobs, progress=advance
         )
-    card = save_aggregation(found, out, command=_command(context))
-    if found.reported is None:
-        raise terminal.StoppedError(
-            f"stopped by Ctrl-C after {len(found.rounds)} of {rounds} rounds; the best rules so "
-            f"far are in {out}, chosen by the episodes of their round only"
-        )
+    written, card = save_aggregation(found, out, command=_command(context))
+    if not found.is_finished:
+        raise terminal.StoppedError(_what_is_left(found, written, out))
     if as_json:
         terminal.print_json(card)
         return
     terminal.print_table(
-        ("Round", "Pairs", "Rules", "Mean return", "Coverage", "Expert disagrees"),
+        ("Round", "Demonstrations", "Rules", "Mean return", "Coverage", "Expert disagrees"),
         [
             (
                 str(one.number),
@@ -155,6 +154,18 @@ def aggregate(
     )
 
 
+def _what_is_left(found: Aggregation, written: Path, out: Path) -> str:
+    """In one line, what a stopped run leaves behind."""
+    from sarl_core.rollouts.aggregation_files import chosen_by
+
+    beside = "" if written == out else f" ({out} stays as it was)"
+    return (
+        f"stopped by Ctrl-C after {len(found.rounds)} of {found.plan.rounds} rounds; the best "
+        f"rules so far are in {written}{beside}, chosen by {chosen_by(found)}; no "
+        "fresh episode has tried them"
+    )
+
+
 def _thresholds(support: float | None, confidence: float | None) -> Thresholds | None:
     from sarl_core.mining.rules import Thresholds
 
@@ -175,25 +186,32 @@ def _gaps(
         )
     if not env_id:
         raise InputError("the demonstrations name no environment; say which with --env")
+    found: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
-        from sarl_core.files import whole_file
         from sarl_core.mining.rules import mine_rules
-        from sarl_core.rollouts.gaps import find_gaps
+        from sarl_core.rollouts.gaps import gaps_so_far
 
         at = plan.thresholds
         rules = mine_rules(shown, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
-        found = find_gaps(
-            env_id,
-            rules,
-            agent=agent,
-            episodes=plan.episodes,
-            seed=plan.seed,
-            projection=plan.projection,
-            jobs=jobs,
-            progress=advance,
-        )
-        with whole_file(out) as unfinished:
-            found.to_frame().to_csv(unfinished, index=False)
+        try:
+            for so_far in gaps_so_far(
+                env_id,
+                rules,
+                agent=agent,
+                episodes=plan.episodes,
+                seed=plan.seed,
+                projection=plan.projection,
+                jobs=jobs,
+                progress=advance,
+            ):
+                found = so_far
+        except KeyboardInterrupt:
+            if found is None:
+                raise
+    assert found is not None
+    if found.episodes < plan.episodes:
+        raise terminal.StoppedError(_keep_gaps(found, out, plan.episodes))
+    _write_gaps(found, out)
     document: dict[str, Any] = {
         "file": str(out),
         "rules": len(rules),
@@ -209,6 +227,26 @@ def _gaps(
             f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
             f"({found.share:.1%}) have no rule and need a demonstration."
         ]
+    )
+
+
+def _write_gaps(found: Gaps, path: Path) -> None:
+    from sarl_core.files import whole_file
+
+    with whole_file(path) as unfinished:
+        found.to_frame().to_csv(unfinished, index=False)
+
+
+def _keep_gaps(found: Gaps, out: Path, planned: int) -> str:
+    """Write what a stopped search has found, and say so in one line."""
+    from sarl_core.rollouts.aggregation_files import stopped_path
+
+    written = stopped_path(out)
+    _write_gaps(found, written)
+    beside = "" if written == out else f" ({out} stays as it was)"
+    return (
+        f"stopped by Ctrl-C after {found.episodes} of {planned} episodes; the {len(found):,} "
+        f"states without a rule that they met are in {written}{beside}"
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from sarl_core.rollouts.progress import Progress
+from sarl_core.rollouts.seeds import REPRODUCED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "partly", "does not agree"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "partly", "does not agree")
 
-FIRST_SEED = 30_000_000  # of the episodes; no expert was trained or chosen by them
+FIRST_SEED = REPRODUCED  # of the episodes; no expert was trained or chosen by them
 
 
 @dataclass(frozen=True)

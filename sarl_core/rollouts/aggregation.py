@@ -16,79 +16,22 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.budget import MIN_RULES, grow_budgeted_trees, leaf_rules
-from sarl_core.mining.rules import RuleSet, Thresholds, mine_rules
+from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.rules import RuleSet, mine_rules
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.rollouts import seeds
 from sarl_core.rollouts.agents import Agent, make_agent
+from sarl_core.rollouts.aggregation_plan import Plan
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.progress import CancelledError, Progress, report
-from sarl_core.rollouts.questions import answered, ask, importance, scores
-from sarl_core.rollouts.refinement import generation_cost, refine
+from sarl_core.rollouts.questions import Answers, ask, importance, scores
+from sarl_core.rollouts.refinement import generation_cost, generation_seed, refine
+from sarl_core.rollouts.seeds import RunSeeds
 from sarl_core.rollouts.selection import planned_episodes, successive_halving
-from sarl_core.rollouts.spaces import Actions
-from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
-# Far apart, and far from what a person types, so that no episode is used twice.
-ROUND_SEED = 20_000_000
-VALIDATION_SEED = 30_000_000
-REPORT_SEED = 50_000_000
-_SEEDS_A_RUN = 1_000_000  # between two values of the seed
-_SEEDS_A_ROUND = 10_000
-
-_PAIRS_A_ROUND = 25_000  # more states of one round are too alike to be worth their time
-# Rules learn from what was shown at first and from where the latest rules led: what earlier ones
-# got into, the present ones may never meet.
-_ROUNDS_KEPT = 12
 _FIRST_VALIDATION = 16
 _MARKS = 8  # points on the way of a refinement from which the best is chosen
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What an aggregation is to do.
-
-    Attributes:
-        max_rules: Most rules of each action dimension.
-        rounds: How often the rules act and the expert answers.
-        episodes: Episodes a round.
-        thresholds: Cut the trees there; None makes every leaf a rule.
-        divider: Number of intervals of continuous dimensions.
-        projection: How the shield replaces a continuous action.
-        generations: Of the refinement that follows; 0 for none.
-        validation: Episodes by which the best of all is chosen in the end.
-        report: Episodes of the final report.
-        seed: Another one gives other episodes.
-    """
-
-    max_rules: int
-    rounds: int = 20
-    episodes: int = 40
-    thresholds: Thresholds | None = None
-    divider: int = 2
-    projection: Projection = "centre"
-    generations: int = 0
-    validation: int = 256
-    report: int = 100
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be done.
-
-        Raises:
-            InputError: If a number is out of range.
-        """
-        for name, value, least in (
-            ("budget of rules", self.max_rules, MIN_RULES),
-            ("number of rounds", self.rounds, 1),
-            ("number of episodes a round", self.episodes, 1),
-            ("number of generations", self.generations, 0),
-            ("number of validation episodes", self.validation, 1),
-            ("number of report episodes", self.report, 1),
-            ("seed", self.seed, 0),
-        ):
-            if value < least:
-                raise InputError(f"the {name} is {value}; give {least} or more")
 
 
 @dataclass(frozen=True)
@@ -131,11 +74,12 @@ class Aggregation:
         trees: Of its rules, one an action dimension, with the pairs it was grown from.
         rounds: All that were finished.
         chosen: Number of the round whose rules are the best.
-        validation_mean: Mean return by which it was chosen; too good by what luck it had. None
-            where the run was stopped before.
+        validation_mean: Mean return by which these very rules were chosen; too good by what luck
+            it had. None where the run was stopped before.
         refined: Whether its thresholds and labels were moved afterwards.
         reported: Episodes that nothing was chosen by; None where the run was stopped before.
         demonstrations: All pairs of the chosen round.
+        seeds: Which episodes served for what.
     """
 
     env_id: str
@@ -148,6 +92,12 @@ class Aggregation:
     refined: bool
     reported: Episodes | None
     demonstrations: Demonstrations
+    seeds: RunSeeds
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it was not stopped before its report."""
+        return self.reported is not None
 
 
 def aggregate(
@@ -174,8 +124,8 @@ def aggregate(
         watch: Called after every round.
 
     Returns:
-        The best rules. Stopped after a first round (by `progress`, or by Ctrl-C), what was
-        finished is given, unreported.
+        The best rules. Stopped after a first round (by `progress`, or by Ctrl-C), every part
+        that was finished counts: the choice among the rounds, the refinement as far as it went.
 
     Raises:
         InputError: If agent, expert and environment do not fit, or the expert acts at random.
@@ -191,15 +141,13 @@ def aggregate(
             run.round(number, clock)
             if watch is not None:
                 watch(run.rounds[-1])
-        best, mean = run.select(clock)
-        trees, refined, mean = run.refine(best, mean, clock)
-        reported = run.report(trees, clock)
+        run.select(clock)
+        run.refine(clock)
+        run.report(clock)
     except (CancelledError, KeyboardInterrupt):
         if not run.rounds:
             raise
-        best = int(np.argmax([found.mean_return for found in run.rounds]))
-        return run.result(best, run.trees[best], None, False, None)
-    return run.result(best, trees, mean, refined, reported)
+    return run.result()
 
 
 class _Clock:
@@ -222,20 +170,37 @@ class _Clock:
         return told
 
 
+@dataclass(frozen=True)
+class _Choice:
+    """The best so far.
+
+    Attributes:
+        index: Of its round, counted from 0.
+        trees: Of its rules.
+        mean: Of the validation episodes that these rules were chosen by; None for none.
+        refined: Whether the trees are no longer those of the round.
+    """
+
+    index: int
+    trees: tuple[PolicyTree, ...]
+    mean: float | None = None
+    refined: bool = False
+
+
 class _Run:
-    """The pairs so far, and the rounds that they came from."""
+    """The rounds so far, and what was made of them: whoever stops it loses nothing finished."""
 
     def __init__(
         self, start: Demonstrations, plan: Plan, env_id: str, agent: Agent, expert: Agent, jobs: int
     ) -> None:
         self.plan, self.env_id, self.jobs = plan, env_id, jobs
         self.agent, self.expert = agent, expert
-        self.observations = [start.observations]
-        self.actions: list[Actions] = [ask(expert, start.observations)]
-        self.episodes = [start.episodes]
-        self.steps = [np.arange(len(start)) if start.steps is None else start.steps]
+        self.answers = Answers(env_id, expert, start)
         self.rounds: list[Round] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
+        self.choice: _Choice | None = None
+        self.reported: Episodes | None = None
+        self.seeds = RunSeeds(rounds=self.seed(seeds.ROUNDS))
 
     def planned_units(self) -> int:
         plan = self.plan
@@ -251,25 +216,9 @@ class _Run:
             + plan.report
         )
 
-    def pairs(self, rounds: int) -> Demonstrations:
-        """What a round (counted from 0) learns from."""
-        kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
-
-        def column(parts: list[Any]) -> Any:
-            return np.concatenate([parts[index] for index in kept])
-
-        return answered(
-            self.env_id,
-            self.expert,
-            column(self.observations),
-            column(self.actions),
-            column(self.episodes),
-            column(self.steps),
-        )
-
     def grow(self, index: int) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
-        pairs = self.pairs(index)
+        pairs = self.answers.pairs(index)
         label_scores = scores(self.expert, pairs.observations)
         ways: dict[str, Any] = {}
         if label_scores is not None:
@@ -310,14 +259,14 @@ class _Run:
         )
 
     def seed(self, first: int) -> int:
-        return first + self.plan.seed * _SEEDS_A_RUN
+        return seeds.of_run(first, self.plan.seed)
 
     def round(self, number: int, clock: _Clock) -> None:
         trees = self.grow(number - 1)
         rules = self.rules(trees)
         found = self.shielded(
             rules,
-            self.seed(ROUND_SEED) + (number - 1) * _SEEDS_A_ROUND,
+            self.seeds.rounds + (number - 1) * seeds.SEEDS_A_ROUND,
             self.plan.episodes,
             clock,
             keep_steps=True,
@@ -335,6 +284,7 @@ class _Run:
             axis=1,
         )
         otherwise = covered & (said != labels)
+        self.trees.append(trees)
         self.rounds.append(
             Round(
                 number=number,
@@ -346,44 +296,45 @@ class _Run:
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
             )
         )
-        self.trees.append(trees)
-        rows = np.arange(len(table))
-        if len(rows) > _PAIRS_A_ROUND:
-            generator = np.random.default_rng(self.seed(number))
-            rows = np.sort(generator.choice(rows, _PAIRS_A_ROUND, replace=False))
-        self.observations.append(table.observation[rows])
-        self.actions.append(wanted[rows])
-        self.episodes.append(self.episodes[-1][-1] + 1 + table.episode[rows])
-        self.steps.append(table.step[rows])
+        self.answers.add(table, wanted, seed=self.seed(number))
 
-    def select(self, clock: _Clock) -> tuple[int, float]:
-        """The best round (counted from 0), and its mean return over the validation episodes."""
-        candidates = [self.rules(trees) for trees in self.trees]
-        return self.best_of(candidates, VALIDATION_SEED, clock)
+    def select(self, clock: _Clock) -> None:
+        """Choose the best round."""
+        first = self.seed(seeds.VALIDATION)
+        best, mean = self.best_of([self.rules(trees) for trees in self.trees], first, clock)
+        self.choice = _Choice(best, self.trees[best], mean)
+        self.seeds = self.seeds._replace(validation=first)
 
     def best_of(self, candidates: list[RuleSet], seed: int, clock: _Clock) -> tuple[int, float]:
+        """The best candidate, and its mean return over all episodes that it was given."""
         found = successive_halving(
             len(candidates),
             lambda index, first, count: (
                 self.shielded(candidates[index], first, count, clock).returns
             ),
-            seed=self.seed(seed),
+            seed=seed,
             first=_FIRST_VALIDATION,
             most=self.plan.validation,
         )
         return found.best, float(found.means[found.best])
 
-    def refine(
-        self, best: int, mean: float, clock: _Clock
-    ) -> tuple[tuple[PolicyTree, ...], bool, float]:
+    def refine(self, clock: _Clock) -> None:
         """Move thresholds and labels of the best rules, and keep what is better."""
-        trees = self.trees[best]
+        start = self.choice
+        assert start is not None
         if not self.plan.generations:
-            return trees, False, mean
+            return
+        first = generation_seed(self.plan.seed, 1)
+
+        def better(trees: tuple[PolicyTree, ...]) -> None:
+            # By the episodes of the search only: for who stops before the second validation.
+            self.choice = _Choice(start.index, trees, refined=True)
+            self.seeds = self.seeds._replace(refinement=first)
+
         marks = refine(
             self.env_id,
-            trees,
-            self.pairs(best),
+            start.trees,
+            self.answers.pairs(start.index),
             agent=self.agent,
             projection=self.plan.projection,
             generations=self.plan.generations,
@@ -391,34 +342,39 @@ class _Run:
             seed=self.plan.seed,
             jobs=self.jobs,
             progress=clock.of(),
+            better=better,
         )
-        candidates = [trees, *marks]
+        self.seeds = self.seeds._replace(refinement=first)
+        candidates = [start.trees, *marks]
         # On other episodes than those of the rounds: the first candidate was chosen by them.
-        found, mean = self.best_of(
-            [self.rules(one) for one in candidates], VALIDATION_SEED + _SEEDS_A_RUN // 2, clock
-        )
-        return candidates[found], found > 0, mean
+        second = self.seed(seeds.SECOND_VALIDATION)
+        found, mean = self.best_of([self.rules(one) for one in candidates], second, clock)
+        self.choice = _Choice(start.index, candidates[found], mean, refined=found > 0)
+        self.seeds = self.seeds._replace(second_validation=second)
 
-    def report(self, trees: tuple[PolicyTree, ...], clock: _Clock) -> Episodes:
-        return self.shielded(self.rules(trees), self.seed(REPORT_SEED), self.plan.report, clock)
+    def report(self, clock: _Clock) -> None:
+        """Episodes that nothing was chosen by."""
+        assert self.choice is not None
+        first = self.seed(seeds.REPORT)
+        rules = self.rules(self.choice.trees)
+        self.reported = self.shielded(rules, first, self.plan.report, clock)
+        self.seeds = self.seeds._replace(report=first)
 
-    def result(
-        self,
-        best: int,
-        trees: tuple[PolicyTree, ...],
-        mean: float | None,
-        refined: bool,
-        reported: Episodes | None,
-    ) -> Aggregation:
+    def result(self) -> Aggregation:
+        choice = self.choice
+        if choice is None:  # stopped early: the episodes of the rounds are all there is
+            best = int(np.argmax([found.mean_return for found in self.rounds]))
+            choice = _Choice(best, self.trees[best])
         return Aggregation(
             env_id=self.env_id,
             plan=self.plan,
-            rule_set=self.rules(trees),
-            trees=trees,
+            rule_set=self.rules(choice.trees),
+            trees=choice.trees,
             rounds=tuple(self.rounds),
-            chosen=best + 1,
-            validation_mean=mean,
-            refined=refined,
-            reported=reported,
-            demonstrations=self.pairs(best),
+            chosen=choice.index + 1,
+            validation_mean=choice.mean,
+            refined=choice.refined,
+            reported=self.reported,
+            demonstrations=self.answers.pairs(choice.index),
+            seeds=self.seeds,
         )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sarl_core.rollouts.aggregation import REPORT_SEED, VALIDATION_SEED, Aggregation, Round
-from sarl_core.rollouts.files import write_card
+from sarl_core.errors import WorkError
+from sarl_core.files import whole_file
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.rollouts.aggregation import Aggregation, Round
 from sarl_core.rollouts.statistics import summarise
 
 
@@ -19,25 +22,76 @@ def card_path(rules: Path) -> Path:
     return rules.with_suffix(".card.json")
 
 
-def save_aggregation(found: Aggregation, out: Path, *, command: str) -> dict[str, Any]:
-    """Write the rule file and its card.
+def stopped_path(out: Path) -> Path:
+    """Where to write what a stopped run has found, so that nothing finished is lost.
+
+    Args:
+        out: Where it would have been written at its end.
+
+    Returns:
+        `out` if there is no such file and no card of one; else `name.stopped.json` beside it.
+    """
+    if not out.exists() and not card_path(out).exists():
+        return out
+    return out.with_name(f"{out.stem}.stopped{out.suffix}")
+
+
+class Saved(NamedTuple):
+    """What was written.
+
+    Attributes:
+        rules: The rule file.
+        card: What its card says.
+    """
+
+    rules: Path
+    card: dict[str, Any]
+
+
+def save_aggregation(found: Aggregation, out: Path, *, command: str) -> Saved:
+    """Write the rule file and its card: both, or neither.
 
     Args:
         found: To be kept.
-        out: The rule file, `.json`.
+        out: The rule file, `.json`. That of a stopped run takes no other's place: see
+            `stopped_path`.
         command: That makes it again; stands in the card.
 
     Returns:
-        The card.
+        Where the rules are, and the card.
 
     Raises:
         InputError: If the folder does not exist.
         WorkError: If it cannot be written to.
     """
+    if not found.is_finished:
+        out = stopped_path(out)
+    for path in (out, card_path(out)):
+        if path.is_dir():
+            raise WorkError(f"{path} is a folder and cannot be written; choose another name")
     card = aggregation_card(found, command=command)
-    found.rule_set.save(out)
-    write_card(card_path(out), card)
-    return card
+    # Both are written before the first takes its place.
+    with whole_file(out) as rules:
+        rules.write_text(rules_to_json(found.rule_set), encoding="utf-8")
+        with whole_file(card_path(out)) as beside:
+            beside.write_text(json.dumps(card, indent=2) + "\n", encoding="utf-8")
+    return Saved(out, card)
+
+
+def chosen_by(found: Aggregation) -> str:
+    """What the rules were chosen by, as it stands after "chosen by".
+
+    Args:
+        found: Finished or stopped.
+    """
+    up_to = f"the mean of up to {found.plan.validation} episodes"
+    if found.seeds.validation is None:
+        return "the episodes of their round only"
+    if found.seeds.second_validation is not None:
+        return f"{up_to} of a second validation"
+    if found.refined:
+        return f"{up_to} of validation, then by those of a refinement that was not finished"
+    return f"{up_to} of validation"
 
 
 def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
@@ -48,7 +102,8 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
         command: That makes it again.
 
     Returns:
-        `reported` is null where the run was stopped before.
+        `seeds` has the first seed of every part of the run. `validation_mean` and what is said of
+        a part are null where the run was stopped before.
     """
     import gymnasium
     import sklearn
@@ -72,12 +127,15 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
         "rounds": [_round(one) for one in found.rounds],
         "chosen_round": found.chosen,
         "refined": found.refined,
-        "chosen_by": f"mean of up to {plan.validation} episodes, seeds {VALIDATION_SEED} and up",
+        "chosen_by": chosen_by(found),
         "validation_mean": None
         if found.validation_mean is None
         else round(found.validation_mean, 2),
-        "reported_on": f"{plan.report} episodes, seeds {REPORT_SEED} and up, used for nothing else",
+        "reported_on": f"{plan.report} episodes used for nothing else"
+        if found.is_finished
+        else None,
         "reported": _reported(found),
+        "seeds": found.seeds._asdict(),
         "demonstrations": {
             "digest": rules.source.digest,
             "steps": rules.source.steps,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.mining.rules import RuleSet
-from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.progress import Progress
 from sarl_core.shielding.projection import Projection
@@ -18,6 +18,8 @@ from sarl_core.shielding.shield import Shield
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_PIECE = 8  # episodes after which a search can be stopped with what it has found
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +115,60 @@ def find_gaps(
         met=len(table),
         episodes=episodes,
     )
+
+
+def gaps_so_far(
+    env_id: str,
+    rules: RuleSet,
+    *,
+    agent: str | Agent = "novice",
+    episodes: int = 20,
+    seed: int = 0,
+    projection: Projection = "centre",
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Iterator[Gaps]:
+    """Do what `find_gaps` does, a few episodes at a time.
+
+    Args:
+        env_id: As there, like all others.
+        rules: The shield's.
+        agent: Who is shielded.
+        episodes: How many.
+        seed: Of the first.
+        projection: How the shield replaces a continuous action.
+        jobs: Processes.
+        progress: Called with (episodes done, in all); returning False stops.
+
+    Yields:
+        Everything that has been found so far; the last is what `find_gaps` gives.
+
+    Raises:
+        InputError: If agent, rules and environment do not fit.
+        CancelledError: If `progress` returned False.
+    """
+    actor = make_agent(agent, env_id, seed=seed)  # once: an untrained one is of the first seed
+    size = max(_PIECE, jobs)
+    pieces: list[Gaps] = []
+    for start in range(0, episodes, size):
+        count = min(size, episodes - start)
+
+        def told(done: int, _: int, start: int = start) -> bool | None:
+            return progress(start + done, episodes) if progress is not None else None
+
+        pieces.append(
+            find_gaps(
+                env_id,
+                rules,
+                agent=actor,
+                episodes=count,
+                seed=seed + start,
+                projection=projection,
+                jobs=min(jobs, count),
+                progress=told,
+            )
+        )
+        yield join_gaps(pieces)
 
 
 def join_gaps(pieces: Sequence[Gaps]) -> Gaps:

@@ -12,7 +12,13 @@ from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import Agent, PolicyAgent
 from sarl_core.rollouts.spaces import Actions
+from sarl_core.rollouts.steps import StepTable
 
+# More states of one round are too alike to be worth their time.
+_PAIRS_A_ROUND = 25_000
+# Rules learn from what was shown at first and from where the latest rules led: what earlier ones
+# got into, the present ones may never meet.
+_ROUNDS_KEPT = 12
 # A label with less than 2 % is one the expert does not want; how much less says nothing.
 _LEAST_LOG_PROBABILITY = -4.0
 
@@ -113,3 +119,64 @@ def answered(
         agent=expert.name,
         **bounds,
     )
+
+
+class Answers:
+    """What an expert said, at first and round by round."""
+
+    def __init__(self, env_id: str, expert: Agent, start: Demonstrations) -> None:
+        """Ask about the states that were demonstrated.
+
+        Args:
+            env_id: The environment.
+            expert: Who is asked.
+            start: What was shown so far; the expert answers anew.
+
+        Raises:
+            InputError: If the expert does not always do the same in the same state.
+        """
+        self._env_id, self._expert = env_id, expert
+        self._observations = [start.observations]
+        self._actions: list[Actions] = [ask(expert, start.observations)]
+        self._episodes = [start.episodes]
+        self._steps = [np.arange(len(start)) if start.steps is None else start.steps]
+
+    def add(self, table: StepTable, actions: Actions, *, seed: int) -> None:
+        """Take up the states of one more round.
+
+        Args:
+            table: The N steps of its episodes.
+            actions: What the expert says about them, (N, m).
+            seed: For choosing some of them, where they are too many.
+        """
+        rows = np.arange(len(table))
+        if len(rows) > _PAIRS_A_ROUND:
+            generator = np.random.default_rng(seed)
+            rows = np.sort(generator.choice(rows, _PAIRS_A_ROUND, replace=False))
+        self._observations.append(table.observation[rows])
+        self._actions.append(actions[rows])
+        self._episodes.append(self._episodes[-1][-1] + 1 + table.episode[rows])
+        self._steps.append(table.step[rows])
+
+    def pairs(self, rounds: int) -> Demonstrations:
+        """What is learned from after so many rounds.
+
+        Args:
+            rounds: How many have been taken up by then.
+
+        Returns:
+            The pairs of the start and of the latest rounds.
+        """
+        kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
+
+        def column(parts: list[Any]) -> Any:
+            return np.concatenate([parts[index] for index in kept])
+
+        return answered(
+            self._env_id,
+            self._expert,
+            column(self._observations),
+            column(self._actions),
+            column(self._episodes),
+            column(self._steps),
+        )

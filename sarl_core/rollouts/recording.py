@@ -16,6 +16,7 @@ from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.files import write_card
 from sarl_core.rollouts.player import Outcome, play
 from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.seeds import DEMONSTRATED
 from sarl_core.rollouts.steps import concatenate
 
 SHIPPED = {
@@ -145,7 +146,7 @@ def ship_demonstrations(
         )
     path = folder / f"{SHIPPED[env_id]}.parquet"
     demos = record(
-        env_id, "expert", steps=SHIPPED_STEPS, seed=0, stochastic=True, progress=progress
+        env_id, "expert", steps=SHIPPED_STEPS, seed=DEMONSTRATED, stochastic=True, progress=progress
     )
     save_demonstrations(demos, path)
     summary, finished = demos.summary(), demos.episode_finished
@@ -153,7 +154,7 @@ def ship_demonstrations(
         "what": f"{SHIPPED_STEPS:,} steps of the shipped expert in {env_id}, actions sampled",
         "from": f"data/experts/{SHIPPED[env_id]}.npz",
         "command": f"python -m sarl_core record --env {env_id} --agent expert --stochastic "
-        f"--steps {SHIPPED_STEPS} --seed 0 --out data/demonstrations/{path.name}",
+        f"--steps {SHIPPED_STEPS} --seed {DEMONSTRATED} --out data/demonstrations/{path.name}",
         "env_id": env_id,
         "steps": summary.steps,
         "episodes": summary.episodes,

@@ -8,7 +8,7 @@ their order stay.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,13 +20,12 @@ from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.seeds import REFINEMENT, of_run
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
 PAIRS = 12  # of opposite directions a generation
 EPISODES = 16  # for each direction, the same for all of a generation
-_SEED = 40_000_000
-_SEEDS_A_RUN = 1_000_000
 
 _SHAKE = 0.15  # in units of half the spread of a feature where it is asked about
 _STEP = 0.15  # of a generation, in units of the shake
@@ -90,6 +89,7 @@ def refine(
     seed: int = 0,
     jobs: int = 1,
     progress: Progress | None = None,
+    better: Callable[[tuple[PolicyTree, ...]], None] | None = None,
 ) -> list[tuple[PolicyTree, ...]]:
     """Search around trees for better ones of the same shape.
 
@@ -104,6 +104,9 @@ def refine(
         seed: Another one gives another way.
         jobs: Processes; changes the speed, never the result.
         progress: Called with (episodes done, in all); returning False stops.
+        better: Called with the trees of a point on the way whenever the episodes around it
+            brought more than those around any point before, the start included; so that
+            something is there when the way is not gone to its end.
 
     Returns:
         The trees at `marks` points, the last at the end of the way. Which is best is not known:
@@ -122,10 +125,18 @@ def refine(
     found = []
     stops = {round(generations * (number + 1) / marks) for number in range(marks)}
     total = generations * generation_cost()
+    most = -np.inf
+
+    def trees_at(point: NDArray[np.float64]) -> tuple[PolicyTree, ...]:
+        return tuple(
+            count_tree(structure, pairs, index, divider=trees[0].divider)
+            for index, structure in enumerate(parameters.structures(point))
+        )
+
     with Parallel(n_jobs=jobs) as work:
         for number in range(1, generations + 1):
             directions = generator.normal(size=(PAIRS, len(here)))
-            first = _SEED + seed * _SEEDS_A_RUN + number * EPISODES
+            first = generation_seed(seed, number)
             shaken = [
                 parameters.structures(here + side * _SHAKE * direction)
                 for direction in directions
@@ -137,6 +148,10 @@ def refine(
                 )
                 for structures in shaken
             )
+            if float(np.mean(means)) > most:
+                most = float(np.mean(means))
+                if better is not None and number > 1:
+                    better(trees_at(here))
             ranks = _ranks(np.array(means))
             slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
             momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
@@ -146,18 +161,23 @@ def refine(
             here = here + _STEP * _SHAKE * steady / scale
             report(progress, number * generation_cost(), total)
             if number in stops:
-                found.append(
-                    tuple(
-                        count_tree(structure, pairs, index, divider=trees[0].divider)
-                        for index, structure in enumerate(parameters.structures(here))
-                    )
-                )
+                found.append(trees_at(here))
     return found
 
 
 def generation_cost() -> int:
     """Episodes of one generation."""
     return 2 * PAIRS * EPISODES
+
+
+def generation_seed(seed: int, number: int) -> int:
+    """First seed of the episodes of one generation.
+
+    Args:
+        seed: Of the run.
+        number: Of the generation, counted from 1.
+    """
+    return of_run(REFINEMENT, seed) + number * EPISODES
 
 
 def pairs_of(pairs: Demonstrations, most: int) -> Demonstrations:

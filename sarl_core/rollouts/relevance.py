@@ -20,6 +20,7 @@ from sarl_core.rollouts.agents import PolicyAgent
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.recording import record
+from sarl_core.rollouts.seeds import RELEVANCE
 from sarl_core.shielding.shield import Shield
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 PAPER_LEARNING = 500  # steps between two tests
 PAPER_TEST = 20_000  # steps of a test
 
-_FIRST_TEST = 50_000_000  # seeds of test episodes; learners are seeded from 0
 _BETWEEN_LEARNERS = 1_000_000  # a test has fewer episodes than this
 
 # PPO's own defaults, but for what lets it learn CartPole in some dozen updates. A learning phase is
@@ -252,7 +252,7 @@ def _test(
 
     first = np.array(describe_environment(env_id).label_first, dtype=np.int64)
     agent = PolicyAgent("learner", export_policy(learner, env_id=env_id), True, first)
-    shown = record(env_id, agent, steps=steps, seed=_FIRST_TEST + _BETWEEN_LEARNERS * seed)
+    shown = record(env_id, agent, steps=steps, seed=RELEVANCE + _BETWEEN_LEARNERS * seed)
     applied, broken = [], []
     for shield in shields:
         decision = shield.decide_batch(shown.observations, shown.actions)

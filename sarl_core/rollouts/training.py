@@ -22,13 +22,11 @@ from sarl_core.rollouts.agents import PolicyAgent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.files import write_card
 from sarl_core.rollouts.policies import MlpPolicy, Normalisation
+from sarl_core.rollouts.seeds import EXPERT_CHOICE, EXPERT_REPORT
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.vec_env import VecEnv
-
-_VALIDATION_SEED = 5_000_000
-_REPORT_SEED = 9_000_000
 
 
 @dataclass(frozen=True)
@@ -167,8 +165,8 @@ def train_expert(
     env.close()
     _, policy, best_steps = best
     policy.save(out)
-    returns = _returns(env_id, policy, episodes=100, seed=_REPORT_SEED)
-    sampled = _returns(env_id, policy, episodes=100, seed=_REPORT_SEED, stochastic=True)
+    returns = _returns(env_id, policy, episodes=100, seed=EXPERT_REPORT)
+    sampled = _returns(env_id, policy, episodes=100, seed=EXPERT_REPORT, stochastic=True)
     card = _card(
         env_id, recipe, seed, total, best_steps, returns, sampled, time.monotonic() - started, out
     )
@@ -261,7 +259,7 @@ def _keep_best(
 
         def validate(self) -> None:
             policy = export_policy(self.model, env_id=env_id)
-            returns = _returns(env_id, policy, episodes=50, seed=_VALIDATION_SEED)
+            returns = _returns(env_id, policy, episodes=50, seed=EXPERT_CHOICE)
             score = float(np.mean(returns))
             if self.best is None or score >= self.best[0]:
                 self.best = (score, policy, self.num_timesteps)
@@ -318,12 +316,12 @@ def _card(
         "seed": seed,
         "steps": steps,
         "kept_after_steps": best_steps,
-        "kept_by": f"mean of 50 episodes, seeds {_VALIDATION_SEED} and up",
+        "kept_by": f"mean of 50 episodes, seeds {EXPERT_CHOICE} and up",
         "n_envs": recipe.n_envs,
         "normalised": recipe.normalise,
         "gamma": recipe.gamma,
         "parameters": dict(recipe.parameters),
-        "report_seeds": f"{_REPORT_SEED} and up",
+        "report_seeds": f"{EXPERT_REPORT} and up",
         "returns_deterministic": summary(returns),
         "returns_sampled": summary(sampled),
         "versions": {
