@@ -16,6 +16,7 @@ from sarl_core.commandline.difference_commands import diff
 from sarl_core.commandline.improvement_commands import aggregate
 from sarl_core.commandline.learning_commands import learn
 from sarl_core.commandline.paper_commands import reproduce
+from sarl_core.commandline.report_commands import report
 from sarl_core.commandline.rollout_commands import evaluate, render, train_expert
 from sarl_core.commandline.rule_commands import landscape, mine
 
@@ -36,6 +37,7 @@ for command in (
     diff,
     evaluate,
     render,
+    report,
     aggregate,
     learn,
     train_expert,

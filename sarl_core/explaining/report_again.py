@@ -1,0 +1,141 @@
+"""The part of a report that lets others make it again: fingerprints, versions, seeds, commands."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shlex
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.language import counted, threshold_text
+from sarl_core.explaining.report_counts import Tally
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
+
+_PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")
+_PROGRAM = "python -m sarl_core"
+
+
+def digest_of(rule_set: RuleSet) -> str:
+    """Fingerprint of rules (blake2b, 32 hex digits), whatever file they came in.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        That of the rule file this version would write.
+    """
+    return hashlib.blake2b(rules_to_json(rule_set).encode(), digest_size=16).hexdigest()
+
+
+def facts(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    *,
+    rules_name: str,
+    demonstrations_name: str,
+    seeds: tuple[int, int] | None,
+) -> tuple[tuple[str, str], ...]:
+    """What tells a report from any other.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        rules_name: Of the rule file, "" where there is none.
+        demonstrations_name: Of their file, likewise.
+        seeds: First and last of the episodes that were played; None where none were.
+
+    Returns:
+        Names and values.
+    """
+    source = rule_set.source
+    found = [
+        ("Demonstrations", _named(demonstrations.digest, demonstrations_name)),
+        ("Rules", _named(digest_of(rule_set), rules_name)),
+    ]
+    if not tally.same:
+        size = f"{source.steps:,} steps in {counted(source.episodes, 'episode')}"
+        found.append(("Rules were made from", _named(source.digest, size)))
+    if demonstrations.seed is not None:
+        found.append(("Seed of the demonstrations", str(demonstrations.seed)))
+    if seeds is not None:
+        found.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
+    found.append(("Python", platform.python_version()))
+    return (*found, *((package, _version(package)) for package in _PACKAGES))
+
+
+def _named(digest: str, name: str) -> str:
+    return f"{digest} ({name})" if name else digest
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def command_line(
+    command: str, argument: str | Path, options: Mapping[str, object | Sequence[object] | None]
+) -> str:
+    """A command as one types it.
+
+    Args:
+        command: As "report".
+        argument: Its file.
+        options: Name to value; several in a list or tuple, None for none.
+
+    Returns:
+        One line, with whatever a shell would take for more than a name in quotes.
+    """
+    words = [command, str(argument)]
+    for name, value in options.items():
+        values = value if isinstance(value, (list, tuple)) else [value]
+        for one in values:
+            if one is not None:
+                words += [name, str(one)]
+    return f"{_PROGRAM} {shlex.join(words)}"
+
+
+def mining_command(
+    rule_set: RuleSet, rules: str | Path, demonstrations: str | Path, given: Demonstrations
+) -> str | None:
+    """How rules were mined, where that is known for sure.
+
+    Args:
+        rule_set: The rules.
+        rules: Their file.
+        demonstrations: The file of the demonstrations.
+        given: The demonstrations.
+
+    Returns:
+        One line; None for rules from other data, of a budget, tried on episodes kept aside, or
+        edited by hand.
+    """
+    plain = all(
+        rule.origin == "mined" and rule.enabled and not rule.pinned and rule.held_out is None
+        for rule in rule_set.rules
+    )
+    if rule_set.cut != "thresholds" or rule_set.source.digest != given.digest or not plain:
+        return None
+    limits = rule_set.thresholds
+    named = next((name for name, pair in NAMED_SETTINGS.items() if pair == limits), None)
+    continuous = any(action.is_interval for action in rule_set.actions)
+    return command_line(
+        "mine",
+        demonstrations,
+        {
+            "--setting": named,
+            "--support": None if named else threshold_text(limits.support),
+            "--confidence": None if named else threshold_text(limits.confidence),
+            "--lift": threshold_text(limits.lift) if limits.lift else None,
+            "--max-depth": limits.max_depth,
+            "--divider": rule_set.divider if continuous else None,
+            "--out": rules,
+        },
+    )

@@ -1,0 +1,301 @@
+"""The part of a report that says what a shield was worth: a comparison, read from files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sarl_core.errors import InputError
+from sarl_core.explaining.colours import LABEL_COLOURS
+from sarl_core.explaining.language import number_text, share_text
+from sarl_core.explaining.report_svg import Scale, dot_and_interval, muted
+from sarl_core.rollouts.comparison import Comparison, comparison_row
+
+_MAX_BYTES = 16 * 2**20
+_MOST_ROWS = 200
+_NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the episodes of one agent, with a shield or without, came to.
+
+    Attributes:
+        name: Of agent and shield.
+        env_id: Environment, "" where unknown.
+        seed: Of the first episode, None where unknown.
+        rules: Number of rules in force, None without a shield or where unknown.
+        episodes: How many.
+        mean: Of the returns.
+        std: Their standard deviation.
+        iqm: Mean of the middle half of the returns.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        changed: Share of steps at which the shield changed the action, None without one.
+        covered: Share of steps at which a rule applied, None without a shield.
+        crashes: Share of episodes that ended in failure, None where unknown.
+    """
+
+    name: str
+    env_id: str
+    seed: int | None
+    rules: int | None
+    episodes: int
+    mean: float
+    std: float
+    iqm: float
+    low: float
+    high: float
+    changed: float | None
+    covered: float | None
+    crashes: float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """A result as it is shown.
+
+    Attributes:
+        name: Of agent and shield.
+        picture: SVG of the typical return and its interval.
+        typical: In numbers, with the interval.
+        mean: Mean return and standard deviation.
+        rules: Their number.
+        changed: Share of steps.
+        covered: Share of steps.
+        crashes: Share of episodes.
+        episodes: How many.
+    """
+
+    name: str
+    picture: str
+    typical: str
+    interval: str
+    mean: str
+    rules: str
+    changed: str
+    covered: str
+    crashes: str
+    episodes: str
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison.
+
+    Attributes:
+        sentences: In which environment, on which seeds.
+        rows: One a result.
+        ends: The numbers at the left and right end of the picture.
+    """
+
+    sentences: tuple[str, ...]
+    rows: tuple[Row, ...]
+    ends: tuple[str, str]
+
+
+def results_of(comparison: Comparison) -> tuple[Result, ...]:
+    """A comparison as results.
+
+    Args:
+        comparison: A arms on the same seeds.
+
+    Returns:
+        A results.
+    """
+    return tuple(
+        _result(
+            comparison_row(arm, episodes) | {"environment": comparison.env_id}, "", comparison.seed
+        )
+        for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True)
+    )
+
+
+def read_results(path: Path) -> tuple[Result, ...]:
+    """Read a comparison: the CSV of the page Shield, or what `evaluate --json` printed.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its results.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{path} has over {_MAX_BYTES >> 20} MB, more than any comparison")
+        text = path.read_bytes().decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise InputError(
+            f"the comparison {path} cannot be read ({reason}); give the CSV file of the page "
+            "Shield, or a JSON document of `evaluate --json`"
+        ) from error
+    return results_from_text(text, path.name)
+
+
+def results_from_text(text: str, name: str) -> tuple[Result, ...]:
+    """The same from a file's content.
+
+    Args:
+        text: Of the file.
+        name: Of the file; tells CSV from JSON, and names the result of a JSON document.
+
+    Returns:
+        Its results.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    rows = _json_row(text, name) if name.lower().endswith(".json") else _csv_rows(text, name)
+    if not 0 < len(rows) <= _MOST_ROWS:
+        raise InputError(
+            f"the comparison {name} has {len(rows)} rows; give one with 1 to {_MOST_ROWS}"
+        )
+    return tuple(_result(row, name) for row in rows)
+
+
+def compared(results: Sequence[Result]) -> Compared | None:
+    """What a comparison came to.
+
+    Args:
+        results: Any number.
+
+    Returns:
+        The part of the report; None without results.
+    """
+    if not results:
+        return None
+    scale = Scale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
+    environments = sorted({one.env_id for one in results if one.env_id})
+    where = f" in {' and '.join(environments)}" if environments else ""
+    seeds = {one.seed for one in results if one.seed is not None}
+    since = f", from seed {seeds.pop()} on" if len(seeds) == 1 else ""
+    return Compared(
+        sentences=(
+            f"Agents were run{where}{since}. The typical return is the mean of the middle half of "
+            "the episodes, which a few odd ones do not move; the line through the dot shows where "
+            "it probably lies (95 % interval). Where two lines do not overlap, the difference is "
+            "hardly chance.",
+        ),
+        rows=tuple(_row(one, scale) for one in results),
+        ends=(number_text(scale.low), number_text(scale.high)),
+    )
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
+    try:
+        reader = csv.DictReader(io.StringIO(text), strict=True)
+        rows = [dict(row) for row in reader]
+        there = reader.fieldnames or []
+    except csv.Error as error:
+        raise InputError(
+            f"the comparison {name} is no CSV ({error}); give the file that the page Shield "
+            "downloads"
+        ) from error
+    for column in ("arm", "episodes", *_NUMBERS):
+        if column not in there:
+            raise InputError(
+                f"the comparison {name} has no column {column!r}; give the CSV file that the page "
+                "Shield downloads, or a .json document of `evaluate --json`"
+            )
+    return [{key: value or None for key, value in row.items() if key} for row in rows]
+
+
+def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"the comparison {name} is not JSON ({error}); give what `evaluate --json` printed"
+        ) from error
+    summary = document.get("summary") if isinstance(document, dict) else None
+    episodes = document.get("episodes") if isinstance(document, dict) else None
+    if not isinstance(summary, dict) or not isinstance(episodes, list) or not episodes:
+        raise InputError(
+            f"the comparison {name} has no episodes with a summary; give what `evaluate --json` "
+            "printed"
+        )
+    first = episodes[0].get("seed") if isinstance(episodes[0], dict) else None
+    # Without a shield no rule ever applies, which is what is shown of it.
+    alone = not summary.get("coverage")
+    row = {"arm": name[: -len(".json")], "episodes": len(episodes), "seed": first, **summary}
+    return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
+
+
+def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Result:
+    def number(key: str) -> float:
+        value = row.get(key)
+        try:
+            if isinstance(value, bool):
+                raise TypeError
+            found = float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            found = math.nan
+        if not math.isfinite(found):
+            shown = repr(value) if len(repr(value)) <= 40 else f"{repr(value)[:40]}..."
+            raise InputError(
+                f"{key!r} in the comparison {name} is {shown}, not a number; download it again"
+            )
+        return found
+
+    def share(key: str) -> float | None:
+        return None if row.get(key) is None else min(max(number(key), 0.0), 1.0)
+
+    def whole(key: str) -> int | None:
+        return None if row.get(key) is None else int(number(key))
+
+    mean, std, iqm, low, high = map(number, _NUMBERS)
+    if not low <= iqm <= high:
+        raise InputError(
+            f"the interval of {row['arm']!r} in the comparison {name} does not hold its value; "
+            "download it again"
+        )
+    return Result(
+        name=str(row["arm"]),
+        env_id=str(row.get("environment") or ""),
+        seed=seed if seed is not None else whole("seed"),
+        rules=whole("rules"),
+        episodes=int(number("episodes")),
+        mean=mean,
+        std=std,
+        iqm=iqm,
+        low=low,
+        high=high,
+        changed=share("intervention_rate"),
+        covered=share("coverage"),
+        crashes=share("crash_rate"),
+    )
+
+
+# --- showing -----------------------------------------------------------------------------------
+
+
+def _row(one: Result, scale: Scale) -> Row:
+    def told(value: float | None) -> str:
+        return "–" if value is None else share_text(value)
+
+    colour = muted() if one.changed is None else LABEL_COLOURS[0]
+    return Row(
+        name=one.name,
+        picture=dot_and_interval(scale, one.iqm, one.low, one.high, colour=colour, zero=True),
+        typical=number_text(one.iqm),
+        interval=f"{number_text(one.low)} to {number_text(one.high)}",
+        mean=f"{number_text(one.mean)} ± {number_text(one.std)}",
+        rules="–" if one.rules is None else f"{one.rules:,}",
+        changed=told(one.changed),
+        covered=told(one.covered),
+        crashes=told(one.crashes),
+        episodes=f"{one.episodes:,}",
+    )

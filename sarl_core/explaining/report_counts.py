@@ -1,0 +1,172 @@
+"""What a report counts: the rules on the demonstrations it is about, each state under its rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.evidence import wilson
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.shield import Shield
+
+
+class Share(NamedTuple):
+    """So many of so many.
+
+    Attributes:
+        part: How many.
+        whole: Of how many.
+    """
+
+    part: int
+    whole: int
+
+    @property
+    def value(self) -> float:
+        """0 to 1; NaN of nothing."""
+        return self.part / self.whole if self.whole else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % Wilson interval of the true share; 0 to 1 where nothing was counted."""
+        low, high = wilson(self.part, self.whole)
+        return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Rules counted on N demonstrated pairs with m action dimensions.
+
+    Attributes:
+        same: Whether the rules were mined from these very demonstrations.
+        split: Whether they were mined from some of these episodes and tried on all the others.
+        rules: Index of the rule in force or -1, (N, m) int64.
+        labels: What the expert did, (N, m) int64.
+        shares: Of each rule, in how many of its states the expert did what it says.
+    """
+
+    same: bool
+    split: bool
+    rules: NDArray[np.int64]
+    labels: NDArray[np.int64]
+    shares: tuple[Share, ...]
+
+    def covered(self, dimension: int) -> Share:
+        """In how many states a rule of a dimension applies."""
+        column = self.rules[:, dimension]
+        return Share(int((column >= 0).sum()), len(column))
+
+    def rows(self, rule: int, dimension: int) -> NDArray[np.int64]:
+        """The states of a rule, ascending."""
+        return np.flatnonzero(self.rules[:, dimension] == rule)
+
+    @property
+    def coverage(self) -> float:
+        """Share of states with a rule, averaged over action dimensions."""
+        return float((self.rules >= 0).mean())
+
+    @property
+    def followed(self) -> Share:
+        """In how many of the covered states the expert did what the rule says."""
+        return Share(sum(share.part for share in self.shares), int((self.rules >= 0).sum()))
+
+
+def check_fit(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
+    """Refuse demonstrations of other features or actions than the rules'.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: N pairs.
+
+    Raises:
+        InputError: If one differs.
+    """
+    advice = "give the demonstrations the rules were mined from"
+    asked = [feature.name for feature in rule_set.source.features]
+    there = [feature.name for feature in demonstrations.features]
+    if len(asked) != len(there):
+        raise InputError(
+            f"the rules ask about {len(asked)} features and the demonstrations have {len(there)}; "
+            f"{advice}"
+        )
+    for number, (one, other) in enumerate(zip(asked, there, strict=True), start=1):
+        if one != other:
+            raise InputError(
+                f"feature {number} is {one!r} in the rules and {other!r} in the demonstrations; "
+                f"{advice}"
+            )
+    actions = demonstrations.action_dimensions
+    if len(rule_set.actions) != len(actions):
+        raise InputError(
+            f"the rules are for {len(rule_set.actions)} action dimensions and the demonstrations "
+            f"have {len(actions)}; {advice}"
+        )
+    for rules, shown in zip(rule_set.actions, actions, strict=True):
+        if rules.is_interval != (shown.kind == "interval"):
+            kinds = ("continuous", "discrete") if rules.is_interval else ("discrete", "continuous")
+            raise InputError(
+                f"the rules are for {kinds[0]} actions and the demonstrations have {kinds[1]} "
+                f"ones; {advice}"
+            )
+        if not rules.is_interval and (rules.n_labels, rules.first) != (
+            len(shown.labels),
+            shown.first,
+        ):
+            raise InputError(
+                f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
+                f"{len(shown.labels)} in the demonstrations; {advice}"
+            )
+
+
+def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
+    """Count rules on demonstrations.
+
+    Args:
+        rule_set: The rules; those that are switched off count nothing.
+        demonstrations: N pairs of the same features and actions.
+
+    Returns:
+        The counts; a state belongs to the rule a shield would find for it.
+
+    Raises:
+        InputError: If features or actions differ.
+    """
+    check_fit(rule_set, demonstrations)
+    actions = demonstrations.action_columns
+    found = Shield(rule_set).decide_batch(demonstrations.observations, actions).rules
+    labels = np.stack(
+        [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
+    )
+    said = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
+    inside = found >= 0
+    right = inside & (said[np.maximum(found, 0)] == labels)
+    count = len(rule_set.rules)
+    samples = np.bincount(found[inside], minlength=count)
+    correct = np.bincount(found[right], minlength=count)
+    shares = tuple(map(Share, correct.tolist(), samples.tolist()))
+    return Tally(
+        same=rule_set.source.digest == demonstrations.digest,
+        split=_is_split(rule_set, demonstrations, shares),
+        rules=found,
+        labels=labels,
+        shares=shares,
+    )
+
+
+def _is_split(rule_set: RuleSet, demonstrations: Demonstrations, shares: Sequence[Share]) -> bool:
+    """Whether what was mined from and what was held out add up to the demonstrations."""
+    if not 0 < rule_set.source.episodes < demonstrations.n_episodes:
+        return False
+    tried = [
+        (rule.samples + rule.held_out.samples, rule.correct + rule.held_out.correct)
+        == (share.whole, share.part)
+        for rule, share in zip(rule_set.rules, shares, strict=True)
+        if rule.held_out is not None and rule.origin == "mined" and rule.enabled
+    ]
+    return bool(tried) and all(tried)

@@ -1,0 +1,225 @@
+"""The part of a report that says what the rules do not reach, and which of them are doubtful."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.language import counted, share_text
+from sarl_core.explaining.report_counts import Share, Tally
+from sarl_core.explaining.report_demonstrations import ActionShares, action_shares
+from sarl_core.explaining.report_svg import share_bar
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.example_frames import Examples, Played
+
+FEW_STATES = 30
+_MOST_NAMED = 24
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How far the rules of one action dimension reach.
+
+    Attributes:
+        name: Of the dimension; "" where there is only one.
+        text: As "14,012 of 15,000 demonstrated states (93 %)".
+        bar: SVG.
+        uncovered: What the expert did in the other states; None where there are none.
+    """
+
+    name: str
+    text: str
+    bar: str
+    uncovered: ActionShares | None
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Rules that deserve a second look, and why.
+
+    Attributes:
+        text: Why, and how many they are.
+        numbers: Of the rules in this report, as far as they are named.
+        more: How many are not named.
+    """
+
+    text: str
+    numbers: tuple[int, ...]
+    more: int
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What was met when somebody played the episodes of the pictures.
+
+    Attributes:
+        player: Who.
+        steps: How many steps.
+        covered: Share at which some rule applied.
+        outside: Share at which some number lay beyond all demonstrated ones.
+        far: Share at which a rule applied beyond its own states; "" where that is not known.
+    """
+
+    player: str
+    steps: str
+    covered: str
+    outside: str
+    far: str
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What the rules do not reach.
+
+    Attributes:
+        coverage: One entry an action dimension.
+        doubts: Rules that deserve a second look.
+        beyond: One entry a player; () without pictures.
+        with_boxes: Whether `Beyond.far` is known.
+    """
+
+    coverage: tuple[Coverage, ...]
+    doubts: tuple[Doubt, ...]
+    beyond: tuple[Beyond, ...]
+    with_boxes: bool
+
+
+def gaps(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    numbers: dict[int, int],
+    examples: Examples | None,
+) -> Gaps:
+    """What the rules do not reach, and which of them are doubtful.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        numbers: Of each rule in the report, by its index.
+        examples: With the episodes that were played; None without pictures.
+
+    Returns:
+        The part of the report.
+    """
+    boxed = any(rule.box is not None for rule in rule_set.rules)
+    return Gaps(
+        coverage=tuple(
+            _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
+        ),
+        doubts=_doubts(rule_set, numbers),
+        beyond=tuple(
+            _beyond(one, rule_set, demonstrations, boxed=boxed)
+            for one in (examples.played if examples is not None else ())
+        ),
+        with_boxes=boxed,
+    )
+
+
+def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
+    share = tally.covered(dimension)
+    action = rule_set.actions[dimension]
+    left = tally.labels[tally.rules[:, dimension] < 0, dimension]
+    return Coverage(
+        name=action.name if len(rule_set.actions) > 1 else "",
+        text=f"{share.part:,} of {counted(share.whole, 'demonstrated state')} "
+        f"({share_text(share.value)})",
+        bar=share_bar(share.value, label_colour(2)),
+        uncovered=action_shares(np.bincount(left, minlength=action.n_labels), action)
+        if len(left)
+        else None,
+    )
+
+
+def _doubts(rule_set: RuleSet, numbers: dict[int, int]) -> tuple[Doubt, ...]:
+    rules = [
+        (index, rule) for index, rule in enumerate(rule_set.rules) if rule.enabled and rule.samples
+    ]
+    found = []
+
+    def doubt(chosen: Sequence[int], one: str, many: str) -> None:
+        if chosen:
+            named = sorted(numbers[index] for index in chosen)
+            text = f"1 rule {one}" if len(chosen) == 1 else f"{len(chosen):,} rules {many}"
+            found.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
+
+    few = [index for index, rule in rules if rule.origin == "mined" and rule.samples < FEW_STATES]
+    doubt(
+        few,
+        f"rests on fewer than {FEW_STATES} states: it may be chance.",
+        f"rest on fewer than {FEW_STATES} states each: they may be chance.",
+    )
+    if rule_set.cut == "thresholds":
+        needed = rule_set.thresholds.confidence
+        unsure = [
+            index
+            for index, rule in rules
+            if rule.origin == "mined" and Share(rule.correct, rule.samples).interval[0] < needed
+        ]
+        wanted = share_text(needed)
+        doubt(
+            unsure,
+            f"reaches {wanted} in the states it was mined from, but so few that its true share "
+            "may lie lower.",
+            f"reach {wanted} in the states they were mined from, but in so few that their true "
+            "share may lie lower.",
+        )
+        failed = [
+            index
+            for index, rule in rules
+            if rule.held_out is not None
+            and Share(rule.held_out.correct, rule.held_out.samples).interval[1] < needed
+        ]
+        doubt(
+            failed,
+            f"does not reach {wanted} in the episodes kept aside.",
+            f"do not reach {wanted} in the episodes kept aside.",
+        )
+    else:
+        minority = [index for index, rule in rules if 2 * rule.correct < rule.samples]
+        doubt(
+            minority,
+            "says what the expert did in less than half of its states.",
+            "say what the expert did in less than half of their states.",
+        )
+    off = [index for index, rule in enumerate(rule_set.rules) if not rule.enabled]
+    doubt(off, "is switched off and does nothing.", "are switched off and do nothing.")
+    return tuple(found)
+
+
+def _beyond(
+    played: Played, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
+) -> Beyond:
+    seen, rules = played.steps.observation, played.steps.rules
+    low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
+    outside = ((seen < low) | (seen > high)).any(axis=1)
+    covered = (rules >= 0).any(axis=1)
+    return Beyond(
+        player=played.player.name,
+        steps=f"{len(seen):,}",
+        covered=share_text(float(covered.mean())),
+        outside=share_text(float(outside.mean())),
+        far=share_text(float(_far(seen, rules, rule_set).mean())) if boxed else "",
+    )
+
+
+def _far(
+    seen: NDArray[np.float32], rules: NDArray[np.int64], rule_set: RuleSet
+) -> NDArray[np.bool_]:
+    """Whether a rule in force lies beyond the states it was made from, (T,)."""
+    found = np.zeros(len(seen), dtype=np.bool_)
+    for index in np.unique(rules[rules >= 0]).tolist():
+        rule = rule_set.rules[index]
+        if rule.box is not None:
+            rows = np.flatnonzero(rules[:, rule.dimension] == index)
+            inside = (seen[rows] >= np.float32(rule.box.least)) & (
+                seen[rows] <= np.float32(rule.box.most)
+            )
+            found[rows] |= ~inside.all(axis=1)
+    return found
