@@ -14,6 +14,7 @@ from sarl_core.demonstrations.checks import find_warnings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sarl_core.commandline.evidence_answers import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.mining.rules import RuleSet
     from sarl_core.rollouts.rendering import Replay
@@ -32,6 +33,8 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[
     Returns:
         A document for JSON.
     """
+    from sarl_core.mining.contradictions import identical_contradictions
+
     finished = demonstrations.episode_finished
     returns = demonstrations.episode_returns
     return {
@@ -56,6 +59,7 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[
                 demonstrations.action_dimensions, demonstrations.action_columns.T, strict=True
             )
         ],
+        "contradictions": int(identical_contradictions(demonstrations).any(axis=1).sum()),
         "notes": list(demonstrations.notes),
         "warnings": list(find_warnings(demonstrations)),
         "digest": demonstrations.digest,
@@ -172,6 +176,12 @@ def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
                     f"{spread['max']:,.1f}",
                 )
             )
+    facts.append(
+        (
+            "contradictions",
+            f"{document['contradictions']:,} states were shown with another action too",
+        )
+    )
     return [*facts, ("digest", document["digest"])]
 
 
@@ -180,16 +190,19 @@ def _numbers(spread: dict[str, float]) -> tuple[str, str, str]:
     return least, median, largest
 
 
-def describe_rules(rule_set: RuleSet, path: Path) -> dict[str, Any]:
+def describe_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) -> dict[str, Any]:
     """What was mined, without the rules themselves.
 
     Args:
         rule_set: The rules.
         path: Their file.
+        tried: Which episodes were held out, if any were.
 
     Returns:
         A document for JSON.
     """
+    from sarl_core.commandline.evidence_answers import describe_tried
+
     thresholds = rule_set.thresholds
     return {
         "file": str(path),
@@ -210,17 +223,20 @@ def describe_rules(rule_set: RuleSet, path: Path) -> dict[str, Any]:
             action.name: len(rule_set.of_dimension(index))
             for index, action in enumerate(rule_set.actions)
         },
+        **({"held_out": describe_tried(rule_set, tried)} if tried is not None else {}),
     }
 
 
-def print_rules(rule_set: RuleSet, path: Path) -> None:
+def print_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) -> None:
     """Print what was mined, and the rules that apply most often, in words.
 
     Args:
         rule_set: The rules.
         path: Their file.
+        tried: Which episodes were held out, if any were.
     """
-    from sarl_core.explaining.language import sentence, share_text
+    from sarl_core.commandline.evidence_answers import rule_line, tried_facts
+    from sarl_core.explaining.language import share_text
 
     facts = [
         ("rules", f"{rule_set.rule_count:,}"),
@@ -231,6 +247,8 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
         facts.append(
             ("fidelity", f"{share_text(rule_set.fidelity)} of these carry the rule's action")
         )
+    if tried is not None:
+        facts += tried_facts(rule_set, tried)
     terminal.print_lines([f"Wrote {path}"])
     terminal.print_facts(facts)
     if not len(rule_set):
@@ -239,7 +257,7 @@ def print_rules(rule_set: RuleSet, path: Path) -> None:
     often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
     terminal.print_lines(["", "The rules that apply most often:"])
     terminal.print_lines(
-        f"  {number}. {sentence(rule, rule_set)}" for number, rule in enumerate(often, 1)
+        f"  {number}. {rule_line(rule, rule_set)}" for number, rule in enumerate(often, 1)
     )
 
 

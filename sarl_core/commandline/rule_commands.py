@@ -65,6 +65,30 @@ def mine(
             show_default="no limit",
         ),
     ] = None,
+    hold_out: Annotated[
+        float | None,
+        typer.Option(
+            "--hold-out",
+            metavar="SHARE",
+            show_default=False,
+            help="Hold out this share of the episodes, and try every rule on them.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Draws the episodes that are held out.")
+    ] = 0,
+    lower_bound: Annotated[
+        float | None,
+        typer.Option(
+            "--lower-bound",
+            metavar="SHARE",
+            min=0.0,
+            max=1.0,
+            show_default=False,
+            help="Keep only rules whose confidence is at least this with 95 % certainty, on what "
+            "was held out if anything was.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Mine a rule set and write it to a rule file.
@@ -77,27 +101,38 @@ def mine(
     if given not in ([True, True, False], [False, False, True]):
         raise InputError("give both --support and --confidence, or --setting instead of them")
     with terminal.working("Mining"):
+        from sarl_core.commandline.evidence_answers import Tried
+        from sarl_core.mining import holding_out
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds, mine_rules
 
         pair = (support or 0.0, confidence or 0.0)
         if setting is not None:
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
+        demonstrations = read_demonstrations(file, env)
+        tried = None
+        if hold_out is not None:
+            tried = Tried(hold_out, seed, holding_out.hold_out(demonstrations, hold_out, seed=seed))
+            demonstrations = tried.split.mined
         rule_set = mine_rules(
-            read_demonstrations(file, env),
+            demonstrations,
             supp_min=pair[0],
             conf_min=pair[1],
             lift_min=lift,
             max_depth=max_depth,
             divider=divider,
         )
+        if tried is not None:
+            rule_set = holding_out.with_held_out(rule_set, tried.split.held_out)
+        if lower_bound is not None:
+            rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
         rule_set.save(out)
     from sarl_core.commandline.answers import describe_rules, print_rules
 
     if as_json:
-        terminal.print_json(describe_rules(rule_set, out))
+        terminal.print_json(describe_rules(rule_set, out, tried))
     else:
-        print_rules(rule_set, out)
+        print_rules(rule_set, out, tried)
 
 
 def landscape(

@@ -50,7 +50,9 @@ class Contradictions:
             dimension: Of the action; None for any of them.
         """
         both = self.identical | self.near
-        return np.asarray(both.any(axis=1) if dimension is None else both[:, dimension])
+        if dimension is None:
+            return np.asarray(both.any(axis=1), dtype=np.bool_)
+        return np.asarray(both[:, dimension], dtype=np.bool_)
 
 
 class EpisodeContradictions(NamedTuple):
