@@ -29,11 +29,11 @@ def reproduce(
         ),
     ],
     figure: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             "--figure",
             metavar="N",
-            help="One only: 2 to 7, table-1, or divider.",
+            help="One only: 2 to 7, table-1, or divider; give it again for one more.",
             show_default="all",
         ),
     ] = None,
@@ -58,7 +58,8 @@ def reproduce(
         from sarl_core.reproducing.studies import STUDIES, find_study
         from sarl_core.reproducing.study import FULL, QUICK
 
-        chosen = tuple(STUDIES.values()) if figure is None else (find_study(figure),)
+        names = list(STUDIES) if not figure else [find_study(name).name for name in figure]
+        chosen = tuple(STUDIES[name] for name in STUDIES if name in names)
     done: list[str] = []
 
     def finished(_: str, entry: Entry) -> None:

@@ -42,7 +42,8 @@ def reproduce(
     """Reproduce figures of the paper.
 
     Each study's files appear when it is finished, and with them its entry in ``report.json``. What
-    an earlier run left in the folder stays where it is not done anew.
+    an earlier run left in the folder stays until its study is finished anew. Pages follow from
+    tables and entries alone, so all are written again, and those that say the same stay the same.
 
     Args:
         folder: Where the files go; made where its parent exists.
@@ -68,13 +69,8 @@ def reproduce(
                 frames[study.name] = study.measure(effort, progress)
             entry = _entry(study, frames[study.name], effort)
             entries = {**report.studies, study.name: entry}
-            # Some claims compare one figure with another, so all are worked out again.
             report = Report(
-                {
-                    name: replace(entries[name], claims=STUDIES[name].claims(frames))
-                    for name in STUDIES
-                    if name in entries
-                }
+                {name: _judged(entries[name], name, frames) for name in STUDIES if name in entries}
             )
             content = picture(study, frames[study.name], draw)
             entry = replace(
@@ -85,7 +81,7 @@ def reproduce(
                 unfinished.write_bytes(content)
             write_table(frames[study.name], folder / entry.files["table"])
             for name, one in report.studies.items():
-                if name == study.name or one.claims != entries[name].claims:
+                if name in frames:
                     _write_page(folder, STUDIES[name], frames[name], one)
             write_report(report, folder)
             finished(study.name, entry)
@@ -93,7 +89,7 @@ def reproduce(
 
 
 def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFrame], Report]:
-    """Make the folder, and read the tables there that are not done anew."""
+    """Make the folder, and read what an earlier run left there."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; give a folder")
     try:
@@ -105,19 +101,40 @@ def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFram
     if not os.access(folder, os.W_OK):
         raise InputError(f"the folder {folder} cannot be written to; choose another")
     report = read_report(folder) or Report()
-    anew = {study.name for study in studies}
-    kept = {name: entry for name, entry in report.studies.items() if name not in anew}
-    unknown = next((name for name in kept if name not in STUDIES), None)
+    unknown = next((name for name in report.studies if name not in STUDIES), None)
     if unknown is not None:
         raise InputError(
             f"the report in {folder} has a study {unknown[:40]!r} that this version does not know; "
             "choose another folder"
         )
-    frames = {
-        name: read_table(STUDIES[name], folder / entry.files["table"])
-        for name, entry in kept.items()
-    }
-    return frames, Report(kept)
+    return _read_tables(folder, report, {study.name for study in studies}), report
+
+
+def _read_tables(folder: Path, report: Report, anew: set[str]) -> dict[str, pd.DataFrame]:
+    """The tables of a report; a damaged one matters only if its study is not done anew."""
+    frames, damaged = {}, {}
+    for name, entry in report.studies.items():
+        try:
+            frames[name] = read_table(STUDIES[name], folder / entry.files["table"])
+        except InputError as error:
+            if name not in anew:
+                damaged[name] = error
+    if len(damaged) == 1:
+        raise next(iter(damaged.values()))
+    if damaged:
+        files = ", ".join(report.studies[name].files["table"] for name in damaged)
+        again = " ".join(f"--figure {name}" for name in damaged)
+        raise InputError(
+            f"in {folder}, {files} are missing or damaged; run `reproduce {again}` again"
+        )
+    return frames
+
+
+def _judged(entry: Entry, name: str, frames: Mapping[str, pd.DataFrame]) -> Entry:
+    """An entry with its claims worked out again: some compare one figure with another."""
+    if name not in frames:  # its table is damaged, and it is still to be done anew
+        return entry
+    return replace(entry, claims=STUDIES[name].claims(frames))
 
 
 def _entry(study: Study, frame: pd.DataFrame, effort: Effort) -> Entry:

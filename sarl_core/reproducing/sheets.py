@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 SCRIPT = "plotly.min.js"  # beside the pages, which share it
+# Where the script is not there, or may not run, a page shows its picture.
+_SOONEST = "python -m sarl_core reproduce --figure table-1 --out DIR"
+_LIVE = '<script>if (window.Plotly) document.documentElement.className = "live";</script>'
 
 _WIDTH = 1240  # of a picture, in points
 _INK = "#1d2730"
@@ -24,7 +27,10 @@ body { margin: 0; font: 16px/1.5 system-ui, sans-serif; color: #1d2730; backgrou
 main { max-width: 1240px; margin: 0 auto; padding: 24px; }
 h1 { font-size: 1.7rem; margin: 0 0 0.4rem; } h2 { font-size: 1.2rem; margin: 2rem 0 0.5rem; }
 p.about, footer { color: #51606c; max-width: 75ch; }
-.row { display: flex; flex-wrap: wrap; gap: 12px; }
+.row { display: none; flex-wrap: wrap; gap: 12px; }
+.live .row { display: flex; }
+.live .still { display: none; }
+.still img { max-width: 100%; }
 figure { margin: 0 0 16px; min-width: min(420px, 100%); }
 figcaption { font-weight: 600; }
 table { border-collapse: collapse; width: 100%; }
@@ -60,7 +66,7 @@ def in_rows(drawings: Sequence[Drawing]) -> list[list[Drawing]]:
 
 
 def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
-    """A study as an HTML page, which needs nothing but `SCRIPT` beside it.
+    """A study as an HTML page: with `SCRIPT` beside it interactive, without it a picture.
 
     Args:
         study: The study.
@@ -77,8 +83,8 @@ def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
             figures.append('<div class="row">')
             figures += [
                 f'<figure style="flex: {one.share:g} 1 0"><figcaption>{escape(one.title)}'
-                f"</figcaption>{_html(one.figure)}</figure>"
-                for one in row
+                f"</figcaption>{_html(one.figure, f'{study.slug}_{number}')}</figure>"
+                for number, one in enumerate(row, len(figures))
             ]
             figures.append("</div>")
     claims = [
@@ -99,21 +105,34 @@ def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'<title>{title}</title><script src="{SCRIPT}"></script><style>{_STYLE}</style></head>'
+        f'<title>{title}</title><script src="{SCRIPT}"></script>{_LIVE}<style>{_STYLE}</style>'
+        "</head>"
         f'<body><main><h1>{title}</h1><p class="about">{escape(study.about)}</p>{quick}'
-        f"{''.join(figures)}{table}<footer><p>Made on {escape(entry.made)} by "
-        f"<code>{escape(entry.command)}</code>, with {escape(versions)}. Every value is in "
+        f"{_still(study, entry)}{''.join(figures)}{table}"
+        f"<footer><p>Made on {escape(entry.made)} by <code>{escape(entry.command)}</code>, with "
+        f"{escape(versions)}. Every value is in "
         f'<a href="{escape(entry.files["table"])}">{escape(entry.files["table"])}</a>, and the '
         'seeds in <a href="report.json">report.json</a>.</p></footer></main></body></html>\n'
     )
 
 
-def _html(figure: go.Figure) -> str:
+def _still(study: Study, entry: Entry) -> str:
+    return (
+        f'<div class="still"><img loading="lazy" src="{escape(entry.files["picture"])}" '
+        f'alt="{escape(f"{study.place}. {study.title}")}">'
+        f'<p class="about">This is a picture, because {SCRIPT} is not beside this page, or no '
+        "code may run in it. Every run of <code>reproduce</code> into this folder brings the "
+        f"interactive figures back, soonest <code>{escape(_SOONEST)}</code>.</p></div>"
+    )
+
+
+def _html(figure: go.Figure, name: str) -> str:
     figure.update_layout(template="plotly_white", font={"color": _INK})
     html: str = figure.to_html(
         full_html=False,
         include_plotlyjs=False,
         default_width="100%",
+        div_id=name,  # else a new one at random, and every page would change every time
         config={"displaylogo": False, "responsive": True},
     )
     return html

@@ -62,6 +62,26 @@ def test_without_a_browser_it_is_code_1_before_any_work(capsys, tmp_path, monkey
 
 
 @pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((), list(STUDIES)),
+        (("--figure", "5"), ["5"]),
+        (("--figure", "divider", "--figure", "Figure 2", "--figure", "2"), ["2", "divider"]),
+    ],
+)
+def test_some_figures_or_all_in_the_order_of_the_paper(arguments, expected, monkeypatch):
+    chosen = []
+
+    def noted(folder, studies, **_):
+        chosen.extend(study.name for study in studies)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sarl_core.reproducing.run.reproduce", noted)
+    assert main(["reproduce", "--out", "paper", *arguments]) == 130
+    assert chosen == expected
+
+
+@pytest.mark.parametrize(
     ("done", "words"),
     [
         ([], "stopped by Ctrl-C; no figure was finished"),
@@ -120,4 +140,5 @@ def test_the_whole_paper_quickly(capsys, tmp_path):
     after = {path.name: path.read_bytes() for path in folder.iterdir()}
     changed = {name for name in after if after[name] != before[name]}
     assert "figure_5.csv" not in changed
+    # Figure 6 compares its falls with those of Figure 5, and these are the same as before.
     assert changed <= {"report.json", "figure_5.html", "figure_5.png"}

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -120,6 +121,21 @@ def test_a_page_shares_the_script_and_shows_text_as_text(
     assert "plotly.js v" in (tmp_path / SCRIPT).read_text()[:200]
 
 
+def test_a_page_without_the_script_has_its_picture_and_says_how_to_bring_it_back(
+    tmp_path: Path, toys: dict[str, Study]
+) -> None:
+    reproduce(tmp_path, (toys["2"],))
+    page = (tmp_path / "figure_2.html").read_text()
+    (still,) = re.findall(r'<div class="still">.*?</div>', page)
+    assert 'src="figure_2.png"' in still
+    assert 'alt="Figure 2. A toy"' in still
+    assert f"{SCRIPT} is not beside this page" in still
+    assert "python -m sarl_core reproduce --figure table-1 --out DIR" in still
+    # Only where Plotly is there are figures shown in its place.
+    assert ".live .still { display: none; }" in page
+    assert page.index(f'<script src="{SCRIPT}">') < page.index('className = "live"')
+
+
 def test_one_figure_at_a_time_ends_at_the_same(tmp_path: Path, toys: dict[str, Study]) -> None:
     reproduce(tmp_path, (toys["3"],))
     assert content(tmp_path)["studies"]["3"]["claims"][0]["ours"] == "5"
@@ -145,13 +161,76 @@ def test_what_is_finished_stays_when_the_rest_is_called_off(
     assert list(content(tmp_path)["studies"]) == ["2", "3"]
 
 
-def test_the_same_again_leaves_the_same_tables(
+def test_what_an_earlier_run_left_stays_until_it_is_made_anew(
     tmp_path: Path, toys: dict[str, Study], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reproduce(tmp_path, tuple(toys.values()))
-    before = (tmp_path / "figure_3.csv").read_bytes()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def until(wanted: str) -> Any:
+        return lambda study: nullcontext(lambda done, total: study.name in wanted)
+
+    # Called off at once: as if nothing had been asked for.
+    with pytest.raises(CancelledError):
+        reproduce(tmp_path, tuple(toys.values()), watch=until(""))
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    # Called off half way: the first is new, and the second as it was, but for what it compares.
+    changed = toys | {"2": toy("2", 3.0), "3": toy("3", 7.0)}
+    monkeypatch.setattr(run, "STUDIES", changed)
+    with pytest.raises(CancelledError):
+        reproduce(tmp_path, tuple(changed.values()), watch=until("2"))
+    studies = content(tmp_path)["studies"]
+    assert {name: one["numbers"]["sum"] for name, one in studies.items()} == {"2": 9.0, "3": 15.0}
+    assert studies["2"]["claims"][0]["ours"] == "3 beside 5"
+    assert studies["3"]["claims"][0]["ours"] == "5 beside 3"
+    assert (tmp_path / "figure_3.csv").read_bytes() == before["figure_3.csv"]
+    assert names(tmp_path) == ALL_FILES
+
+
+def test_a_damaged_table_that_is_made_anew_keeps_its_entry_until_then(
+    tmp_path: Path, toys: dict[str, Study]
+) -> None:
     reproduce(tmp_path, tuple(toys.values()))
-    assert (tmp_path / "figure_3.csv").read_bytes() == before
+    old = content(tmp_path)["studies"]["3"]
+    (tmp_path / "figure_3.csv").write_text("x\n1\n")
+    with pytest.raises(CancelledError):
+        reproduce(
+            tmp_path,
+            tuple(toys.values()),
+            watch=lambda study: nullcontext(lambda done, total: study.name == "2"),
+        )
+    studies = content(tmp_path)["studies"]
+    assert studies["3"] == old
+    assert studies["2"]["claims"][0]["ours"] == "1"  # there is nothing to compare it with
+    reproduce(tmp_path, (toys["3"],))
+    assert content(tmp_path)["studies"]["2"]["claims"][0]["ours"] == "1 beside 5"
+
+
+def test_several_damaged_tables_are_made_anew_by_the_command_that_is_named(
+    tmp_path: Path, toys: dict[str, Study], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    three = toys | {"4": toy("4")}
+    monkeypatch.setattr(run, "STUDIES", three)
+    reproduce(tmp_path, tuple(three.values()))
+    for name in "34":
+        (tmp_path / f"figure_{name}.csv").write_text("x\n1\n")
+    with pytest.raises(
+        InputError, match=r"figure_3\.csv, figure_4\.csv are missing or damaged; "
+    ) as caught:
+        reproduce(tmp_path, (three["2"],))
+    assert "`reproduce --figure 3 --figure 4`" in str(caught.value)
+    reproduce(tmp_path, (three["3"], three["4"]))
+    assert content(tmp_path)["studies"]["2"]["claims"][0]["ours"] == "1 beside 5 beside 1"
+
+
+def test_the_same_again_leaves_the_same_tables_and_pages(
+    tmp_path: Path, toys: dict[str, Study], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reproduce(tmp_path, tuple(toys.values()))
+    kinds = ("csv", "html")
+    before = [(tmp_path / f"figure_3.{kind}").read_bytes() for kind in kinds]
+    reproduce(tmp_path, tuple(toys.values()))
+    assert [(tmp_path / f"figure_3.{kind}").read_bytes() for kind in kinds] == before
     changed = toys | {"3": toy("3", 6.0)}
     monkeypatch.setattr(run, "STUDIES", changed)
     reproduce(tmp_path, (changed["3"],))
