@@ -20,6 +20,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
 from sarl_core.rollouts.agents import EXPERT_FOLDER, Agent, make_agent, shipped_experts
+from sarl_core.rollouts.seeds import FRESH
 from sarl_core.shielding.shield import Projection
 
 AS_DEMONSTRATED = "as demonstrated"
@@ -27,9 +28,10 @@ ENVIRONMENTS = (AS_DEMONSTRATED, *(env_id for _, env_id in state.SHIPPED.values(
 OWN_FILE = "own file"
 AGENTS = ("novice", "untrained", "expert", OWN_FILE)
 CHOSEN, NO_RULES, COMPACT = "at the thresholds", "none", "compact"
+EDITED = "edited"
 PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
-FRESH_SEED = 100_000  # far from those the demonstrations were recorded with
+FRESH_SEED = FRESH  # far from those the demonstrations were recorded with
 RULES_FOLDER = Path(__file__).parents[1] / "data" / "rules"
 
 
@@ -85,6 +87,10 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | Non
         return rules_from_json(content, name=uploaded.name), digest_of(content)
     if choice == COMPACT:
         return compact_rules()
+    if choice == EDITED:
+        from _edits import edited_rules  # it builds on this module
+
+        return edited_rules()
     demonstrations = state.chosen_demonstrations()
     if demonstrations is None:
         raise InputError(

@@ -44,6 +44,18 @@ PAGES = [
         help="Every rule in plain language, with the evidence behind it.",
     ),
     st.Page(
+        "edit.py",
+        title="Edit",
+        icon=":material/edit:",
+        help="Switch rules off, pin them, move them, add your own, and see what it changes.",
+    ),
+    st.Page(
+        "difference.py",
+        title="Difference",
+        icon=":material/difference:",
+        help="Two rule sets side by side: their rules, and the states they decide differently.",
+    ),
+    st.Page(
         "replay.py",
         title="Replay",
         icon=":material/play_circle:",

@@ -10,6 +10,7 @@ from _choices import (
     AGENTS,
     CHOSEN,
     COMPACT,
+    EDITED,
     ENVIRONMENTS,
     FRESH_SEED,
     NO_RULES,
@@ -24,6 +25,7 @@ from _choices import (
     rules_for,
 )
 from _compact import THRESHOLDS
+from _edits import offered as edits_offered
 from _replay_view import comparison, numbers, step_by_step
 from _replays import (
     Order,
@@ -39,7 +41,14 @@ from _words import escaped
 from sarl_core.errors import SarlError
 from sarl_core.mining.rules import UNFILTERED, RuleSet
 
-RULE_SETS = (CHOSEN, *PAPERS, COMPACT, OWN_FILE, NO_RULES)
+RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
+
+
+def rule_sets() -> list[str]:
+    """The rules that can be had."""
+    there = {COMPACT: compact_file().is_file(), EDITED: edits_offered()}
+    return [name for name in RULE_SETS if there.get(name, True)]
+
 
 # --- what is asked for -------------------------------------------------------------------------
 
@@ -69,13 +78,13 @@ def settings() -> Callable[[], Order]:
             )
             rules = st.selectbox(
                 "Rules",
-                [name for name in RULE_SETS if name != COMPACT or compact_file().is_file()],
+                rule_sets(),
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
                 "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
-                "is shipped for this environment. Own file: rules you saved. None: the agent "
-                "alone.",
+                "is shipped for this environment. Edited: what you made of them on the Edit page. "
+                "Own file: rules you saved. None: the agent alone.",
             )
             seed = st.number_input(
                 "Seed",

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import _compact
+import _edits
 import _state as state
 import numpy as np
 import streamlit as st
@@ -43,6 +44,7 @@ more frequent than it is overall.
 WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
 st.title("Rules")
+_edits.notice()
 demonstrations = state.require_demonstrations()
 compact = _compact.chosen_compact(demonstrations)
 thresholds = state.chosen_thresholds()

@@ -15,6 +15,7 @@ from _choices import (
     AGENTS,
     CHOSEN,
     COMPACT,
+    EDITED,
     ENVIRONMENTS,
     FRESH_SEED,
     OWN_FILE,
@@ -28,6 +29,7 @@ from _choices import (
     rules_for,
 )
 from _comparisons import Row, row_key
+from _edits import offered as edits_offered
 from _run_bar import known, run_bar, working
 from _shield_view import Line, show
 from _words import in_full
@@ -44,7 +46,7 @@ from sarl_core.shielding.shield import Projection, Shield
 NO_SHIELD = "no shield"
 # Their places give them their colours, the paper's where it has them.
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
-RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE)
+RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE, EDITED)
 MOST_EPISODES = 1_000
 PLACE = "comparison"
 
@@ -149,7 +151,9 @@ def settings() -> Choices:
                 accept_multiple_files=True,
                 key="policy_files",
             )
-        offered = [NO_SHIELD, *PAPERS, CHOSEN, COMPACT, OWN_FILE]
+        offered = [NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE]
+        if not edits_offered():
+            offered.remove(EDITED)
         if not compact_file().is_file():
             offered.remove(COMPACT)
         shields = st.pills(
@@ -161,7 +165,8 @@ def settings() -> Choices:
             bind="query-params",
             help="Filtered: support 0.005, confidence 0.95. Unfiltered: support 0, confidence 1. "
             "At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
-            "this environment. Own file: rules you saved.",
+            "this environment. Edited: what you made of them on the Edit page. Own file: rules you "
+            "saved.",
         )
         rule_file = None
         if OWN_FILE in shields:

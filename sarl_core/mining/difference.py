@@ -85,7 +85,10 @@ def check_comparable(first: RuleSet, second: RuleSet) -> None:
         )
     for one, other in zip(first.actions, second.actions, strict=True):
         if one.edges != other.edges:
-            divided = [f"{action.n_labels} labels" for action in (one, other)]
+            divided = [
+                f"{action.n_labels} {'intervals' if action.is_interval else 'labels'}"
+                for action in (one, other)
+            ]
             if one.n_labels == other.n_labels:
                 divided = ["intervals with some edges", "intervals with others"]
             raise InputError(

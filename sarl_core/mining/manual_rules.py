@@ -149,7 +149,7 @@ def _refuse_empty(bounds: Bounds, name: str) -> None:
             f"{name!r} cannot be above {low:g} and at most {high:g}; change one of the two"
         )
     # The largest float32 that is allowed; states are float32, thresholds are not.
-    largest = np.finfo(np.float32).max
+    largest = float(np.finfo(np.float32).max)
     top = np.float32(np.clip(high, -largest, largest))
     if float(top) > high >= -largest:
         top = np.nextafter(top, np.float32(-np.inf))

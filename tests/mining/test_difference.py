@@ -170,7 +170,7 @@ def test_sets_for_other_things_are_refused_in_one_sentence(more, words):
 
 
 def test_another_divider_is_named_and_new_names_are_no_hindrance():
-    with pytest.raises(InputError, match="2 labels in one rule set and 3 labels"):
+    with pytest.raises(InputError, match="2 intervals in one rule set and 3 intervals"):
         check_comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-1, 0, 1, 2)))
     with pytest.raises(InputError, match="some edges"):
         check_comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-2, 0, 2)))

@@ -1,0 +1,366 @@
+"""What the page Edit shows: the rules as edited, what the edits change, whom they overrule."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import _edits
+import _state as state
+import streamlit as st
+from _edits import Base
+from _rule_table import table_height
+from _words import escaped, in_full
+
+from sarl_core.errors import SarlError
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.edit_words import change_text, edit_text, state_text
+from sarl_core.explaining.language import (
+    action_text,
+    conditions_text,
+    counted,
+    sentence,
+    share_text,
+)
+from sarl_core.mining.editing import Move, Pin, Remove, Switch, Unpin, peers_of
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.effects import Verdicts, change
+
+TABLE_ROWS = 9
+EVERY, TOUCHED = "All rules", "Edited"
+
+
+# --- the bar above -----------------------------------------------------------------------------
+
+
+def bar(of: Base) -> None:
+    """Undo, redo, and the file."""
+    edits = _edits.history(of)
+    error = st.session_state.pop("_edit_error", None)
+    if error:
+        st.error(in_full(error), icon=":material/error:")
+    with st.container(horizontal=True, gap="small", vertical_alignment="center"):
+        for name, icon, step, waiting in (
+            ("Undo", "undo", _edits.undo, edits.edits[-1:]),
+            ("Redo", "redo", _edits.redo, edits.undone[-1:]),
+        ):
+            told = edit_text(waiting[0], of.rule_set) if waiting else ""
+            st.button(
+                f"{name}: {escaped(_short(told))}" if told else name,
+                on_click=step,
+                args=(of,),
+                disabled=not waiting,
+                icon=f":material/{icon}:",
+                key=name.lower(),
+                help=escaped(told) if told else f"Nothing to {name.lower()}",
+            )
+        rule_set = _edits.edited(of)
+        source = rule_set.source.env_id.rsplit("/", 1)[-1] or "unnamed"
+        st.download_button(
+            "Rule file",
+            lambda: rules_to_json(rule_set),
+            f"rules-{source}-edited.json",
+            "application/json",
+            on_click="ignore",
+            icon=":material/download:",
+            key="edited_file",
+            help="The set with all edits: what is off, what is pinned, what was added by hand.",
+        )
+        if edits.edits:
+            st.page_link(
+                "difference.py",
+                label="Compare with the unedited set",
+                icon=":material/difference:",
+                query_params={"first": "before the edits", "second": "edited"},
+            )
+
+
+def _short(text: str, most: int = 44) -> str:
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
+
+
+def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
+    """What the edits change at once, against the unedited set."""
+    found, noun = change(before, after), _edits.basis(of).noun
+    in_force = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
+    shown = (
+        ("Rules in force", f"{in_force[1]:,}", f"{in_force[0]:,}"),
+        ("Coverage", *(share_text(one.coverage, decimals=1) for one in (after, before))),
+        ("Fidelity", *(share_text(one.fidelity, decimals=1) for one in (after, before))),
+        ("Decided differently", f"{found.different:,}", ""),
+        ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
+    )
+    hints = (
+        "Rules that are switched on",
+        "Share of the states in which some rule applies",
+        "Share of the covered states in which the expert did as the rule in force says",
+        "States of which the edited set says something else than the unedited one",
+        "States in which a placed rule overrules another that says something else",
+    )
+    with st.container(horizontal=True, gap="small"):
+        for (label, value, was), hint in zip(shown, hints, strict=True):
+            st.metric(
+                label,
+                value,
+                delta=f"was {was}" if was and was != value else None,
+                delta_color="off",
+                delta_arrow="off",
+                border=True,
+                height="stretch",
+                width=176,
+                help=hint,
+            )
+    told = change_text(found, before, after, states=noun)
+    st.caption(f"Against the unedited set: {escaped(told[:1].lower() + told[1:])}{where(of)}")
+
+
+def where(of: Base) -> str:
+    """Which states these are, where they are not the demonstrated ones."""
+    if _edits.basis(of).expert is not None:
+        return ""
+    return (
+        " The chosen demonstrations are of something else, so this is counted on random states "
+        "over the range of the rules' thresholds."
+    )
+
+
+# --- the table ---------------------------------------------------------------------------------
+
+
+@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+def _texts(digest: str, _rule_set: RuleSet) -> dict[str, tuple[str, str]]:
+    return {rule.id: _text(rule, _rule_set) for rule in _rule_set.rules}
+
+
+def _text(rule: Rule, rule_set: RuleSet) -> tuple[str, str]:
+    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    return does, conditions_text(rule, rule_set)
+
+
+def in_order(rule_set: RuleSet) -> list[int]:
+    """Places of the rules, the placed ones in their order, then the largest first."""
+    rules = rule_set.rules
+    return sorted(
+        range(len(rules)),
+        key=lambda at: (0, at) if rules[at].placed else (1, -rules[at].samples),
+    )
+
+
+def table(of: Base, found: Verdicts) -> Rule | None:
+    """The rules as edited; returns the chosen one."""
+    rule_set, texts = found.rule_set, _texts(of.digest, of.rule_set)
+    with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
+        words = st.text_input(
+            "Search",
+            key="search",
+            bind="query-params",
+            icon=":material/search:",
+            width=300,
+            placeholder="a feature, an action, a number",
+            label_visibility="collapsed",
+        )
+        view = st.segmented_control(
+            "Show",
+            [EVERY, TOUCHED],
+            default=EVERY,
+            key="rules_shown",
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+        )
+    order = in_order(rule_set)
+    if view == TOUCHED:
+        order = [at for at in order if _touched(rule_set.rules[at])]
+    told = {}
+    for at in order:
+        rule = rule_set.rules[at]
+        told[at] = _text(rule, rule_set) if rule.origin == "manual" else texts.get(rule.id)
+        told[at] = told[at] or _text(rule, rule_set)
+    wanted = (words or "").lower().split()
+    if wanted:
+        order = [
+            at
+            for at in order
+            if all(w in f"{' '.join(told[at])} {rule_set.rules[at].id}".lower() for w in wanted)
+        ]
+    if not order:
+        st.info(
+            "No rule is edited yet; show all rules and choose one."
+            if view == TOUCHED and not wanted
+            else "No rule matches; clear the search to see all.",
+            icon=":material/search_off:",
+        )
+        return None
+    ids = [rule_set.rules[at].id for at in order]
+    chosen = state.url_choice("rule", [rule.id for rule in rule_set.rules], ids[0])
+    row = ids.index(chosen) if chosen in ids else None
+
+    def pick() -> None:
+        rows = st.session_state["edit_table"].selection.rows
+        if rows and rows[0] < len(ids):
+            state.set_url_choice("rule", ids[rows[0]])
+
+    st.dataframe(
+        _frame(order, [told[at] for at in order], found),
+        hide_index=True,
+        column_config=_columns(rule_set),
+        height=table_height(len(order), TABLE_ROWS),
+        key="edit_table",
+        on_select=pick,
+        selection_mode="single-row",
+        selection_default={"selection": {"rows": [] if row is None else [row]}},
+        alt="The rules with all edits",
+    )
+    several = counted(len(rule_set), "rule")
+    st.caption(
+        (f"{len(order):,} of {several}. " if len(order) < len(rule_set) else f"{several}. ")
+        + "Placed rules (manual or pinned) come first, in their order: the first that applies "
+        "decides. Mined rules never overlap. Click the box at the left of a row to edit its rule."
+    )
+    return next(rule for rule in rule_set.rules if rule.id == chosen)
+
+
+def _touched(rule: Rule) -> bool:
+    return rule.placed or not rule.enabled
+
+
+def _frame(order: list[int], texts: list[tuple[str, str]], found: Verdicts) -> Any:
+    import pandas as pd
+
+    rules = [found.rule_set.rules[at] for at in order]
+    decided = found.decided[order]
+    columns: dict[str, Any] = {
+        "On": [rule.enabled for rule in rules],
+        "Kind": [state_text(rule).split(",")[0] for rule in rules],
+        "Rule": [rule.id for rule in rules],
+        "Action": [[does] for does, _ in texts],
+        "When": [when for _, when in texts],
+        "Decides": decided,
+    }
+    if found.right is not None:
+        right = found.right[order].astype(float)
+        right[decided == 0] = float("nan")
+        columns["Expert agrees"] = right / decided.clip(min=1)
+    return pd.DataFrame(columns)
+
+
+def _columns(rule_set: RuleSet) -> dict[str, Any]:
+    column = st.column_config
+    colours = {
+        action_text(label, dimension): label_colour(label)
+        for dimension in rule_set.actions
+        for label in range(dimension.n_labels)
+    }
+    action_width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    return {
+        "On": column.CheckboxColumn(width=40, help="Whether a shield uses the rule"),
+        "Kind": column.TextColumn(
+            width=70, help="Mined; pinned, so that it keeps its place; or added by hand"
+        ),
+        "Rule": column.TextColumn(width=80, help="Its name"),
+        "Action": column.MultiselectColumn(
+            width=action_width,
+            help="What the rule says",
+            options=list(colours),
+            color=list(colours.values()),
+        ),
+        "When": column.TextColumn(
+            width=570 - action_width, help="The conditions under which the rule applies"
+        ),
+        "Decides": column.NumberColumn(
+            width=80, format="localized", help="States in which it is the rule in force"
+        ),
+        "Expert agrees": column.ProgressColumn(
+            width=112,
+            min_value=0.0,
+            max_value=1.0,
+            format="%.3f",
+            color="gray",
+            help="Share of those in which the expert did as it says",
+        ),
+    }
+
+
+# --- one rule ----------------------------------------------------------------------------------
+
+
+def chosen_rule(of: Base, rule: Rule, found: Verdicts) -> str | None:
+    """The chosen rule and what can be done to it; gives what the form is to do with it."""
+    rule_set, wish = found.rule_set, None
+    with st.container(border=True, key="chosen_rule"):
+        st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
+        at = rule_set.rules.index(rule)
+        decides = f"decides {counted(int(found.decided[at]), _edits.basis(of).noun)}"
+        st.caption(f"Rule {escaped(rule.id)} · {state_text(rule)} · {decides}")
+        with st.container(horizontal=True, gap="small"):
+            on = rule.enabled
+            _button(
+                of,
+                "Switch off" if on else "Switch on",
+                "toggle_off" if on else "toggle_on",
+                Switch(rule.id, not on),
+                "switch",
+            )
+            if rule.origin == "mined":
+                edit = Unpin(rule.id) if rule.pinned else Pin(rule)
+                _button(
+                    of,
+                    "Unpin" if rule.pinned else "Pin",
+                    "keep_off" if rule.pinned else "keep",
+                    edit,
+                    "pin",
+                    "A pinned rule stays in force when the thresholds move, and comes before "
+                    "those that were only mined.",
+                )
+            peers = peers_of(rule, rule_set.rules) if rule.placed else []
+            for up in (True, False):
+                last = not peers or peers[0 if up else -1] == rule.id
+                _button(
+                    of,
+                    f"Move {'up' if up else 'down'}",
+                    f"arrow_{'up' if up else 'down'}ward",
+                    Move(rule.id, up),
+                    "up" if up else "down",
+                    "Its place among the placed rules of its action"
+                    if rule.placed
+                    else "Mined rules never overlap, so they have no order. Pin it first.",
+                    disabled=last,
+                )
+            if rule.origin == "manual":
+                _button(of, "Remove", "delete", Remove(rule.id), "remove")
+                if st.button("Change", icon=":material/edit:", key="change_rule"):
+                    wish = "change"
+            if st.button(
+                "Copy",
+                icon=":material/content_copy:",
+                key="copy_rule",
+                help="Fill the form below with its conditions, to add a rule like it.",
+            ):
+                wish = "copy"
+    return wish
+
+
+def _button(
+    of: Base,
+    label: str,
+    icon: str,
+    edit: Any,
+    key: str,
+    hint: str | None = None,
+    *,
+    disabled: bool = False,
+) -> None:
+    st.button(
+        label,
+        on_click=_edits.do,
+        args=(of, edit),
+        icon=f":material/{icon}:",
+        key=f"edit_{key}",
+        help=hint,
+        disabled=disabled,
+    )
+
+
+def refuse(error: SarlError) -> None:
+    """Say what cannot be done, in place."""
+    st.warning(in_full(str(error)), icon=":material/error:")

@@ -1,0 +1,251 @@
+"""The edits of this session: on which rules, their history, and the set they make.
+
+Edits belong to the rules they were made on: those of the trees, whatever the thresholds are, the
+compact ones, or those of a file. They stay in the session, and an error loses none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import _compact
+import _state as state
+import numpy as np
+import streamlit as st
+from _choices import CHOSEN, COMPACT, OWN_FILE, compact_rules, digest_of, rules_for
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError, SarlError
+from sarl_core.explaining.language import counted
+from sarl_core.mining.editing import Edit, History, apply, check_edit
+from sarl_core.mining.rule_files import rules_from_json
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.deciding import Ground, ground_of
+from sarl_core.shielding.disagreement import sampled_states
+from sarl_core.shielding.effects import Verdicts, expert_labels, fits, verdicts
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """The rules that are edited.
+
+    Attributes:
+        kind: One of the words on screen.
+        key: To which edits belong.
+        digest: Tells these rules from all others.
+        rule_set: Without edits.
+        name: Of the file they are from, "" for none.
+    """
+
+    kind: str
+    key: str
+    digest: str
+    rule_set: RuleSet
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """The states on which a rule set and its edits are counted.
+
+    Attributes:
+        ground: The states, walked.
+        expert: What the expert did there, None where that is not known.
+        noun: What one of them is called.
+    """
+
+    ground: Ground
+    expert: NDArray[np.int64] | None
+    noun: str
+
+
+# --- which rules are edited --------------------------------------------------------------------
+
+
+def kinds() -> list[str]:
+    """What can be edited."""
+    return [CHOSEN, *([COMPACT] if _compact.offered() else []), OWN_FILE]
+
+
+def chosen_kind() -> str:
+    """What is edited: a file, or the rules in force (URL: base, set)."""
+    if state.url_choice("base", ("force", OWN_FILE), "force") == OWN_FILE:
+        return OWN_FILE
+    return COMPACT if _compact.in_force() else CHOSEN
+
+
+def choose_kind(kind: str) -> None:
+    """Choose what is edited; for callbacks."""
+    state.set_url_choice("base", OWN_FILE if kind == OWN_FILE else "force", "force")
+    if kind != OWN_FILE:
+        _compact.choose(kind == COMPACT)
+
+
+def take_file(content: bytes, name: str) -> None:
+    """Keep an uploaded rule file for this session; what was kept before stays where that fails.
+
+    Raises:
+        InputError: If it is no rule file.
+    """
+    rule_set = rules_from_json(content, name=name)
+    digest = digest_of(content)
+    st.session_state["_edit_file"] = Base(OWN_FILE, f"file {digest}", digest, rule_set, name)
+
+
+def base() -> Base:
+    """The rules that are edited.
+
+    Raises:
+        InputError: If they cannot be had.
+    """
+    kind = chosen_kind()
+    if kind == OWN_FILE:
+        kept = cast("Base | None", st.session_state.get("_edit_file"))
+        if kept is None:
+            raise InputError("no rule file has been uploaded; upload one, or edit other rules")
+        return kept
+    if kind == COMPACT:
+        rule_set, digest = compact_rules()
+        return Base(kind, f"compact {digest}", digest, rule_set)
+    rule_set, digest = cast("tuple[RuleSet, str]", rules_for(CHOSEN, None))
+    # A rule's number is its node's, the same at all thresholds.
+    return Base(kind, repr((rule_set.source.digest, rule_set.divider)), digest, rule_set)
+
+
+# --- the edits ---------------------------------------------------------------------------------
+
+
+def _histories() -> dict[str, History]:
+    return cast("dict[str, History]", st.session_state.setdefault("_edits", {}))
+
+
+def history(of: Base) -> History:
+    """The edits of some rules."""
+    return _histories().get(of.key, History())
+
+
+def keep(of: Base, edits: History) -> None:
+    """Put edits in force."""
+    _histories()[of.key] = edits
+
+
+def do(of: Base, edit: Edit) -> None:
+    """Make one more edit; for callbacks. What cannot be made is said on the page."""
+    try:
+        check_edit(edited(of), edit)
+    except InputError as error:
+        st.session_state["_edit_error"] = str(error)
+    else:
+        keep(of, history(of).done(edit))
+
+
+def undo(of: Base) -> None:
+    """Take the latest edit back; for callbacks."""
+    keep(of, history(of).undo())
+
+
+def redo(of: Base) -> None:
+    """Make the edit again that was taken back last; for callbacks."""
+    keep(of, history(of).redo())
+
+
+def edited(of: Base) -> RuleSet:
+    """The rules with the edits."""
+    return _edited(of.digest, _told(history(of).edits), history(of).edits, of.rule_set)
+
+
+def _told(edits: tuple[Edit, ...]) -> str:
+    return digest_of(repr(edits).encode())
+
+
+@st.cache_resource(max_entries=32, show_spinner=False)
+def _edited(digest: str, told: str, _edits: tuple[Edit, ...], _rule_set: RuleSet) -> RuleSet:
+    return apply(_rule_set, _edits)
+
+
+# --- for other pages ---------------------------------------------------------------------------
+
+
+def offered() -> bool:
+    """Whether there is an edited set to choose."""
+    if not _histories():
+        return False
+    try:
+        return bool(history(base()).edits)
+    except SarlError:
+        return False
+
+
+def edited_rules() -> tuple[RuleSet, str]:
+    """The edited set, and what tells it from others.
+
+    Raises:
+        InputError: If there is none.
+    """
+    of = base()
+    edits = history(of).edits
+    if not edits:
+        raise InputError("there are no edits of the rules in force; make some on the Edit page")
+    return edited(of), f"{of.digest} {_told(edits)}"
+
+
+def notice() -> None:
+    """Say that the rules in force have edits, with a link to them; nothing where they have none."""
+    if not _histories() or chosen_kind() == OWN_FILE or not offered():
+        return
+    count = counted(len(history(base()).edits), "edit")
+    with st.container(horizontal=True, vertical_alignment="center", gap="small"):
+        st.caption(
+            f":material/edit: You have made {count} of these rules. Shown here is what was mined.",
+            width="content",
+        )
+        st.page_link("edit.py", label="See the edited set")
+
+
+# --- what they change --------------------------------------------------------------------------
+
+
+def demonstrations_for(rule_set: RuleSet) -> Demonstrations | None:
+    """The chosen demonstrations, where the rules ask about their features."""
+    demonstrations = state.chosen_demonstrations()
+    return demonstrations if demonstrations and fits(rule_set, demonstrations) else None
+
+
+def basis(of: Base) -> Basis:
+    """The states on which the edits of some rules are counted."""
+    return basis_of(of.rule_set, of.digest)
+
+
+def basis_of(rule_set: RuleSet, digest: str) -> Basis:
+    """The states on which a rule set is counted: demonstrated ones, where they are its own kind."""
+    demonstrations = demonstrations_for(rule_set)
+    told = demonstrations.digest if demonstrations is not None else ""
+    return _basis(digest, told, rule_set, demonstrations)
+
+
+@st.cache_resource(max_entries=16, show_spinner="Looking which rule decides which state …")
+def _basis(
+    digest: str, told: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None
+) -> Basis:
+    if _demonstrations is None:
+        return Basis(ground_of(_rule_set, sampled_states([_rule_set])), None, "random state")
+    ground = ground_of(_rule_set, _demonstrations.observations)
+    return Basis(ground, expert_labels(_rule_set, _demonstrations), "demonstrated state")
+
+
+def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
+    """What the rules with some edits say of the states."""
+    found = basis(of)
+    told = f"{len(found.ground.states)} {found.noun} {_told(edits)}"
+    if found.noun == "demonstrated state":
+        told += cast(Demonstrations, state.chosen_demonstrations()).digest
+    return _verdicts(of.digest, told, edits, of.rule_set, found)
+
+
+@st.cache_resource(max_entries=32, show_spinner=False)
+def _verdicts(
+    digest: str, told: str, _edits: tuple[Edit, ...], _rule_set: RuleSet, _basis: Basis
+) -> Verdicts:
+    return verdicts(_basis.ground, apply(_rule_set, _edits), _basis.expert)

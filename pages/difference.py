@@ -1,0 +1,216 @@
+"""Difference: two rule sets side by side, their rules and the states they decide differently."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import _edits
+import _state as state
+import streamlit as st
+from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, compact_file, rules_for
+from _rule_table import table_height
+from _words import escaped, in_full
+
+from sarl_core.errors import SarlError
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.difference_figures import confusion_figure
+from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
+from sarl_core.explaining.difference_words import decided_text, kinds_text, rows_text
+from sarl_core.explaining.language import action_text, counted
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.deciding import ground_of
+from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
+from sarl_core.shielding.effects import fits
+
+UNEDITED = "before the edits"
+EVERY = "all"
+SIDES = (("first", "First set", CHOSEN), ("second", "Second set", "unfiltered"))
+
+
+def options() -> list[str]:
+    """The rule sets that can be had."""
+    offered = [CHOSEN, *PAPERS]
+    if compact_file().is_file():
+        offered.append(COMPACT)
+    if _edits.offered():
+        offered += [UNEDITED, EDITED]
+    return [*offered, OWN_FILE]
+
+
+def side(key: str, label: str, default: str) -> tuple[RuleSet, str, str]:
+    """One of the two sets, what tells it from others, and its name.
+
+    Raises:
+        InputError: If it cannot be had.
+    """
+    offered = options()
+    choice = st.selectbox(label, offered, offered.index(default), key=key, bind="query-params")
+    file = None
+    if choice == OWN_FILE:
+        file = st.file_uploader("Rule file (.json)", key=f"{key}_file")
+    if choice == UNEDITED:
+        of = _edits.base()
+        return of.rule_set, of.digest, choice
+    rule_set, digest = rules_for(choice, file)
+    assert rule_set is not None
+    return rule_set, digest, file.name if file is not None else choice
+
+
+@st.cache_resource(max_entries=12, show_spinner="Comparing …")
+def compared(
+    digests: tuple[str, str, str], _first: RuleSet, _second: RuleSet, _demonstrations: Any
+) -> tuple[Disagreement, Any]:
+    """The comparison, and the states."""
+    states = (
+        sampled_states([_first, _second])
+        if _demonstrations is None
+        else _demonstrations.observations
+    )
+    return disagreement(ground_of(_first, states), ground_of(_second, states)), states
+
+
+@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+def rules_frame(digests: tuple[str, str, str], kinds: tuple[str, ...], _found: Disagreement) -> Any:
+    """The rules that differ, as a data frame."""
+    import pandas as pd
+
+    rows = rule_rows(_found, kinds)
+    rows["Action"] = [[action] for action in rows["Action"]]
+    return pd.DataFrame(rows)
+
+
+def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
+    """Rules added, removed, changed."""
+    st.subheader("Rules")
+    st.caption(
+        rows_text(found),
+        help="Rules are the same rule where they ask the same, or where they share more than "
+        "half of the states that either of them applies to. A changed one has other conditions, "
+        "says something else, was switched on or off, or has another place.",
+    )
+    counts = (
+        len(found.difference.added),
+        len(found.difference.removed),
+        len(found.difference.changed),
+    )
+    if not any(counts):
+        return
+    view = st.segmented_control(
+        "Show",
+        [EVERY, *(kind for kind, count in zip(KINDS, counts, strict=True) if count)],
+        default=EVERY,
+        key="kind",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
+    )
+    frame = rules_frame(digests, KINDS if view == EVERY else (str(view),), found)
+    if not len(found.difference.changed) or view not in (EVERY, "changed"):
+        frame = frame.drop(columns="Change")
+    column = st.column_config
+    colours = {
+        action_text(label, action): label_colour(label)
+        for action in found.first.actions
+        for label in range(action.n_labels)
+    }
+    st.dataframe(
+        frame,
+        hide_index=True,
+        height=table_height(len(frame), 9),
+        key="rule_changes",
+        alt="Rules that differ",
+        column_config={
+            "What": column.TextColumn(width=75),
+            "Rule": column.TextColumn(width=80),
+            "Action": column.MultiselectColumn(
+                width=160, options=list(colours), color=list(colours.values())
+            ),
+            "When": column.TextColumn(width=360 if "Change" in frame else 560),
+            "Change": column.TextColumn(width=240),
+            "States": column.NumberColumn(
+                format="localized",
+                width=75,
+                help="Demonstrated states to which the rule applies, of those it was mined from",
+            ),
+        },
+    )
+
+
+def show_states(found: Disagreement, states: Any, names: tuple[str, str], shown: Any) -> None:
+    """The states that are decided differently."""
+    import pandas as pd
+
+    noun = "random state" if shown is None else "demonstrated state"
+    st.subheader("Decisions")
+    st.markdown(f"**{escaped(decided_text(found, states=noun))}**")
+    if shown is None:
+        st.caption(
+            f"The states are {counted(found.states, 'random one')} over the range of the rules' "
+            "thresholds, because the chosen demonstrations are of something else. They say where "
+            "the two differ, not how often an agent comes there."
+        )
+    actions = found.first.actions
+    at = 0
+    if len(actions) > 1:
+        labels = [action.name for action in actions]
+        most = labels[int(found.differs.sum(axis=0).argmax())]
+        name = st.segmented_control(
+            "Action", labels, default=most, key="decided", bind="query-params", required=True
+        )
+        at = labels.index(name) if name in labels else 0
+    if found.differs[:, at].any():
+        told = (f"the first ({names[0]})", f"the second ({names[1]})")
+        st.caption(f"Differently: {escaped(kinds_text(found, at, told))}.")
+    st.plotly_chart(
+        confusion_figure(found, at, names=names, noun=noun),
+        key="confusion",
+        config={"displayModeBar": False},
+        alt=f"What {names[0]} says against what {names[1]} says, in numbers of states",
+    )
+    columns = example_rows(found, at, states, names=names, demonstrations=shown)
+    count = len(next(iter(columns.values())))
+    if not count:
+        return
+    several = int(found.differs[:, at].sum())
+    st.subheader("Example states")
+    if several > count:
+        st.caption(f"{count} of {several:,}, evenly spread.")
+    st.dataframe(
+        pd.DataFrame(columns),
+        hide_index=True,
+        height=table_height(count, 9),
+        key="examples",
+        alt="States that the two decide differently",
+    )
+
+
+st.title("Difference")
+st.caption(
+    "Two rule sets side by side: which rules differ, and on how many of the same states the two "
+    "decide differently."
+)
+sides, problems = [], []
+for place, (key, label, default) in zip(st.columns(2), SIDES, strict=True):
+    with place:
+        try:
+            sides.append(side(key, label, default))
+        except SarlError as error:
+            problems.append(in_full(str(error)))
+for problem in problems:
+    st.info(problem, icon=":material/upload_file:")
+if problems:
+    st.stop()
+(one, one_digest, one_name), (other, other_digest, other_name) = sides
+if one_name == other_name:
+    one_name, other_name = f"{one_name} (first)", f"{other_name} (second)"
+chosen = state.chosen_demonstrations()
+if chosen is not None and not (fits(one, chosen) and fits(other, chosen)):
+    chosen = None
+told_by = (one_digest, other_digest, chosen.digest if chosen is not None else "")
+try:
+    result, compared_on = compared(told_by, one, other, chosen)
+except SarlError as error:
+    st.error(in_full(str(error)), icon=":material/error:")
+    st.stop()
+show_states(result, compared_on, (one_name, other_name), chosen)
+show_rules(result, told_by)
