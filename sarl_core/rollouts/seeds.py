@@ -6,11 +6,12 @@ good by what luck it had, so it is told on episodes of another purpose.
 ====================  =====================================================================
 first seed            what its episodes are for
 ====================  =====================================================================
-`DEMONSTRATED` 0      shipped demonstrations; all learners, which are seeded from 0
-`FRESH` 100,000       what a page plays or looks for where nobody says otherwise; the examples
+`DEMONSTRATED`        shipped demonstrations; learners that experts are trained by
+`FRESH`               what a page plays or looks for where nobody says otherwise; the examples
 `EXPERT_CHOICE`       a training keeps its best policy by them
 `EXPERT_REPORT`       and reports it on these
-`TRIAL`               what learning under a shield (`learn`) has come to
+`TRIAL`               what learning under a shield (`learn`) has come to; its learners have the
+                      seeds below, 100,000 for each
 `ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
 `VALIDATION`          the best of its rounds is chosen by them
 `SECOND_VALIDATION`   the best point of its refinement is chosen by them
@@ -25,8 +26,10 @@ no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that.
 
 Ranges that do meet, and why that does no harm:
 
-- `TRIAL` and `EXPERT_REPORT` are the same seeds. Nothing is chosen by either, and the learners of
-  one are not those of the other.
+- `TRIAL` and `EXPERT_REPORT` are the same seeds: an expert and a learner are two policies, and
+  neither is chosen by what is told of the other.
+- Learners of `learn` pass over `DEMONSTRATED`, `FRESH` and `EXPERT_CHOICE`. They are tried on
+  `TRIAL`, which none of them reaches.
 - `REPRODUCED` and `VALIDATION` are the same seeds. What `reproduce` plays is mined at the paper's
   thresholds and chosen by no episode. Compact rules are chosen by these seeds and are therefore
   never to be judged by them.
@@ -35,7 +38,7 @@ Ranges that do meet, and why that does no harm:
 - `RELEVANCE` and `REPORT` are the same seeds. Nothing is chosen by either.
 - Runs of `aggregate` whose seeds are ten apart: the rounds of one are the validation of the other.
   They share no rules.
-- `FRESH` and the page Improve's search for gaps. Nothing is chosen by either.
+- `FRESH` serves all pages, the search for gaps included. Nothing that is shipped is chosen by it.
 
 They stay as they are, because shipped files name them.
 """

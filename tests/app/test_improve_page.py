@@ -14,8 +14,9 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.rules import Thresholds
-from sarl_core.rollouts.aggregation import Aggregation, Plan, aggregate
+from sarl_core.rollouts.aggregation import Aggregation, aggregate
 from sarl_core.rollouts.aggregation_files import save_aggregation
+from sarl_core.rollouts.aggregation_plan import Plan
 from sarl_core.rollouts.gaps import find_gaps
 from tests.app.screens import errors, metrics, open_page, texts
 
@@ -126,8 +127,8 @@ def test_a_run_is_what_the_library_gives_and_goes_on_from_there(expected: Aggreg
     table = app.dataframe[0].value
     assert table["Round"].tolist() == [1, 2]
     assert table["Mean return"].tolist() == [one.mean_return for one in expected.rounds]
-    assert table["Otherwise"].tolist() == [one.disagreement for one in expected.rounds]
-    assert table["Pairs"].tolist() == [one.pairs for one in expected.rounds]
+    assert table["Expert disagrees"].tolist() == [one.disagreement for one in expected.rounds]
+    assert table["Demonstrations"].tolist() == [one.pairs for one in expected.rounds]
     assert expected.reported is not None
     spread = expected.reported.statistics
     assert metrics(app)["Mean return"] == f"{spread.mean:,.1f}"

@@ -92,9 +92,56 @@ def test_stopped_by_ctrl_c_the_finished_rounds_are_kept(capsys, tmp_path, monkey
     assert code == 130
     assert told.err == (
         f"error: stopped by Ctrl-C after 2 of 5 rounds; the best rules so far are in {out}, "
-        "chosen by the episodes of their round only\n"
+        "chosen by the episodes of their round only; no fresh episode has tried them\n"
     )
     assert len(RuleSet.load(out)) <= 3
     card = json.loads((tmp_path / "compact.card.json").read_text())
     assert card["reported"] is None
     assert len(card["rounds"]) == 2
+    # Stopped again, it takes the place of nothing.
+    before = out.read_bytes()
+    calls.clear()
+    assert main(["aggregate", CART, "--out", str(out), *arguments]) == 130
+    assert f"are in {tmp_path / 'compact.stopped.json'} ({out} stays as it was), chosen by" in (
+        capsys.readouterr().err
+    )
+    assert out.read_bytes() == before
+    assert len(RuleSet.load(tmp_path / "compact.stopped.json")) <= 3
+
+
+def test_stopped_by_ctrl_c_the_gaps_so_far_are_written(capsys, tmp_path, monkeypatch):
+    from sarl_core.rollouts import gaps
+
+    rollout, calls = gaps.rollout, []
+
+    def interrupted(*arguments, **named):
+        calls.append(named["episodes"])
+        if len(calls) == stop_at:
+            raise KeyboardInterrupt
+        return rollout(*arguments, **named)
+
+    monkeypatch.setattr(gaps, "rollout", interrupted)
+    out = tmp_path / "gaps.csv"
+    thresholds = ["--support", "0.05", "--confidence", "0.95", "--episodes", "12"]
+    arguments = ["aggregate", CART, "--expert", "none", "--out", str(out), *thresholds]
+    stop_at = 1
+    assert main(arguments) == 130
+    assert capsys.readouterr().err == "error: stopped by Ctrl-C; nothing was written\n"
+    assert not out.exists()
+    calls.clear()
+    stop_at = 2
+    assert main(arguments) == 130
+    with out.open() as file:
+        rows = list(csv.DictReader(file))
+    assert {int(row["episode"]) for row in rows} <= set(range(8))
+    assert capsys.readouterr().err == (
+        f"error: stopped by Ctrl-C after 8 of 12 episodes; the {len(rows):,} states without a "
+        f"rule that they met are in {out}\n"
+    )
+    before = out.read_bytes()
+    calls.clear()
+    assert main(arguments) == 130
+    assert f"are in {tmp_path / 'gaps.stopped.csv'} ({out} stays as it was)" in (
+        capsys.readouterr().err
+    )
+    assert out.read_bytes() == before
