@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 
 import _compact
+import _hold_out
 import _state as state
 import streamlit as st
 from streamlit.errors import StreamlitAPIException
@@ -62,6 +63,8 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
             f"{counted(len(demonstrations), 'step')} in "
             f"{counted(demonstrations.n_episodes, 'episode')}"
         ]
+        whole = state.all_demonstrations()
+        lines += _hold_out.told(whole) if whole is not None else []
         if _compact.in_force():
             lines.append("**Compact rules** in force")
             if thresholds_shown:

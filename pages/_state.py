@@ -13,14 +13,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
+import _hold_out
 import numpy as np
 import streamlit as st
+from _hold_out import Parts
+from _url import set_url_choice, url_choice
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.explaining.tables import top_rules
-from sarl_core.mining.landscape import Landscape, threshold_landscape
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.holding_out import count_held_out, with_held_out
+from sarl_core.mining.landscape import Landscape, NodeCounts, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds, mine_rules
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
@@ -43,43 +48,6 @@ DATA_FOLDER = Path(__file__).parents[1] / "data" / "demonstrations"
 # --- what is chosen ----------------------------------------------------------------------------
 
 
-def url_choice(name: str, options: Sequence[str], default: str) -> str:
-    """A choice that the URL holds and that survives a change of page.
-
-    Args:
-        name: URL parameter.
-        options: What it may be.
-        default: Taken where the URL says nothing, or something else.
-
-    Returns:
-        One of `options`.
-    """
-    kept = f"_{name}"
-    value = st.query_params.get(name, "")
-    if value not in options:
-        value = str(st.session_state.get(kept, default))
-    if value not in options:
-        value = default
-    set_url_choice(name, value, default)
-    return value
-
-
-def set_url_choice(name: str, value: str, default: str = "") -> None:
-    """Choose, from a widget's callback or by `url_choice`.
-
-    Args:
-        name: URL parameter.
-        value: Its new value.
-        default: Value that needs no place in the URL.
-    """
-    st.session_state[f"_{name}"] = value
-    if value != default:
-        if st.query_params.get(name) != value:
-            st.query_params[name] = value
-    elif name in st.query_params:
-        del st.query_params[name]
-
-
 def dataset_names() -> tuple[str, ...]:
     """What the URL parameter `data` may be: the shipped sets, and "upload"."""
     return (*SHIPPED, UPLOAD)
@@ -96,7 +64,8 @@ def chosen_dataset() -> str:
 
 
 def choose_dataset(name: str) -> None:
-    """Choose a data set; for callbacks."""
+    """Choose a data set, with all its episodes; for callbacks."""
+    _hold_out.leave_out(())
     set_url_choice("data", name, DEFAULT_DATA)
 
 
@@ -117,8 +86,8 @@ def uploaded() -> Demonstrations | None:
     return cast("Demonstrations | None", st.session_state.get("_upload"))
 
 
-def chosen_demonstrations() -> Demonstrations | None:
-    """The demonstrations that every page works on; None while nothing is uploaded.
+def all_demonstrations() -> Demonstrations | None:
+    """The chosen demonstrations with every episode; None while nothing is uploaded.
 
     A shipped file that cannot be read is said on the page, which then stops.
     """
@@ -130,6 +99,31 @@ def chosen_demonstrations() -> Demonstrations | None:
     except SarlError as error:
         st.error(str(error), icon=":material/error:")
         st.stop()
+
+
+# The way of the data: as it was read (`all_demonstrations`), less what is left out, less what is
+# held out (`_hold_out`). What rules are mined from is what remains.
+
+
+def parts() -> Parts | None:
+    """What is mined from and what is held out; None while nothing is uploaded."""
+    demonstrations = all_demonstrations()
+    return None if demonstrations is None else _hold_out.parted(demonstrations)
+
+
+def chosen_demonstrations() -> Demonstrations | None:
+    """The demonstrations that rules are mined from, and every page works on.
+
+    None while nothing is uploaded.
+    """
+    found = parts()
+    return None if found is None else found.mined
+
+
+def held_out() -> Demonstrations | None:
+    """The episodes that rules are tried on; None where nothing is held out."""
+    found = parts()
+    return None if found is None else found.held_out
 
 
 def require_demonstrations() -> Demonstrations:
@@ -245,15 +239,23 @@ def _key(grown: tuple[PolicyTree, ...]) -> tuple[str, int]:
 
 @st.cache_resource(max_entries=48, show_spinner=False)
 def _rule_set(
-    key: tuple[str, int], thresholds: Thresholds, _trees: tuple[PolicyTree, ...]
+    key: tuple[str, int],
+    thresholds: Thresholds,
+    digests: tuple[str, str],
+    _trees: tuple[PolicyTree, ...],
+    _parts: Parts | None,
 ) -> RuleSet:
-    return mine_rules(
+    mined = mine_rules(
         _trees,
         supp_min=thresholds.support,
         conf_min=thresholds.confidence,
         lift_min=thresholds.lift,
         max_depth=thresholds.max_depth,
     )
+    if _parts is None:
+        return mined
+    boxed = with_boxes(mined, _parts.mined)
+    return boxed if _parts.held_out is None else with_held_out(boxed, _parts.held_out)
 
 
 def rule_set(
@@ -266,11 +268,30 @@ def rule_set(
         thresholds: The chosen ones where not given.
 
     Returns:
-        Mined once for each combination.
+        Mined once for each combination. Rules of the chosen data carry their data boxes and what
+        the held-out episodes say of them.
     """
     if grown is None:
         grown = trees(require_demonstrations(), chosen_divider())
-    return _rule_set(_key(grown), thresholds or chosen_thresholds(), grown)
+    found = parts()
+    if found is not None and found.mined.digest != grown[0].source.digest:
+        found = None
+    digests = ("", "") if found is None else (found.mined.digest, _digest(found.held_out))
+    return _rule_set(_key(grown), thresholds or chosen_thresholds(), digests, grown, found)
+
+
+def _digest(demonstrations: Demonstrations | None) -> str:
+    return "" if demonstrations is None else demonstrations.digest
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _held_out_counts(
+    key: tuple[str, int],
+    digest: str,
+    _trees: tuple[PolicyTree, ...],
+    _held_out: Demonstrations,
+) -> tuple[NodeCounts, ...]:
+    return count_held_out(_trees, _held_out)
 
 
 @st.cache_resource(max_entries=48, show_spinner=False)
@@ -280,9 +301,13 @@ def _landscape(
     confidences: tuple[float, ...],
     lift: float,
     depth: int | None,
+    held_out: str,
     _trees: tuple[PolicyTree, ...],
+    _counts: tuple[NodeCounts, ...] | None,
 ) -> Landscape:
-    return threshold_landscape(_trees, supports, confidences, lift_min=lift, max_depth=depth)
+    return threshold_landscape(
+        _trees, supports, confidences, lift_min=lift, max_depth=depth, held_out=_counts
+    )
 
 
 def landscape(
@@ -293,14 +318,23 @@ def landscape(
     lift: float = 0.0,
     depth: int | None = None,
 ) -> Landscape:
-    """The landscape over a grid, computed once for each combination."""
+    """The landscape over a grid, computed once for each combination.
+
+    It has a layer of what the held-out episodes say, where there are some.
+    """
+    other = held_out()
+    counts = None
+    if other is not None:
+        counts = _held_out_counts(_key(grown), other.digest, grown, other)
     return _landscape(
         _key(grown),
         tuple(map(float, supports)),
         tuple(map(float, confidences)),
         lift,
         depth,
+        _digest(other),
         grown,
+        counts,
     )
 
 

@@ -139,7 +139,7 @@ def show_maps(
     with st.container(key="maps"):
         for column, layer in zip(st.columns(2), layers, strict=True):
             with column:
-                st.markdown(f"**{figures.LAYERS[layer].title}**")
+                st.markdown(f"**{figures.STYLES[layer].title}**")
                 with st.container(key=f"box_{layer}"):
                     st.plotly_chart(
                         figures.heatmap(landscape, layer, dark=state.is_dark()),
@@ -147,7 +147,7 @@ def show_maps(
                         config=BARE,
                         selection_mode="points",
                         on_select=lambda key=f"map_{layer}": take_click(key, grown),
-                        alt=f"{figures.LAYERS[layer].title}, for every minimum support and "
+                        alt=f"{figures.STYLES[layer].title}, for every minimum support and "
                         "minimum confidence",
                     )
     st.caption(
@@ -173,7 +173,7 @@ def show_surfaces(
     point = here(grown, thresholds, dimension)
     for column, layer in zip(st.columns(2), layers, strict=True):
         with column:
-            st.markdown(f"**{figures.LAYERS[layer].title}**")
+            st.markdown(f"**{figures.STYLES[layer].title}**")
             figure = figures.surface(
                 landscape,
                 layer,
@@ -190,7 +190,7 @@ def show_surfaces(
                 figure,
                 key=f"surface_{layer}",
                 config={"displaylogo": False},
-                alt=f"{figures.LAYERS[layer].title} as a surface",
+                alt=f"{figures.STYLES[layer].title} as a surface",
             )
     st.caption("Drag to turn." + (" The dot marks the present thresholds." if marked else ""))
 

@@ -43,10 +43,11 @@ from sarl_core.explaining.steps import (
 from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 
-SIZE, QUALITY = "Rules and length", "Coverage and fidelity"
+SIZE, QUALITY, HELD_OUT = "Rules and length", "Coverage and fidelity", "Held out"
 LAYERS: dict[str, tuple[figures.Layer, figures.Layer]] = {
     SIZE: ("rule_count", "mean_length"),
     QUALITY: ("coverage", "fidelity"),
+    HELD_OUT: ("fidelity", "held_out_fidelity"),
 }
 FINE, PAPER = "Fine grid", "Paper's grid"
 WHOLE = "All actions"
@@ -225,6 +226,12 @@ def metrics(point: Landscape) -> None:
             share_text(float(point.fidelity[0, 0]), decimals=1),
             help="Share of those in which the expert did what the rule says",
         )
+        if point.held_out_fidelity is not None:
+            st.metric(
+                "Held-out fidelity",
+                share_text(float(point.held_out_fidelity[0, 0]), decimals=1),
+                help="The same on the episodes held out, which no rule was mined from",
+            )
 
 
 def more() -> None:
@@ -274,7 +281,7 @@ def chosen_dimension() -> int | None:
 
 
 def switch(label: str, key: str, options: list[str], hint: str) -> str:
-    """A choice between two ways to look."""
+    """A choice between a few ways to look."""
     return (
         st.segmented_control(
             label,
@@ -304,7 +311,8 @@ st.caption(
 )
 top = st.container()
 with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
-    shown = switch("Show", "layer", [SIZE, QUALITY], "What the two figures show")
+    pairs = [SIZE, QUALITY] if state.held_out() is None else [SIZE, QUALITY, HELD_OUT]
+    shown = switch("Show", "layer", pairs, "What the two figures show")
     view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
     axes = switch(
         "Grid",

@@ -18,7 +18,7 @@ from sarl_core.explaining.language import number_text
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.landscape import Landscape
 
-Layer = Literal["rule_count", "mean_length", "coverage", "fidelity"]
+Layer = Literal["rule_count", "mean_length", "coverage", "fidelity", "held_out_fidelity"]
 Floats = NDArray[np.float64]
 
 
@@ -43,6 +43,11 @@ LAYERS: dict[Layer, LayerStyle] = {
     "coverage": LayerStyle("Coverage: share of states with a rule", share=True),
     "fidelity": LayerStyle("Fidelity: share of those where the rule is right", share=True),
 }
+"""The layers that every landscape has."""
+STYLES: dict[Layer, LayerStyle] = LAYERS | {
+    "held_out_fidelity": LayerStyle("Held-out fidelity: the same on episodes held out", share=True)
+}
+"""Those and what there is only where episodes are held out."""
 
 HEIGHT = 330
 # Fixed, so that a mark laid over the figure stands where it should.
@@ -64,7 +69,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
     Returns:
         Support to the right, confidence upwards.
     """
-    style = LAYERS[layer]
+    style = STYLES[layer]
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     figure = go.Figure()
     bar = {
@@ -95,7 +100,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         xgap=1,
         ygap=1,
         hoverongaps=False,
-        zmin=0 if layer != "fidelity" else None,
+        zmin=_least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0,
         zmax=1 if style.share else None,
     )
     columns, rows = np.meshgrid(
@@ -110,7 +115,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         hovertemplate=(
             "support %{customdata[0]}, confidence %{customdata[1]}<br>"
             "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
-            "coverage %{customdata[4]}, fidelity %{customdata[5]}<extra></extra>"
+            "coverage %{customdata[4]}, fidelity %{customdata[5]}%{customdata[6]}<extra></extra>"
         ),
         showlegend=False,
     )
@@ -182,7 +187,7 @@ def surface(
     Returns:
         To be turned with the mouse.
     """
-    style = LAYERS[layer]
+    style = STYLES[layer]
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     ink = "#c5d0d8" if dark else "#3b4954"
     columns = np.arange(len(landscape.supports))
@@ -198,7 +203,7 @@ def surface(
         hovertemplate=(
             "support %{customdata[0]}, confidence %{customdata[1]}<br>"
             "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
-            "coverage %{customdata[4]}, fidelity %{customdata[5]}<extra></extra>"
+            "coverage %{customdata[4]}, fidelity %{customdata[5]}%{customdata[6]}<extra></extra>"
         ),
     )
     if chosen is not None and np.isfinite(chosen[2]):
@@ -289,8 +294,16 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
     return figure
 
 
+def _least(landscape: Landscape) -> float | None:
+    """Where the colours of both fidelities begin, so that they can be compared; None: anywhere."""
+    if landscape.held_out_fidelity is None:
+        return None
+    both = np.stack([landscape.fidelity, landscape.held_out_fidelity])
+    return float(np.nanmin(both)) if np.isfinite(both).any() else None
+
+
 def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
-    """What is said of each cell: thresholds, rules, length, coverage, fidelity; (S * C, 6)."""
+    """What is said of each cell, from its thresholds to what is held out; (S * C, 7)."""
     supports = [float(value) for value in landscape.supports]
     confidences = [float(value) for value in landscape.confidences]
     rows: list[list[Any]] = []
@@ -299,9 +312,10 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
         landscape.mean_length.tolist(),
         landscape.coverage.tolist(),
         landscape.fidelity.tolist(),
+        _held_out_words(landscape),
         strict=True,
     )
-    for support, (counts, lengths, covered, right) in zip(supports, layers, strict=True):
+    for support, (counts, lengths, covered, right, tried) in zip(supports, layers, strict=True):
         rows += [
             [
                 support,
@@ -310,12 +324,23 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
                 f"{length:.1f}",
                 f"{share:.1%}",
                 f"{truth:.1%}" if truth == truth else "–",
+                other,
             ]
-            for confidence, count, length, share, truth in zip(
-                confidences, counts, lengths, covered, right, strict=True
+            for confidence, count, length, share, truth, other in zip(
+                confidences, counts, lengths, covered, right, tried, strict=True
             )
         ]
     return np.array(rows, dtype=object)
+
+
+def _held_out_words(landscape: Landscape) -> list[list[str]]:
+    """What follows the fidelity of each cell, (S, C)."""
+    if landscape.held_out_fidelity is None:
+        return [[""] * len(landscape.confidences)] * len(landscape.supports)
+    return [
+        [f", held out {value:.1%}" if value == value else ", held out –" for value in row]
+        for row in landscape.held_out_fidelity.tolist()
+    ]
 
 
 def _axis(title: str, grid: Floats, most: int = _TICKS) -> dict[str, Any]:
