@@ -13,6 +13,7 @@ import typer
 from sarl_core.commandline import terminal
 from sarl_core.commandline.demonstration_commands import check, record
 from sarl_core.commandline.difference_commands import diff
+from sarl_core.commandline.export_commands import export
 from sarl_core.commandline.improvement_commands import aggregate
 from sarl_core.commandline.learning_commands import learn
 from sarl_core.commandline.paper_commands import reproduce
@@ -38,6 +39,7 @@ for command in (
     evaluate,
     render,
     report,
+    export,
     aggregate,
     learn,
     train_expert,

@@ -16,6 +16,8 @@ FOLDERS = ("sarl_core", "pages", "tests", "benchmarks")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
 TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
+# The product imports it inside one function, and says what to do where it is missing.
+OPTIONAL = {"onnx"}
 
 
 def python_files() -> list[Path]:
@@ -70,7 +72,7 @@ def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
         for path in python_files()
         if path.relative_to(ROOT).parts[0] not in ("tests", "benchmarks")
     ]
-    assert packages_of(imported(files)) | {"kaleido", "imageio-ffmpeg"} == set(
+    assert packages_of(imported(files)) - OPTIONAL | {"kaleido", "imageio-ffmpeg"} == set(
         pins("requirements.txt")
     )
 

@@ -1,10 +1,20 @@
-"""Rule sets for other programs and for reading: CSV and text, every rule, never cut short."""
+"""Rule sets for other programs and for reading, every rule, never cut short.
+
+CSV and text are written here; the other formats have files of their own and are found from here.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.explaining.export_program import require_rules
 from sarl_core.explaining.language import (
     counted,
     exact_condition,
@@ -12,8 +22,14 @@ from sarl_core.explaining.language import (
     sentence,
     share_text,
 )
+from sarl_core.files import whole_file
+from sarl_core.mining.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Shield
 
+FORMATS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
+"""What a rule set is carried away as: endings of file names."""
 CSV_COLUMNS = (
     "id",
     "dimension",
@@ -31,6 +47,175 @@ CSV_COLUMNS = (
     "origin",
 )
 _FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
+
+
+class Prepared(NamedTuple):
+    """Rules as they are to be carried away.
+
+    Attributes:
+        rule_set: Rounded and merged as was asked.
+        rounding: What became of each threshold; None where none was to be rounded.
+        changed: Demonstrated pairs that the rounded rules decide differently, by the shield's own
+            count; 0 where none was to be rounded.
+    """
+
+    rule_set: RuleSet
+    rounding: Rounding | None = None
+    changed: int = 0
+
+
+def prepare(
+    rule_set: RuleSet, *, merged: bool = False, demonstrations: Demonstrations | None = None
+) -> Prepared:
+    """Round and merge rules, as asked.
+
+    Args:
+        rule_set: To carry away.
+        merged: Whether several conditions on one feature become one interval.
+        demonstrations: Round the thresholds to what changes no decision on these; None for not.
+
+    Returns:
+        The rules, and what rounding did.
+
+    Raises:
+        InputError: If there are no rules, or the demonstrations are for other features or actions.
+    """
+    require_rules(rule_set)
+    rounding, changed = None, 0
+    if demonstrations is not None:
+        rounding = rounded_rules(rule_set, demonstrations)
+        changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)
+        rule_set = rounding.rule_set
+    return Prepared(merged_rules(rule_set) if merged else rule_set, rounding, changed)
+
+
+def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstrations) -> int:
+    """Count the demonstrated pairs that two rule sets decide differently.
+
+    Args:
+        before: Rules.
+        after: As many, in the same order.
+        demonstrations: N states with the actions taken in them.
+
+    Returns:
+        Pairs for which the rule in force or the executed action differs in some dimension.
+
+    Raises:
+        InputError: If the demonstrations have another number of action dimensions.
+    """
+    dimensions = demonstrations.action_columns.shape[1]
+    if dimensions != len(before.actions):
+        raise InputError(
+            f"the rules are for {counted(len(before.actions), 'action dimension')} and the "
+            f"demonstrations have {dimensions}; choose demonstrations of the rules' environment"
+        )
+    one, other = (
+        Shield(rules).decide_batch(demonstrations.observations, demonstrations.action_columns)
+        for rules in (before, after)
+    )
+    differs = (one.rules != other.rules) | (one.executed != other.executed)
+    return int(np.count_nonzero(differs.any(axis=1)))
+
+
+def export_rules(rule_set: RuleSet, suffix: str, projection: Projection = "centre") -> bytes:
+    """A rule set in one of the formats.
+
+    Args:
+        rule_set: To carry away.
+        suffix: One of `FORMATS`.
+        projection: What a continuous action that breaks a rule becomes; for code.
+
+    Returns:
+        The content of the file.
+
+    Raises:
+        InputError: If the format is not known, there are no rules, or code is asked of rules none
+            of which is switched on.
+        WorkError: If a package is missing that the format needs.
+    """
+    require_rules(rule_set)
+    if suffix == ".onnx":
+        from sarl_core.explaining.onnx_export import rules_to_onnx
+
+        return rules_to_onnx(rule_set, projection)
+    # A file may have brought half of a pair that UTF-8 cannot write.
+    return _text(rule_set, suffix, projection).encode("utf-8", errors="replace")
+
+
+def export_vectors(rule_set: RuleSet, projection: Projection = "centre") -> bytes:
+    """Test vectors for a rule set, as CSV.
+
+    Args:
+        rule_set: As it was exported.
+        projection: As it was exported.
+
+    Returns:
+        The content of the file that stands beside the export.
+
+    Raises:
+        InputError: If there are no rules, or none is switched on.
+    """
+    from sarl_core.explaining.test_vectors import make_vectors, vectors_to_csv
+
+    return vectors_to_csv(make_vectors(rule_set, projection)).encode()
+
+
+def vectors_name(name: str) -> str:
+    """What the file of test vectors is called.
+
+    Args:
+        name: Of the exported file.
+
+    Returns:
+        As "shield.c.vectors.csv".
+    """
+    return f"{name}.vectors.csv"
+
+
+def save_export(rule_set: RuleSet, path: Path, projection: Projection = "centre") -> Path:
+    """Write a rule set in the format that the file's name ends in, and its test vectors beside it.
+
+    Args:
+        rule_set: To carry away.
+        path: Ends in one of `FORMATS`.
+        projection: What a continuous action that breaks a rule becomes.
+
+    Returns:
+        Where the test vectors are.
+
+    Raises:
+        InputError: As `export_rules`, or if the folder does not exist.
+        WorkError: If it cannot be written to, or a package is missing.
+    """
+    content = export_rules(rule_set, path.suffix.lower(), projection)
+    vectors = export_vectors(rule_set, projection)
+    beside = path.with_name(vectors_name(path.name))
+    for place, data in ((beside, vectors), (path, content)):
+        with whole_file(place) as unfinished:
+            unfinished.write_bytes(data)
+    return beside
+
+
+def _text(rule_set: RuleSet, suffix: str, projection: Projection) -> str:
+    if suffix == ".json":
+        from sarl_core.mining.rule_files import rules_to_json
+
+        return rules_to_json(rule_set)
+    if suffix == ".csv":
+        return rules_to_csv(rule_set)
+    if suffix == ".md":
+        from sarl_core.explaining.markdown import rules_to_markdown
+
+        return rules_to_markdown(rule_set)
+    if suffix == ".py":
+        from sarl_core.explaining.code_python import rules_to_python
+
+        return rules_to_python(rule_set, projection)
+    if suffix == ".c":
+        from sarl_core.explaining.code_c import rules_to_c
+
+        return rules_to_c(rule_set, projection)
+    raise InputError(f"the format {suffix!r} is none of {', '.join(FORMATS)}; choose one of them")
 
 
 def rules_to_csv(rule_set: RuleSet) -> str:
@@ -81,21 +266,11 @@ def rules_to_text(rule_set: RuleSet) -> str:
         What it was mined from and how, then every rule as a numbered sentence, by action
         dimension, the most general first.
     """
-    source, thresholds = rule_set.source, rule_set.thresholds
-    limits = [
-        f"support at least {thresholds.support:g}",
-        f"confidence at least {thresholds.confidence:g}",
-    ]
-    if thresholds.lift:
-        limits.append(f"lift at least {thresholds.lift:g}")
-    if thresholds.max_depth is not None:
-        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
-    if any(dimension.is_interval for dimension in rule_set.actions):
-        limits.append(f"divider {rule_set.divider}")
+    source = rule_set.source
     lines = [
         f"Rules for {source.env_id or 'an unnamed environment'}",
         f"Mined from {counted(source.steps, 'step')} in "
-        f"{counted(source.episodes, 'episode')}: {', '.join(limits)}.",
+        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}.",
         f"{counted(rule_set.rule_count, 'rule')}, {rule_set.mean_length:.2f} conditions on "
         f"average; they cover {share_text(rule_set.coverage)} of the states and are right in "
         f"{share_text(rule_set.fidelity)} of those.",
@@ -108,6 +283,31 @@ def rules_to_text(rule_set: RuleSet) -> str:
             f"{number:>4}. {sentence(rule, rule_set)}" for number, rule in enumerate(rules, start=1)
         ]
     return "\n".join(lines) + "\n"
+
+
+def limits_text(rule_set: RuleSet) -> str:
+    """The thresholds that a rule set was mined at.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "support at least 0.005, confidence at least 0.95".
+    """
+    thresholds = rule_set.thresholds
+    limits = [
+        f"support at least {thresholds.support:g}",
+        f"confidence at least {thresholds.confidence:g}",
+    ]
+    if rule_set.cut == "leaves":
+        limits = ["every leaf of the tree"]
+    if thresholds.lift:
+        limits.append(f"lift at least {thresholds.lift:g}")
+    if thresholds.max_depth is not None:
+        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
+    if any(dimension.is_interval for dimension in rule_set.actions):
+        limits.append(f"divider {rule_set.divider}")
+    return ", ".join(limits)
 
 
 def _cell(text: str) -> str:

@@ -1,0 +1,259 @@
+"""A rule set in the form that code is written from: what is asked in which order, and what follows.
+
+It does what a `Shield` does, with float32 states and, where actions are continuous, float32
+actions: those that environments give and take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from sarl_core.errors import InputError
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.tree import LEAF
+from sarl_core.shielding.projection import Projection, replacements
+
+# Nested deeper than this, code goes on in a function of its own: Python ends at a hundred levels.
+_MOST_LEVELS = 20
+
+
+class Outcome(NamedTuple):
+    """What a rule makes of a proposed action.
+
+    An action carries the rule's label if it is neither below `low` nor above `high`; it is kept.
+
+    Attributes:
+        value: What any other action becomes, a whole number or a float32 one; None for the
+            nearest in [low, high].
+        low: Least action that carries the rule's label.
+        high: Largest such action.
+        open_low: Whether all actions below carry it too.
+        open_high: Whether all actions above carry it too, and what is no number.
+    """
+
+    value: float | None
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+
+
+class Order(NamedTuple):
+    """How the rule of one action dimension is found.
+
+    Attributes:
+        dimension: The action dimension.
+        scanned: Rules that are tried one by one, first; each with its index.
+        nodes: The tree that is walked where none of them applies, root first.
+    """
+
+    dimension: LabelledDimension
+    scanned: tuple[Numbered, ...]
+    nodes: tuple[RuleNode, ...]
+
+    @property
+    def asks(self) -> bool:
+        """Whether anything is asked of the state."""
+        return len(self.nodes) > 1 or any(rule.conditions for _, rule in self.scanned)
+
+
+@dataclass(frozen=True)
+class Program:
+    """All that code needs to know.
+
+    Attributes:
+        rule_set: Where it comes from.
+        projection: What a continuous action that breaks a rule becomes.
+        orders: One an action dimension.
+        outcomes: One a rule, in the order of the rule set.
+    """
+
+    rule_set: RuleSet
+    projection: Projection
+    orders: tuple[Order, ...]
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def continuous(self) -> bool:
+        """Whether the actions are numbers from intervals."""
+        return self.orders[0].dimension.is_interval
+
+
+class Step(NamedTuple):
+    """One line of nested code.
+
+    Attributes:
+        level: How deep it is nested.
+        kind: A query, its other side, its end, the rule that applies, or the part that goes on.
+        feature: Of a query.
+        threshold: Of a query.
+        target: Index of the rule or `NO_RULE`; number of the part.
+    """
+
+    level: int
+    kind: Literal["if", "else", "end", "rule", "part"]
+    feature: int = LEAF
+    threshold: float = 0.0
+    target: int = NO_RULE
+
+
+def require_rules(rule_set: RuleSet) -> None:
+    """Refuse a rule set without rules.
+
+    Args:
+        rule_set: To carry away.
+
+    Raises:
+        InputError: If there is nothing in it.
+    """
+    if not rule_set.rules:
+        raise InputError(
+            "the rule set has no rules, so there is nothing to export; lower the minimum support "
+            "or confidence, or choose other rules"
+        )
+
+
+def program_of(rule_set: RuleSet, projection: Projection = "centre") -> Program:
+    """Arrange rules for writing code.
+
+    Args:
+        rule_set: The rules; those switched off are left out, and keep their index.
+        projection: What a continuous action that breaks a rule becomes.
+
+    Returns:
+        Placed rules first, the others as a tree.
+
+    Raises:
+        InputError: If no rule is there or switched on, or ``expert`` is asked of rules without
+            demonstrated values.
+    """
+    require_rules(rule_set)
+    if not any(rule.enabled for rule in rule_set.rules):
+        raise InputError(
+            "every rule of the rule set is switched off, so there is nothing to export; switch "
+            "one on"
+        )
+    return Program(
+        rule_set,
+        projection,
+        tuple(_order(rule_set, index) for index in range(len(rule_set.actions))),
+        _outcomes(rule_set, projection),
+    )
+
+
+def parts_of(nodes: tuple[RuleNode, ...]) -> list[list[Step]]:
+    """A tree as nested queries, in parts that are not nested too deep.
+
+    Args:
+        nodes: Root first.
+
+    Returns:
+        The part with the root first; a part goes on only in parts after it.
+    """
+    roots, parts = [0], []
+    for root in roots:  # grows on the way
+        steps: list[Step] = []
+        waiting: list[tuple[Literal["node", "else", "end"], int, int]] = [("node", root, 0)]
+        while waiting:
+            kind, place, level = waiting.pop()
+            if kind != "node":
+                steps.append(Step(level, kind))
+                continue
+            node = nodes[place]
+            if node.feature == LEAF:
+                steps.append(Step(level, "rule", target=node.rule))
+            elif level == _MOST_LEVELS:
+                steps.append(Step(level, "part", target=len(roots)))
+                roots.append(place)
+            else:
+                steps.append(Step(level, "if", node.feature, node.threshold))
+                waiting += [
+                    ("end", place, level),
+                    ("node", node.right, level + 1),
+                    ("else", place, level),
+                    ("node", node.left, level + 1),
+                ]
+        parts.append(steps)
+    return parts
+
+
+def largest_float32(number: float) -> np.float32:
+    """The largest float32 number that is at most a number.
+
+    It divides float32 values exactly as the number does: all that are at most the one are at most
+    the other.
+
+    Args:
+        number: A threshold.
+
+    Returns:
+        -inf below all finite ones.
+    """
+    with np.errstate(over="ignore"):
+        nearest = np.float32(number)
+    lower = np.float32(-np.inf)
+    return np.nextafter(nearest, lower) if float(nearest) > number else nearest
+
+
+def one_line(text: str, *, most: int = 120) -> str:
+    """Text from outside for a comment in code: one line, nothing invisible.
+
+    Args:
+        text: A name, a unit or a label, which may come from a file.
+        most: Longest to be shown in full.
+
+    Returns:
+        The text, with a space for every sign that cannot be seen.
+    """
+    seen = "".join(sign if sign.isprintable() else " " for sign in text[: most + 1])
+    return seen if len(seen) <= most else f"{seen[:most]}..."
+
+
+def _order(rule_set: RuleSet, index: int) -> Order:
+    """As the shield arranges them: placed rules in their order, then the tree of the others."""
+    rules = [
+        (place, rule)
+        for place, rule in enumerate(rule_set.rules)
+        if rule.dimension == index and rule.enabled
+    ]
+    placed = [entry for entry in rules if entry[1].placed]
+    others = [entry for entry in rules if not entry[1].placed]
+    nodes = tree_of(others)
+    if nodes is None:
+        placed, nodes = [*placed, *others], [NOTHING]
+    return Order(rule_set.actions[index], tuple(placed), tuple(nodes))
+
+
+def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Outcome, ...]:
+    found = replacements(rule_set, projection)
+    settled = np.clip(found.target, found.low, found.high)
+    return tuple(
+        _outcome(rule, rule_set.actions[rule.dimension], value, low, high)
+        for rule, value, low, high in zip(
+            rule_set.rules,
+            settled.tolist(),
+            found.low.tolist(),
+            found.high.tolist(),
+            strict=True,
+        )
+    )
+
+
+def _outcome(
+    rule: Rule, dimension: LabelledDimension, value: float, low: float, high: float
+) -> Outcome:
+    if not dimension.is_interval:
+        action = rule.action + dimension.first  # not through floating point: it may be large
+        return Outcome(action, action, action, open_low=False, open_high=False)
+    return Outcome(
+        None if np.isnan(value) else float(np.float32(value)),
+        low,
+        high,
+        open_low=rule.action == 0,
+        open_high=rule.action == dimension.n_labels - 1,
+    )

@@ -1,0 +1,111 @@
+"""Rules as a Markdown document: a table an action, thresholds with every digit they have."""
+
+from __future__ import annotations
+
+import math
+import re
+from html import escape
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.export_program import one_line
+from sarl_core.explaining.language import action_text, counted, share_text, threshold_text
+from sarl_core.mining.rules import Bounds, Rule, RuleSet
+
+_SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
+_ORDINARY = re.compile(r"[A-Za-z0-9 ,;.+/²³°%-]*")
+
+
+def rules_to_markdown(rule_set: RuleSet) -> str:
+    """A rule set as Markdown.
+
+    Args:
+        rule_set: Any number of rules.
+
+    Returns:
+        What it was mined from and how, then a table for each action dimension, the rules that
+        apply most often first. Every name is escaped.
+    """
+    from sarl_core.explaining.exports import limits_text
+
+    source = rule_set.source
+    lines = [
+        f"# Rules for {markdown_text(source.env_id) or 'an unnamed environment'}",
+        "",
+        f"{counted(rule_set.rule_count, 'rule')}, mined from {counted(source.steps, 'step')} in "
+        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. They cover "
+        f"{share_text(rule_set.coverage)} of the states and are right in "
+        f"{share_text(rule_set.fidelity)} of those.",
+        "",
+        "They were learned from examples and guarantee nothing.",
+    ]
+    held_out = any(rule.held_out is not None for rule in rule_set.rules)
+    headings = ["Rule", "If", "Then", "The expert did so in", "States"]
+    headings += ["Held out"] if held_out else []
+    for index, dimension in enumerate(rule_set.actions):
+        rules = sorted(
+            rule_set.of_dimension(index), key=lambda rule: (not rule.placed, -rule.samples)
+        )
+        lines += [
+            "",
+            f"## {markdown_text(dimension.name)}: {counted(len(rules), 'rule')}",
+            "",
+            f"| {' | '.join(headings)} |",
+            "|" + " --- |" * len(headings),
+        ]
+        lines += [f"| {' | '.join(_cells(rule, rule_set, held_out=held_out))} |" for rule in rules]
+    if any(rule.placed for rule in rule_set.rules):
+        lines += ["", "Rules written by hand or pinned come before the others, in their order."]
+    return "\n".join(lines) + "\n"
+
+
+def markdown_text(text: str) -> str:
+    """Text from outside that Markdown, and the HTML in it, leave alone.
+
+    Args:
+        text: A name, a unit or a label, which may come from a file.
+
+    Returns:
+        One line.
+    """
+    seen = one_line(text)
+    if _ORDINARY.fullmatch(seen):
+        return seen
+    return escape(_SIGNS.sub(r"\\\1", seen), quote=False)
+
+
+def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
+    features = rule_set.source.features
+    asked = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    action = markdown_text(action_text(rule.action, rule_set.actions[rule.dimension]))
+    name = markdown_text(rule.id)
+    if rule.origin == "manual":
+        name += ", by hand"
+    elif rule.pinned:
+        name += ", pinned"
+    cells = [
+        f"{name}{'' if rule.enabled else ', off'}",
+        " and ".join(asked) or "always",
+        action,
+        share_text(rule.confidence) if rule.samples else "–",
+        f"{rule.samples:,}",
+    ]
+    if held_out:
+        found = rule.held_out
+        cells.append(
+            f"{share_text(found.correct / found.samples)} of {found.samples:,}"
+            if found is not None and found.samples
+            else "–"
+        )
+    return cells
+
+
+def _interval(bounds: Bounds, feature: Feature) -> str:
+    """What is asked of one feature, with every digit."""
+    name = markdown_text(feature.name)
+    unit = f" {markdown_text(feature.unit)}" if feature.unit else ""
+    if math.isinf(bounds.low):
+        return f"{name} ≤ {threshold_text(bounds.high)}{unit}"
+    if math.isinf(bounds.high):
+        return f"{name} &gt; {threshold_text(bounds.low)}{unit}"
+    low, high = threshold_text(bounds.low), threshold_text(bounds.high)
+    return f"{low} &lt; {name} ≤ {high}{unit}"
