@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks import data
 from benchmarks.measure import Row, duration, side_by_side
 from sarl_core import Shield, ShieldedEnv
+from sarl_core.mining.envelope import with_boxes
 
 
 class Still(gymnasium.Env[Any, Any]):
@@ -33,7 +34,8 @@ class Still(gymnasium.Env[Any, Any]):
 
 def decision(quick: bool) -> Iterable[Row]:
     """One decision with its record, against one prediction of the same policy."""
-    model, shield = data.same_in_sb3(), Shield(data.rules())
+    rules = with_boxes(data.rules(), data.demonstrations())
+    model, shield = data.same_in_sb3(), Shield(rules)
     states = data.demonstrations().observations[:: 15 if quick else 5]
     actions = np.random.default_rng(0).integers(0, 4, len(states))
     bare = Still(states[0])
@@ -65,7 +67,7 @@ def decision(quick: bool) -> Iterable[Row]:
         "share",
         one / other,
         0.03,
-        f"{duration(one)} against {duration(other)}; {len(data.rules()):,} rules",
+        f"{duration(one)} against {duration(other)}; {len(rules):,} rules",
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.mining.rules import RuleSet
-from sarl_core.shielding.boxes import Boxes
+from sarl_core.shielding.boxes import Boxes, leaves_out
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements
 
@@ -125,6 +125,7 @@ class Shield:
         self._label_list: list[int] = self._labels.tolist()
         self._replace = replacements(rule_set, projection)
         self._boxes = Boxes(rule_set.rules, self._n_features)
+        self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
         self._single = len(self._actions) == 1 and not self._actions[0].is_interval
         self._first = self._actions[0].first
@@ -152,7 +153,8 @@ class Shield:
             wanted = self._label_list[rule] + self._first
             if action == wanted:
                 return Decision(action, action, (rule,), False, margin)
-            outside = self._boxes.leaves_out(rule, state)
+            sides = self._sides[rule]
+            outside = sides is not None and leaves_out(sides, state)
             if outside and self._abstains:
                 return Decision(action, action, (rule,), False, margin, True)
             return Decision(_like(action, wanted), action, (rule,), True, margin, outside)
@@ -173,7 +175,8 @@ class Shield:
                 continue
             value = flat[dimension]
             if self._actions[dimension].label_of(float(value)) != self._label_list[rule]:
-                if self._boxes.leaves_out(rule, state):
+                sides = self._sides[rule]
+                if sides is not None and leaves_out(sides, state):
                     outside = True
                     if self._abstains:
                         continue
