@@ -141,6 +141,17 @@ def test_a_damaged_study_is_one_sentence(
     assert "version 7" in sentence
 
 
+def test_what_is_committed_can_be_shown() -> None:
+    plans = list(learning.STUDIES.glob("*/plan.json"))
+    assert plans
+    for plan in plans:
+        study = load_study(plan.parent)
+        assert study.complete
+        assert len(study.seeds) >= 3
+        for name in ("outcome", "curves", "afterwards"):
+            assert (plan.parent / f"{name}.png").is_file()
+
+
 # --- a study of one's own -----------------------------------------------------------------------
 
 

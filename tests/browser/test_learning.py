@@ -60,3 +60,12 @@ def test_curves_grow_while_agents_learn_and_nothing_is_left_when_the_visitor_goe
     no_trace(screen)
     screen.context.close()  # the visitor goes without a word
     wait_until(0)
+
+
+def test_the_shipped_study_is_shown(screen: Page) -> None:
+    visit(screen, "/learning?data=lunar_lander", "Learning")
+    expect(screen.locator(".js-plotly-plot").first).to_be_visible()
+    expect(screen.get_by_text("LunarLander-v3, 3,274 rules")).to_be_visible()
+    screen.get_by_role("tab", name="All numbers").click()
+    expect(screen.get_by_test_id("stDataFrame")).to_be_visible()
+    no_trace(screen)
