@@ -1,4 +1,4 @@
-"""What came of a replay: its numbers, its steps one by one, and how it compares over episodes."""
+"""What came of a replay: its numbers, and its steps one by one."""
 
 from __future__ import annotations
 
@@ -7,33 +7,31 @@ from collections.abc import Callable
 
 import numpy as np
 import streamlit as st
+from _fork_view import fork_section
+from _recorder import flight_recorder
 from _replays import (
     ALONE,
-    EPISODES,
     WITH,
     WITHOUT,
     Order,
     Replay,
-    compare,
-    kept_comparisons,
-    with_progress,
 )
 from _words import escaped
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
-from sarl_core.explaining.language import label_text, share_text
+from sarl_core.explaining.language import counted, label_text, share_text
+from sarl_core.explaining.lit_path import lit_paths_html
 from sarl_core.explaining.replay import StepView, margin_text, step_texts, step_view, tracks
 from sarl_core.explaining.replay_figures import (
     SHIELDED_COLOUR,
     UNSHIELDED_COLOUR,
     ReturnLine,
-    ReturnRow,
-    comparison_figure,
     intervention_strip,
     return_figure,
 )
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.rollouts.statistics import summarise
+from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.flips import pace_of
 
 PLAIN = {"displayModeBar": False}
 FEW = 0.3  # share of the steps below which the rules say little about an episode
@@ -136,13 +134,16 @@ def go_to(step: int) -> None:
 
 
 @st.fragment
-def step_by_step(replay: Replay, *, linked: str | None) -> None:
+def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
     """The strip, the slider, and everything about the step it stands at.
 
     Args:
         replay: To show.
+        order: Asked for it.
         linked: The set under which its rules are found on the Rules page; None if they are not.
     """
+    if "_elsewhere" in st.session_state:
+        st.rerun()  # as a whole: another episode was chosen in the table
     st.subheader("Step by step")
     steps, shielded = replay.shown.steps, replay.shielded is not None
     last = len(steps) - 1
@@ -184,7 +185,9 @@ def step_by_step(replay: Replay, *, linked: str | None) -> None:
                 disabled=not len(after),
                 key="next",
             )
-            st.caption(f"{len(changes):,} of {len(steps):,} steps were changed.")
+            st.caption(
+                f"{len(changes):,} of {len(steps):,} steps were changed. {flips_text(replay.shown)}"
+            )
     strip.plotly_chart(
         intervention_strip(
             tracks(steps, replay.dimensions, shielded=shielded),
@@ -220,6 +223,26 @@ def step_by_step(replay: Replay, *, linked: str | None) -> None:
         )
     with words:
         describe(view, shielded=shielded, linked=linked)
+        if replay.finder is not None:
+            tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
+            for action, table in zip(view.actions, tables, strict=True):
+                many = len(tables) > 1
+                st.html(f"<b>{html.escape(action.dimension)}</b>{table}" if many else table)
+    if shielded:
+        fork_section(replay, order, current)
+    flight_recorder(replay, order, current)
+
+
+def flips_text(episodes: Episodes) -> str:
+    """How often the shield switched on and off in some episodes, as a sentence."""
+    flips = int(episodes.flips.sum()) if episodes.flips is not None else 0
+    pace = pace_of(episodes.env_id)
+    rate = pace.rate(flips, int(episodes.lengths.sum()))
+    return (
+        f"The shield switched on or off {counted(flips, 'time')}: {rate:.2g} flips a {pace.unit}."
+        if flips
+        else "The shield never switched on or off."
+    )
 
 
 def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
@@ -265,58 +288,4 @@ def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
         },
         hide_index=True,
         height="content" if len(view.state) <= 12 else 400,
-    )
-
-
-def comparison(order: Order) -> None:
-    """Several episodes instead of one, on request."""
-    st.subheader(f"Over {EPISODES} episodes")
-    key = order.request
-    runs = kept_comparisons().get(key)
-    if runs is None:
-        st.caption("One episode may be luck. Run more of them, each on a seed of its own.")
-        if st.button(
-            f"Run {EPISODES} episodes", key="compare", icon=":material/stacked_bar_chart:"
-        ):
-            runs = with_progress(lambda tell: compare(order, tell))
-            if runs is not None:
-                kept_comparisons().put(key, runs)
-                st.rerun()
-        return
-    rows, table = [], []
-    for name, episodes in runs:
-        interval = summarise(episodes.returns)
-        rows.append(
-            ReturnRow(
-                name,
-                episodes.returns,
-                interval.iqm,
-                interval.low,
-                interval.high,
-                SHIELDED_COLOUR if name == WITH else UNSHIELDED_COLOUR,
-            )
-        )
-        steps = float(episodes.lengths.sum())
-        table.append(
-            {
-                "Run": name.capitalize(),
-                "Mean return": f"{interval.mean:,.1f}",
-                "Typical return": f"{interval.iqm:,.1f}",
-                "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
-                "Mean length": f"{episodes.lengths.mean():,.1f}",
-                "Changed": share_text(float(episodes.interventions.sum()) / steps)
-                if name == WITH
-                else "–",
-            }
-        )
-    st.plotly_chart(
-        comparison_figure(rows),
-        config=PLAIN,
-        key="comparison",
-        alt="Returns of the episodes with the rules and without",
-    )
-    st.dataframe(table, hide_index=True)
-    st.caption(
-        "A point is an episode. The diamond is the typical return, the mean of the middle "
-        "half of the episodes, which a few odd ones do not move, with its 95 % interval."
     )

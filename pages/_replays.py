@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,18 +22,20 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.language import sentence
+from sarl_core.explaining.lit_path import PathFinder
 from sarl_core.explaining.replay import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.forking import Fork, Rest, fork
 from sarl_core.rollouts.rendering import Replay as Film
 from sarl_core.rollouts.rendering import render_episode, side_by_side
 from sarl_core.shielding.shield import Projection, Shield
 
-EPISODES = 20
+EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
-KEPT_REPLAYS, KEPT_COMPARISONS = 6, 24
+KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
 
 Told = Callable[[float, str], None]
 
@@ -54,6 +57,7 @@ class Request:
 class Replay:
     """One episode without the rules and, where there are any, one with them."""
 
+    key: Request
     film: Film
     rule_set: RuleSet | None
     dimensions: tuple[LabelledDimension, ...]
@@ -74,6 +78,11 @@ class Replay:
         """The episode that is gone through step by step."""
         return self.film.episodes[0]
 
+    @cached_property
+    def finder(self) -> PathFinder | None:
+        """Follows a state through the rules; None without rules."""
+        return None if self.rule_set is None else PathFinder(self.rule_set)
+
 
 @st.cache_resource
 def kept_replays() -> Kept:
@@ -83,8 +92,14 @@ def kept_replays() -> Kept:
 
 @st.cache_resource
 def kept_comparisons() -> Kept:
-    """Comparisons by their request."""
+    """Comparisons by their request and number of episodes."""
     return Kept(KEPT_COMPARISONS)
+
+
+@st.cache_resource
+def kept_forks() -> Kept:
+    """Forks by the request, the step, and what the shield does after it."""
+    return Kept(KEPT_FORKS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +116,32 @@ class Order:
         if self.rule_set is None:
             return None
         return Shield(self.rule_set, projection=self.request.projection)
+
+    def of_seed(self, seed: int) -> Order:
+        """The same agent and rules on another seed, as in a comparison over several."""
+        request = self.request
+        # Fresh weights depend on a seed too: those of the first episode act in all.
+        made_for = f" made for {request.seed}" if request.agent == "untrained" else ""
+        told = request.agent_digest + (made_for if seed != request.seed else "")
+        return replace(self, request=replace(request, seed=seed, agent_digest=told))
+
+
+def compared(order: Order) -> tuple[Order, int] | None:
+    """The comparison that the visitor ran last, if an order is one of its episodes.
+
+    Args:
+        order: Of the episode on screen.
+
+    Returns:
+        Its own order and number of episodes, or None.
+    """
+    latest: tuple[Order, int] | None = st.session_state.get("_compared")
+    if latest is None:
+        return None
+    first, episodes = latest
+    number = order.request.seed - first.request.seed
+    inside = 0 <= number < episodes
+    return latest if inside and first.of_seed(order.request.seed).request == order.request else None
 
 
 # --- running -----------------------------------------------------------------------------------
@@ -137,6 +178,7 @@ def run(order: Order, tell: Told) -> Replay:
     film.gif(progress=encoding)
     description = describe_environment(request.env_id)
     return Replay(
+        key=request,
         film=film,
         rule_set=rule_set,
         dimensions=environment_dimensions(description, rule_set),
@@ -147,8 +189,13 @@ def run(order: Order, tell: Told) -> Replay:
     )
 
 
-def compare(order: Order, tell: Told) -> tuple[tuple[str, Episodes], ...]:
-    """Run several episodes with the rules and without.
+def compare(order: Order, episodes: int, tell: Told) -> tuple[tuple[str, Episodes], ...]:
+    """Run several episodes with the rules and without; of the first run the steps are kept.
+
+    Args:
+        order: Of the first of them.
+        episodes: How many.
+        tell: How far it is.
 
     Raises:
         SarlError: If they cannot be run.
@@ -168,14 +215,52 @@ def compare(order: Order, tell: Told) -> tuple[tuple[str, Episodes], ...]:
                     order.request.env_id,
                     agent,
                     shield=guard,
-                    episodes=EPISODES,
+                    episodes=episodes,
                     seed=order.request.seed,
-                    keep_steps=False,
+                    keep_steps=part == 0,
                     progress=told,
                 ),
             )
         )
     return tuple(runs)
+
+
+def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
+    """Run the episode with what the shield changed at a step, and without it, and draw both.
+
+    Args:
+        order: Of the episode; it has rules.
+        step: At which the change is withheld.
+        rest: What the shield does after it.
+        tell: How far it is.
+
+    Raises:
+        SarlError: If it cannot be run.
+    """
+    request, shield, rule_set = order.request, order.shield, order.rule_set
+    assert shield is not None
+    assert rule_set is not None
+    tell(0.0, "Making the agent …")
+    agent = order.agent()
+
+    def playing(done: int, total: int) -> None:
+        tell(0.7 * done / total, "Playing both and drawing them …")
+
+    def encoding(done: int, total: int) -> None:
+        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
+
+    found = fork(
+        request.env_id,
+        agent,
+        shield,
+        step=step,
+        rest=rest,
+        seed=request.seed,
+        describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
+        progress=playing,
+    )
+    found.gif(progress=encoding)
+    return found
 
 
 def movie(replay: Replay) -> bytes:

@@ -26,10 +26,12 @@ from _choices import (
 )
 from _compact import THRESHOLDS
 from _edits import offered as edits_offered
-from _replay_view import comparison, numbers, step_by_step
+from _over_view import comparison
+from _replay_view import numbers, step_by_step
 from _replays import (
     Order,
     Request,
+    compared,
     kept_replays,
     movie,
     refuse,
@@ -152,11 +154,18 @@ st.caption(
     "breaks a rule is replaced before it is executed. The rules are learned from "
     "demonstrations: they guarantee nothing."
 )
+elsewhere: Order | None = None
+if (chosen := st.session_state.pop("_elsewhere", None)) is not None:
+    # A step of another episode was chosen in the flight recorder: go there.
+    latest = compared(st.session_state["_replay"])
+    if latest is not None:
+        elsewhere = latest[0].of_seed(chosen[0])
+        st.session_state["seed"], st.session_state["step"] = chosen
 order_now = settings()
 started = st.button("Run", type="primary", icon=":material/play_arrow:", key="run")
-if started or st.session_state.pop("_run", False):
+if elsewhere is not None or started or st.session_state.pop("_run", False):
     try:
-        ordered = order_now()
+        ordered = elsewhere or order_now()
     except SarlError as error:
         refuse(error)
     else:
@@ -221,5 +230,5 @@ with st.container(horizontal=True):
     )
 # Which set the Rules page has to show, to show a rule of this replay.
 SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
-step_by_step(replayed, linked=SHOWN_AS.get(asked.rules))
+step_by_step(replayed, shown, linked=SHOWN_AS.get(asked.rules))
 comparison(shown)

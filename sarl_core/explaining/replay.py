@@ -162,8 +162,8 @@ def step_view(
         views.append(
             ActionView(
                 dimension=dimension.name,
-                proposed=_in_words(float(proposed), dimension),
-                executed=_in_words(float(executed), dimension),
+                proposed=value_text(float(proposed), dimension),
+                executed=value_text(float(executed), dimension),
                 proposed_label=dimension.label_of(float(proposed)),
                 executed_label=dimension.label_of(float(executed)),
                 changed=bool(proposed != executed),
@@ -207,9 +207,9 @@ def step_texts(
             strict=True,
         )
         for line, (proposed, executed, rule) in zip(lines, pairs, strict=True):
-            done = plain(_in_words(executed, dimension))
+            done = plain(value_text(executed, dimension))
             if proposed != executed:
-                wanted = plain(_in_words(proposed, dimension))
+                wanted = plain(value_text(proposed, dimension))
                 line.append(f"{prefix}wanted {wanted}, done {done}")
             else:
                 line.append(f"{prefix}{done}")
@@ -238,7 +238,16 @@ def margin_text(margin: float) -> str:
     )
 
 
-def _in_words(value: float, dimension: LabelledDimension) -> str:
+def value_text(value: float, dimension: LabelledDimension) -> str:
+    """A recorded action in words.
+
+    Args:
+        value: What was proposed or executed in one dimension.
+        dimension: That dimension.
+
+    Returns:
+        As "push right" or "torque -1.2".
+    """
     if dimension.is_interval:
         return f"{dimension.name} {number_text(value)}"
     label = dimension.label_of(value)
