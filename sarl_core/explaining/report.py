@@ -263,14 +263,14 @@ def _capital(text: str) -> str:
 # --- numbers -----------------------------------------------------------------------------------
 
 
-def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str, str], ...]:
+def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...]:
     followed = counts.followed
     merged = sum(rule.merged_length for rule in rule_set.rules) / max(len(rule_set), 1)
     return (
-        (f"{len(rule_set):,}", "rules" if len(rule_set) != 1 else "rule", "in the set"),
-        (f"{merged:.1f}", "features a rule asks about", "on average"),
-        (share_text(counts.coverage), "covered", "of the demonstrated states have a rule"),
-        (share_text(followed.value), "as the expert", "did, of the states with a rule"),
+        (f"{len(rule_set):,}", "rule" if len(rule_set) == 1 else "rules"),
+        (f"{merged:.1f}", "conditions a rule, on average"),
+        (share_text(counts.coverage), "of the demonstrated states have a rule"),
+        (share_text(followed.value), "of these show what the rule says"),
     )
 
 

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from sarl_core.errors import InputError
-from sarl_core.explaining.colours import LABEL_COLOURS
 from sarl_core.explaining.language import number_text, share_text
-from sarl_core.explaining.report_svg import Scale, dot_and_interval, muted
+from sarl_core.explaining.report_svg import MUTED, NEUTRAL, Scale, dot_and_interval
 from sarl_core.rollouts.comparison import Comparison, comparison_row
 
 _MAX_BYTES = 16 * 2**20
@@ -286,7 +285,7 @@ def _row(one: Result, scale: Scale) -> Row:
     def told(value: float | None) -> str:
         return "–" if value is None else share_text(value)
 
-    colour = muted() if one.changed is None else LABEL_COLOURS[0]
+    colour = MUTED if one.changed is None else NEUTRAL
     return Row(
         name=one.name,
         picture=dot_and_interval(scale, one.iqm, one.low, one.high, colour=colour, zero=True),

@@ -8,10 +8,10 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.distributions import episode_series, feature_rows
+from sarl_core.explaining.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.language import counted, label_text, number_text, share_text
 from sarl_core.explaining.report_counts import Tally
-from sarl_core.explaining.report_svg import columns, muted, share_bar
+from sarl_core.explaining.report_svg import MUTED, NEUTRAL, columns, share_bar
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
 
@@ -113,14 +113,25 @@ def shown(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> Sh
         features=tuple(
             FeatureLine(
                 f"{row.name} ({row.unit})" if row.unit else row.name,
-                number_text(row.low),
-                number_text(row.median),
-                number_text(row.high),
+                *(within(value, row) for value in (row.low, row.median, row.high)),
             )
             for row in feature_rows(demonstrations)
         ),
         notes=demonstrations.notes,
     )
+
+
+def within(value: float, row: FeatureRow) -> str:
+    """A value of a feature for people.
+
+    Args:
+        value: Any.
+        row: The feature in numbers.
+
+    Returns:
+        Three digits; "0" for what is nothing beside the feature's range.
+    """
+    return number_text(value if abs(value) > 1e-4 * (row.high - row.low) else 0.0)
 
 
 def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionShares:
@@ -197,11 +208,10 @@ def _returns(demonstrations: Demonstrations) -> tuple[str, str]:
         f"Return of {counted(len(returns), 'episode')}: from {number_text(least)} to "
         f"{number_text(most)}"
     )
-    accent = label_colour(0)
     picture = columns(
         series.mean.tolist(),
         label,
-        [muted() if unfinished else accent for unfinished in series.unfinished.tolist()],
+        [MUTED if unfinished else NEUTRAL for unfinished in series.unfinished.tolist()],
         zero=zero,
         top=max(most, 0.0),
     )

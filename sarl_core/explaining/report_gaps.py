@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.explaining.report_counts import Share, Tally
 from sarl_core.explaining.report_demonstrations import ActionShares, action_shares
-from sarl_core.explaining.report_svg import share_bar
+from sarl_core.explaining.report_svg import NEUTRAL, share_bar
+from sarl_core.mining.contradictions import NEAR, find_contradictions
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.example_frames import Examples, Played
 
 FEW_STATES = 30
 _MOST_NAMED = 24
+_MOST_COMPARED = 50_000  # steps; to compare more states with each other takes minutes
 
 
 @dataclass(frozen=True)
@@ -78,12 +79,14 @@ class Gaps:
 
     Attributes:
         coverage: One entry an action dimension.
+        contradictions: How often demonstrations disagree, in words; "" where that was not asked.
         doubts: Rules that deserve a second look.
         beyond: One entry a player; () without pictures.
         with_boxes: Whether `Beyond.far` is known.
     """
 
     coverage: tuple[Coverage, ...]
+    contradictions: str
     doubts: tuple[Doubt, ...]
     beyond: tuple[Beyond, ...]
     with_boxes: bool
@@ -113,6 +116,7 @@ def gaps(
         coverage=tuple(
             _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
         ),
+        contradictions=_contradictions(demonstrations, rule_set.divider),
         doubts=_doubts(rule_set, numbers),
         beyond=tuple(
             _beyond(one, rule_set, demonstrations, boxed=boxed)
@@ -130,10 +134,29 @@ def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
         name=action.name if len(rule_set.actions) > 1 else "",
         text=f"{share.part:,} of {counted(share.whole, 'demonstrated state')} "
         f"({share_text(share.value)})",
-        bar=share_bar(share.value, label_colour(2)),
+        bar=share_bar(share.value, NEUTRAL),
         uncovered=action_shares(np.bincount(left, minlength=action.n_labels), action)
         if len(left)
         else None,
+    )
+
+
+def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
+    if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
+        return ""
+    found = find_contradictions(demonstrations, divider=divider)
+    count = int(found.found().sum())
+    if not count:
+        return (
+            "None was found: wherever it came to the same state again, or nearly the same in "
+            "another episode, it did the same."
+        )
+    share = share_text(count / len(demonstrations))
+    return (
+        f"In {count:,} of {counted(len(demonstrations), 'state')} ({share}) it did something else "
+        "in the same state, or in the nearest one of another episode, no feature of which differs "
+        f"by more than {NEAR:g} of its standard deviation. A rule can be right in only one of "
+        "them. Where the expert changes its mind within a short way, this need be no mistake."
     )
 
 

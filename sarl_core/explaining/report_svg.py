@@ -14,7 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.explaining.colours import LAYER_SCALE, MUTED_COLOUR
+from sarl_core.explaining.colours import LAYER_SCALE
+
+# Of the page's own style, light or dark. The colours of actions stay those of actions.
+NEUTRAL, BAD, MUTED = "var(--fill)", "var(--bad)", "var(--muted)"
 
 
 class Scale(NamedTuple):
@@ -53,7 +56,7 @@ def share_bar(share: float, colour: str) -> str:
 
     Args:
         share: 0 to 1.
-        colour: As "#0072B2".
+        colour: As "#0072B2", or one of the page's.
 
     Returns:
         SVG.
@@ -63,7 +66,7 @@ def share_bar(share: float, colour: str) -> str:
 
 
 def evidence_bar(
-    share: float, low: float, high: float, *, colour: str, threshold: float | None
+    share: float, low: float, high: float, *, below: bool, threshold: float | None
 ) -> str:
     """A share with its interval, and the threshold it had to reach; said in words beside it.
 
@@ -71,17 +74,17 @@ def evidence_bar(
         share: 0 to 1.
         low: Lower end of its interval.
         high: Upper end.
-        colour: Of the bar.
+        below: Whether the interval lies below the threshold.
         threshold: Marked by a line, None for no line.
 
     Returns:
         SVG.
     """
-    parts = [_box(0, 1, 3, 10, "track"), _box(0, share, 3, 10, fill=colour, css="fill")]
+    parts = [_box(0, 1, 5, 8, "track"), _box(0, share, 5, 8, fill=BAD if below else NEUTRAL)]
     if threshold is not None:
-        parts.append(_line(threshold, 0, 16, "mark"))
-    parts += [_across(low, high, 8, "ink"), _line(low, 4, 12, "ink"), _line(high, 4, 12, "ink")]
-    return _picture("bar", 16, "".join(parts))
+        parts.append(_line(threshold, 0, 18, "mark"))
+    parts += [_across(low, high, 9, "ink"), _line(low, 5, 13, "ink"), _line(high, 5, 13, "ink")]
+    return _picture("bar", 18, "".join(parts))
 
 
 def interval_bar(
@@ -138,7 +141,7 @@ def columns(
         y, tall = min(ground, end), max(abs(end - ground), 0.8)
         parts.append(
             f'<rect x="{_percent((index + 0.1) * width)}" y="{y:.1f}" '
-            f'width="{_percent(0.8 * width)}" height="{tall:.1f}" fill="{colour}"/>'
+            f'width="{_percent(0.8 * width)}" height="{tall:.1f}" style="fill:{colour}"/>'
         )
     parts.append(_across(0, 1, round(ground, 1), "axis"))
     return _picture("columns", int(height), "".join(parts), label)
@@ -165,7 +168,8 @@ def dot_and_interval(
         parts.append(_line(scale.place(0.0), 0, 16, "axis"))
     parts.append(_across(scale.place(low), scale.place(high), 8, "wide", colour))
     parts.append(
-        f'<circle cx="{_percent(scale.place(value))}" cy="8" r="4.5" class="dot" fill="{colour}"/>'
+        f'<circle cx="{_percent(scale.place(value))}" cy="8" r="4.5" class="dot" '
+        f'style="fill:{colour}"/>'
     )
     return _picture("bar", 16, "".join(parts))
 
@@ -221,11 +225,6 @@ def _luminance(colour: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def muted() -> str:
-    """The colour of what stands there for comparison."""
-    return MUTED_COLOUR
-
-
 def _percent(share: float) -> str:
     return f"{100 * share:.2f}%"
 
@@ -233,7 +232,7 @@ def _percent(share: float) -> str:
 def _box(
     start: float, end: float, y: float, height: float, css: str = "", *, fill: str = ""
 ) -> str:
-    look = (f' class="{css}"' if css else "") + (f' fill="{fill}"' if fill else "")
+    look = (f' class="{css}"' if css else "") + (f' style="fill:{fill}"' if fill else "")
     return (
         f'<rect x="{_percent(start)}" y="{y:g}" width="{_percent(max(end - start, 0.0))}" '
         f'height="{height:g}"{look}/>'

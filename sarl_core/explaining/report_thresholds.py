@@ -311,7 +311,6 @@ def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
         if isinstance(card.get(key), str):
             found.append((name, str(card[key])))
 
-    text("What", "what")
     if (budget := number(card.get("budget"))) is not None:
         found.append(("Most rules for each action", budget))
     if isinstance(rounds := card.get("rounds"), list) and rounds:

@@ -30,6 +30,7 @@ from sarl_core.shielding.shield import Shield
 
 FIRST_SEED = 100_000  # far from those the demonstrations were recorded with
 EPISODES = 12
+_LEAST_HEIGHT = 0.4  # of the width, below which nothing more is cut off
 _COLOURS = 64  # that all frames share: the scenes hold few
 _PALETTE_FRAMES = 48  # of them, spread evenly, that the colours are taken from
 
@@ -59,6 +60,7 @@ class ExampleFrame:
         player: Who played, as "the expert".
         seed: Of the episode.
         step: Index within the episode, from 0.
+        observation: The state, (d,).
         executed: The action the environment got, (m,).
         picture: A PNG file of the state in which the step was decided.
     """
@@ -66,6 +68,7 @@ class ExampleFrame:
     player: str
     seed: int
     step: int
+    observation: NDArray[np.float32]
     executed: NDArray[np.int64] | NDArray[np.float32]
     picture: bytes
 
@@ -120,7 +123,7 @@ def example_frames(
     each: int = 3,
     episodes: int = EPISODES,
     seed: int = FIRST_SEED,
-    width: int = 300,
+    width: int = 400,
     progress: Progress | None = None,
 ) -> Examples:
     """Draw some states in which rules apply.
@@ -165,7 +168,7 @@ def example_frames(
                 found += _spread(played[-1].steps, rule, rule_set, number, each - len(found))
     report(progress, total // 2, total)
     wanted = sorted({place for found in places.values() for place in found})
-    pictures = _pictures(env_id, played, wanted, width, progress)
+    pictures = _trimmed(_pictures(env_id, played, wanted, width, progress))
     files = _files(pictures)
     frames = {
         rule: tuple(
@@ -293,6 +296,25 @@ def _smaller(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
     return np.asarray(whole)
 
 
+def _trimmed(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, NDArray[np.uint8]]:
+    """Without the rows at the top and at the bottom in which no picture ever shows anything."""
+    if not pictures or len({picture.shape for picture in pictures.values()}) > 1:
+        return pictures
+    busy = np.zeros(len(next(iter(pictures.values()))), dtype=np.bool_)
+    for picture in pictures.values():
+        busy |= (picture != picture[:, :1]).any(axis=(1, 2))
+        # Rows of one colour are told apart where the colour changes.
+        busy[1:] |= (picture[1:, 0] != picture[:-1, 0]).any(axis=1)
+    rows = np.flatnonzero(busy)
+    if not len(rows):
+        return pictures
+    height, width = next(iter(pictures.values())).shape[:2]
+    least = int(_LEAST_HEIGHT * width)
+    margin = max(height // 20, (least - (int(rows[-1]) - int(rows[0]))) // 2)
+    first, last = max(int(rows[0]) - margin, 0), min(int(rows[-1]) + 1 + margin, height)
+    return {place: picture[first:last] for place, picture in pictures.items()}
+
+
 def _files(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, bytes]:
     """PNG files that share their colours."""
     from PIL import Image
@@ -320,6 +342,7 @@ def _frame(played: Played, place: _Place, picture: bytes) -> ExampleFrame:
         player=played.player.name,
         seed=int(played.seeds[place.episode]),
         step=place.step,
+        observation=steps.observation[place.step],
         executed=steps.executed[place.step],
         picture=picture,
     )

@@ -1,0 +1,289 @@
+"""One rule of a report in full: its sentence, its evidence, its conditions and its pictures."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.distributions import FeatureRow
+from sarl_core.explaining.language import (
+    action_text,
+    counted,
+    is_flag,
+    label_text,
+    number_text,
+    sentence,
+    share_text,
+    short_condition,
+)
+from sarl_core.explaining.report_counts import Share, Tally
+from sarl_core.explaining.report_demonstrations import within
+from sarl_core.explaining.report_svg import Scale, evidence_bar, interval_bar
+from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.rollouts.example_frames import ExampleFrame, Examples
+
+_MOST_VALUES = 3  # under a picture
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How often the expert did what a rule says.
+
+    Attributes:
+        source: Of which states, as "that the rule was made from".
+        text: As "412 of 425 states (97 %)".
+        interval: In words.
+        bar: SVG.
+        below: Whether the interval lies below the threshold.
+    """
+
+    source: str
+    text: str
+    interval: str
+    bar: str
+    below: bool
+
+
+@dataclass(frozen=True)
+class ConditionRow:
+    """What a rule asks of one feature.
+
+    Attributes:
+        text: As "pole angle > 0.02 rad".
+        data: The demonstrated range, as "-0.2 to 0.2".
+        bar: SVG; "" where it is yes or no.
+    """
+
+    text: str
+    data: str
+    bar: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An example frame.
+
+    Attributes:
+        source: A data address.
+        alt: What it is, in words.
+        caption: What was done.
+        values: Of features that the rule asks about.
+        place: Where to find it again.
+    """
+
+    source: str
+    alt: str
+    caption: str
+    values: str
+    place: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """A rule in full.
+
+    Attributes:
+        number: In this report.
+        id: In the rule file.
+        title: The rule as a sentence.
+        colour: Of its action.
+        action: Its name.
+        tags: As "switched off".
+        support: How often it applies, in words.
+        evidence: One entry a source.
+        conditions: One a feature.
+        pictures: Frames at which it applied.
+    """
+
+    number: int
+    id: str
+    title: str
+    colour: str
+    action: str
+    tags: tuple[str, ...]
+    support: str
+    evidence: tuple[Evidence, ...]
+    conditions: tuple[ConditionRow, ...]
+    pictures: tuple[Picture, ...]
+
+
+def rule_card(
+    rule_set: RuleSet,
+    index: int,
+    number: int,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    ranges: Sequence[FeatureRow],
+    examples: Examples | None,
+) -> Card:
+    """A rule in full.
+
+    Args:
+        rule_set: The rules.
+        index: Of the rule.
+        number: Of the rule in the report.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        ranges: Every feature of them in numbers.
+        examples: Frames at which rules applied, None without pictures.
+
+    Returns:
+        What is shown of it.
+    """
+    rule = rule_set.rules[index]
+    dimension = rule_set.actions[rule.dimension]
+    frames = examples.frames.get(index, ()) if examples is not None else ()
+    rows = tally.rows(index, rule.dimension)
+    return Card(
+        number=number,
+        id=rule.id,
+        title=sentence(rule, rule_set, evidence=False),
+        colour=label_colour(rule.action),
+        action=action_text(rule.action, dimension),
+        tags=tags(rule),
+        support=_support(rule, tally.shares[index], tally),
+        evidence=_evidence(rule, rule_set, tally.shares[index], tally),
+        conditions=tuple(
+            _condition(
+                bounds,
+                demonstrations,
+                ranges[bounds.feature],
+                (
+                    demonstrations.observations[rows, bounds.feature].min().item(),
+                    demonstrations.observations[rows, bounds.feature].max().item(),
+                )
+                if len(rows)
+                else (),
+            )
+            for bounds in rule.bounds
+        ),
+        pictures=tuple(_picture(frame, rule, rule_set, ranges) for frame in frames),
+    )
+
+
+def tags(rule: Rule) -> tuple[str, ...]:
+    """What is special about a rule.
+
+    Args:
+        rule: Any.
+
+    Returns:
+        As ("switched off", "written by hand").
+    """
+    found = []
+    if not rule.enabled:
+        found.append("switched off")
+    if rule.origin == "manual":
+        found.append("written by hand")
+    if rule.pinned:
+        found.append("put in its place by hand")
+    return tuple(found)
+
+
+def _support(rule: Rule, here: Share, tally: Tally) -> str:
+    if tally.same and rule.origin == "mined":
+        return (
+            f"Applies in {share_text(rule.support)} of the demonstrated states "
+            f"({counted(rule.samples, 'state')})."
+        )
+    text = f"Applies in {share_text(here.whole / len(tally.rules))} of this report's states "
+    text += f"({here.whole:,})"
+    if rule.origin == "mined" and rule.samples:
+        text += f", and in {share_text(rule.support)} of those it was made from"
+    return f"{text}."
+
+
+def _evidence(rule: Rule, rule_set: RuleSet, here: Share, tally: Tally) -> tuple[Evidence, ...]:
+    threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
+    found = []
+    if rule.origin == "mined":
+        found.append(("that the rule was made from", Share(rule.correct, rule.samples)))
+    if rule.held_out is not None:
+        held = Share(rule.held_out.correct, rule.held_out.samples)
+        found.append(("of episodes kept aside, which it was not made from", held))
+    if not (tally.same or tally.split) or rule.origin != "mined":
+        found.append(("of this report's demonstrations", here))
+    return tuple(_evidence_of(name, share, threshold) for name, share in found)
+
+
+def _evidence_of(source: str, share: Share, threshold: float | None) -> Evidence:
+    if not share.whole:
+        return Evidence(source, "0 of 0 states", "nothing is known there", "", below=False)
+    low, high = share.interval
+    below = threshold is not None and high < threshold
+    states = "1 state" if share.whole == 1 else f"{share.whole:,} states"
+    return Evidence(
+        source=source,
+        text=f"{share.part:,} of {states} ({share_text(share.value)})",
+        interval=f"the true share probably lies between {_share(low)} and {_share(high)}"
+        + (", below the threshold" if below else ""),
+        bar=evidence_bar(
+            share.value,
+            low,
+            high,
+            below=below,
+            threshold=threshold,
+        ),
+        below=below,
+    )
+
+
+def _share(value: float) -> str:
+    """An end of an interval: with one decimal, unless that says nothing."""
+    return share_text(value, decimals=1) if 0.0 < value < 1.0 else share_text(value)
+
+
+def _condition(
+    bounds: Bounds,
+    demonstrations: Demonstrations,
+    row: FeatureRow,
+    states: Sequence[float],
+) -> ConditionRow:
+    feature = demonstrations.features[bounds.feature]
+    text = short_condition(bounds, feature)
+    if is_flag(feature, bounds):
+        return ConditionRow(text, "", "")
+    unit = f" {feature.unit}" if feature.unit else ""
+    low = number_text(row.low, apart_from=row.high)
+    high = number_text(row.high, apart_from=row.low)
+    finite = [value for value in (bounds.low, bounds.high) if math.isfinite(value)]
+    scale = Scale.over([row.low, row.high, *finite], margin=0.04)
+    return ConditionRow(
+        text,
+        f"{low} to {high}{unit}",
+        interval_bar(scale, (row.low, row.high), (bounds.low, bounds.high), states),
+    )
+
+
+def _picture(
+    frame: ExampleFrame, rule: Rule, rule_set: RuleSet, ranges: Sequence[FeatureRow]
+) -> Picture:
+    dimension, features = rule_set.actions[rule.dimension], rule_set.source.features
+    value = frame.executed[rule.dimension].item()
+    did = (
+        f"{dimension.name} {number_text(float(value))}"
+        if dimension.is_interval
+        else label_text(dimension.label_of(value), dimension)
+    )
+    followed = dimension.label_of(value) == rule.action
+    name = frame.player[:1].upper() + frame.player[1:]
+    return Picture(
+        source=f"data:image/png;base64,{base64.b64encode(frame.picture).decode('ascii')}",
+        alt=f"The scene at step {frame.step} of the episode with seed {frame.seed}, where the "
+        f"rule applies; {frame.player} chose {did}",
+        caption=f"{name}: {did}{'' if followed else ', against the rule'}",
+        values="; ".join(
+            _value_text(ranges[bounds.feature], frame.observation[bounds.feature].item())
+            for bounds in rule.bounds[:_MOST_VALUES]
+            if not is_flag(features[bounds.feature], bounds)
+        ),
+        place=f"seed {frame.seed}, step {frame.step}",
+    )
+
+
+def _value_text(row: FeatureRow, value: float) -> str:
+    return f"{row.name} {within(value, row)}{f' {row.unit}' if row.unit else ''}"
