@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sarl_core.mining.rules import Rule
 
-
 Sides = tuple[tuple[float, ...], tuple[float, ...]]
 """Least and largest values of the d features."""
 
@@ -85,8 +84,9 @@ def leaves_out(sides: Sides, state: list[float]) -> bool:
         Whether any value does.
     """
     lower, upper = sides
-    # Plain `zip`: asking for equal lengths would take a quarter longer, at every intervention.
-    for value, least, most in zip(state, lower, upper):  # noqa: B905
+    # A plain loop and a plain `zip`: `any` or equal lengths would take a quarter longer, at every
+    # intervention.
+    for value, least, most in zip(state, lower, upper):  # noqa: B905, SIM110
         if not least <= value <= most:
             return True
     return False

@@ -1,0 +1,315 @@
+"""What lies near a state: rules that almost apply, and where the shield would decide otherwise.
+
+Everything here is exact to the float32 number. Along one feature the shield's decision can change
+only at a threshold or at the edge of a data box of a rule whose other conditions hold; so it is
+asked once between each two of them, and nothing is sampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.errors import InputError
+from sarl_core.shielding.shield import BatchDecision, Shield
+
+Floats = NDArray[np.float64]
+States = NDArray[np.float32]
+
+_LARGEST = np.finfo(np.float32).max
+_DOWN, _UP = np.float32(-np.inf), np.float32(np.inf)
+
+
+class Change(NamedTuple):
+    """One feature moved as little as possible.
+
+    Attributes:
+        feature: Its index.
+        before: The present value, a float32 number.
+        after: The nearest float32 number that does.
+    """
+
+    feature: int
+    before: float
+    after: float
+
+    @property
+    def by(self) -> float:
+        """How far, with its sign."""
+        return self.after - self.before
+
+
+class NearMiss(NamedTuple):
+    """A rule that does not apply, and what is missing.
+
+    Attributes:
+        rule: Its index in the rule set.
+        changes: Of one feature or two, the least of each that lets its conditions hold.
+        distance: Sum of the changes, each in units of its feature's spread.
+        in_force: Whether it would then be the rule in force; else one placed before it is.
+    """
+
+    rule: int
+    changes: tuple[Change, ...]
+    distance: float
+    in_force: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """What the shield does along one feature, all others as they are.
+
+    Attributes:
+        feature: Its index.
+        starts: First value of each of k stretches, ascending float32 numbers, (k,); the first
+            is -inf. Within a stretch nothing changes.
+        decisions: What the shield does in each, k of them.
+        here: The stretch that the present value lies in.
+    """
+
+    feature: int
+    starts: States
+    decisions: BatchDecision
+    here: int
+
+
+class DecisionChange(NamedTuple):
+    """The least change of one feature that makes the shield execute another action.
+
+    Attributes:
+        change: The feature, and how far.
+        executed: The action then, (m,).
+        rules: The rules then in force, -1 for none, (m,).
+        distance: The change in units of the feature's spread.
+    """
+
+    change: Change
+    executed: NDArray[Any]
+    rules: NDArray[np.int64]
+    distance: float
+
+
+class Neighbourhood:
+    """The rules that a shield uses, laid out for questions about single states."""
+
+    def __init__(self, shield: Shield) -> None:
+        """Lay out the bounds of R enabled rules over d features.
+
+        Args:
+            shield: In force.
+        """
+        self.shield = shield
+        rules = shield.rule_set.rules
+        d = len(shield.rule_set.source.features)
+        self._index = np.array(
+            [index for index, rule in enumerate(rules) if rule.enabled], dtype=np.int64
+        )
+        low: Floats = np.full((len(self._index), d), -np.inf)
+        high: Floats = np.full((len(self._index), d), np.inf)
+        least, most = low.copy(), high.copy()
+        for row, index in enumerate(self._index.tolist()):
+            rule = rules[index]
+            for feature, below, above in rule.bounds:
+                low[row, feature], high[row, feature] = below, above
+            if rule.box is not None:
+                least[row], most[row] = rule.box.least, rule.box.most
+        # In float32 numbers a rule asks for first <= x <= last.
+        self._first, self._last = after(low), at_most(high)
+        # Where its data begins, and what comes after the last of it.
+        self._begin, self._beyond = at_least(least), after(most)
+
+    def near_misses(
+        self, state: ArrayLike, spreads: Floats, *, features: int = 1, most: int = 8
+    ) -> tuple[NearMiss, ...]:
+        """Rules that would apply if few features were a little different.
+
+        Args:
+            state: Shape (d,); finite, taken as float32.
+            spreads: What a change of each feature is measured in, (d,), above 0.
+            features: How many features have to change, 1 or 2.
+            most: How many rules at most.
+
+        Returns:
+            The nearest first.
+
+        Raises:
+            InputError: If the state has another length, or a value is not finite.
+        """
+        here = self._state(state)
+        wanted = np.clip(here, self._first, self._last)
+        differs = wanted != here
+        # A bound that no finite number reaches makes a rule that never applies.
+        possible = (self._first <= self._last).all(axis=1) & np.isfinite(wanted).all(axis=1)
+        rows = np.flatnonzero(possible & (differs.sum(axis=1) == features))
+        moved = np.abs(wanted[rows].astype(np.float64) - here.astype(np.float64)) / spreads
+        distances = moved.sum(axis=1)
+        nearest = np.argsort(distances, kind="stable")[:most]
+        rows, distances = rows[nearest], distances[nearest]
+        # The same states that the rules ask for, and not the rules' word for it.
+        found = self.shield.decide_batch(wanted[rows], self._any_action(len(rows))).rules
+        return tuple(
+            NearMiss(
+                rule=int(self._index[row]),
+                changes=tuple(
+                    Change(feature, float(here[feature]), float(wanted[row, feature]))
+                    for feature in np.flatnonzero(differs[row]).tolist()
+                ),
+                distance=float(distance),
+                in_force=bool((at == self._index[row]).any()),
+            )
+            for row, distance, at in zip(rows.tolist(), distances.tolist(), found, strict=True)
+        )
+
+    def lines(self, state: ArrayLike, action: Any) -> tuple[Line, ...]:
+        """What the shield would do along each feature.
+
+        Args:
+            state: Shape (d,); finite, taken as float32.
+            action: What the agent proposes, in the environment's own form.
+
+        Returns:
+            One line a feature.
+
+        Raises:
+            InputError: If the state has another length, or a value is not finite.
+        """
+        here = self._state(state)
+        broken = ~((self._first <= here) & (here <= self._last))
+        count = broken.sum(axis=1)
+        starts, states = [], []
+        for feature in range(len(here)):
+            # Rules whose other conditions hold; no other can apply anywhere along the line.
+            rows = np.flatnonzero(count == broken[:, feature])
+            found = _starts(
+                self._first[rows, feature],
+                after(self._last[rows, feature]),
+                self._begin[rows, feature],
+                self._beyond[rows, feature],
+            )
+            at = np.repeat(here[None], len(found), axis=0)
+            at[:, feature] = found
+            # Before the first start: any value below it, so the one just below.
+            at[0, feature] = np.nextafter(found[1], _DOWN) if len(found) > 1 else here[feature]
+            starts.append(found)
+            states.append(at)
+        decided = self._decide(np.concatenate(states), action)
+        ends = np.cumsum([len(part) for part in starts])
+        return tuple(
+            Line(
+                feature=feature,
+                starts=part,
+                decisions=BatchDecision(
+                    *(np.asarray(column)[end - len(part) : end] for column in decided)
+                ),
+                here=int(np.searchsorted(part, here[feature], side="right")) - 1,
+            )
+            for feature, (part, end) in enumerate(zip(starts, ends.tolist(), strict=True))
+        )
+
+    def _state(self, state: ArrayLike) -> States:
+        here = np.asarray(state, dtype=np.float32)
+        wide = self._first.shape[1]
+        if here.shape != (wide,) or not np.isfinite(here).all():
+            raise InputError(
+                f"the state is no list of {wide} finite numbers; give one for each feature"
+            )
+        return here
+
+    def _decide(self, states: States, action: Any) -> BatchDecision:
+        one = np.asarray(action)
+        proposed = np.repeat(one.reshape(1, -1), len(states), axis=0)
+        return self.shield.decide_batch(states, proposed)
+
+    def _any_action(self, count: int) -> NDArray[np.float32]:
+        return np.zeros((count, len(self.shield.rule_set.actions)), dtype=np.float32)
+
+
+def decision_changes(
+    line: Line, value: float, spread: float
+) -> tuple[DecisionChange | None, DecisionChange | None]:
+    """The least change downwards and upwards that makes the shield execute another action.
+
+    Args:
+        line: Of the feature.
+        value: Its present value.
+        spread: What a change is measured in, above 0.
+
+    Returns:
+        Down and up; None where no change in that direction does.
+    """
+    executed = line.decisions.executed
+    other = np.flatnonzero((executed != executed[line.here]).any(axis=1))
+    below, above = other[other < line.here], other[other > line.here]
+
+    def change(stretch: int, after: float) -> DecisionChange:
+        return DecisionChange(
+            Change(line.feature, float(np.float32(value)), after),
+            executed[stretch],
+            line.decisions.rules[stretch],
+            abs(after - float(np.float32(value))) / spread,
+        )
+
+    down = up = None
+    if len(below):
+        stretch = int(below[-1])
+        down = change(stretch, float(np.nextafter(line.starts[stretch + 1], _DOWN)))
+    if len(above):
+        up = change(int(above[0]), float(line.starts[above[0]]))
+    return down, up
+
+
+def feature_spreads(observations: NDArray[np.float32]) -> Floats:
+    """What a change of each feature is measured in: its interquartile range.
+
+    Args:
+        observations: Shape (N, d).
+
+    Returns:
+        Shape (d,), above 0: the range where half of the values are the same, as those of a
+        contact are, and 1 where all are.
+    """
+    low, high = np.quantile(observations.astype(np.float64), [0.25, 0.75], axis=0)
+    wide = observations.max(axis=0).astype(np.float64) - observations.min(axis=0)
+    spread = np.where(high > low, high - low, wide)
+    return np.asarray(np.where(spread > 0, spread, 1.0))
+
+
+def after(values: NDArray[Any]) -> States:
+    """The least float32 number above each value.
+
+    Args:
+        values: float64 numbers, any shape.
+
+    Returns:
+        Likewise; inf where there is none, -inf for -inf.
+    """
+    near = _float32(values)
+    beyond = np.where(near > values, near, np.nextafter(near, _UP))
+    return np.asarray(np.where(np.isneginf(values), _DOWN, beyond), dtype=np.float32)
+
+
+def at_most(values: NDArray[Any]) -> States:
+    """The largest float32 number that is no larger than each value; inf for inf."""
+    near = _float32(values)
+    return np.where(near > values, np.nextafter(near, _DOWN), near).astype(np.float32)
+
+
+def at_least(values: NDArray[Any]) -> States:
+    """The least float32 number that is no smaller than each value; -inf for -inf."""
+    near = _float32(values)
+    return np.where(near < values, np.nextafter(near, _UP), near).astype(np.float32)
+
+
+def _float32(values: NDArray[Any]) -> States:
+    with np.errstate(over="ignore"):
+        return np.asarray(values).astype(np.float32)
+
+
+def _starts(*edges: States) -> States:
+    """Where something may change, ascending, with -inf at the front."""
+    found = np.unique(np.concatenate(edges))
+    found = found[np.isfinite(found)]
+    return np.concatenate([np.array([_DOWN], dtype=np.float32), found])
