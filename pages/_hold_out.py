@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import streamlit as st
 from _url import set_url_choice, url_choice, url_text
+from _words import in_full
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
@@ -42,9 +43,11 @@ class Parts(NamedTuple):
         mined: What rules are mined from.
         held_out: What they are tried on; None where nothing is held out.
         problem: Why a choice could not be followed, in one sentence; "" where it was.
+        remaining: Both together: all but what is left out.
     """
 
     mined: Demonstrations
+    remaining: Demonstrations
     held_out: Demonstrations | None = None
     problem: str = ""
 
@@ -94,7 +97,7 @@ def parted(demonstrations: Demonstrations) -> Parts:
     """
     choice = chosen()
     if not choice.share and not choice.left_out:
-        return Parts(demonstrations)
+        return Parts(demonstrations, demonstrations)
     return _parted(demonstrations.digest, choice, demonstrations)
 
 
@@ -113,12 +116,12 @@ def _parted(digest: str, choice: Choice, _demonstrations: Demonstrations) -> Par
         except InputError as error:
             problem = f"no episode is left out: {error}"
     if not choice.share:
-        return Parts(remaining, problem=problem)
+        return Parts(remaining, remaining, problem=problem)
     try:
         split = hold_out(remaining, choice.share, seed=choice.seed)
     except InputError as error:
-        return Parts(remaining, problem=problem or f"nothing is held out: {error}")
-    return Parts(*split, problem)
+        return Parts(remaining, remaining, problem=problem or f"nothing is held out: {error}")
+    return Parts(split.mined, remaining, split.held_out, problem)
 
 
 def told(demonstrations: Demonstrations) -> list[str]:
@@ -139,3 +142,26 @@ def told(demonstrations: Demonstrations) -> list[str]:
     if held:
         lines.append(f"**{counted(held, 'episode')}** held out")
     return lines
+
+
+def leave_out_choice(demonstrations: Demonstrations) -> None:
+    """The widget that leaves episodes out.
+
+    Args:
+        demonstrations: All there are.
+    """
+    there = demonstrations.episodes[demonstrations.episode_starts].tolist()
+    gone = set(chosen().left_out)
+    # The widget follows the URL, so a link and the browser's "back" both reach it.
+    st.session_state["_left_out_choice"] = [episode for episode in there if episode in gone]
+    st.multiselect(
+        "Episodes left out",
+        there,
+        key="_left_out_choice",
+        format_func=lambda episode: f"episode {episode}",
+        placeholder="none: choose one, and every page follows",
+        on_change=lambda: leave_out(tuple(st.session_state["_left_out_choice"])),
+    )
+    problem = parted(demonstrations).problem
+    if problem:
+        st.warning(in_full(problem), icon=":material/warning:")

@@ -32,6 +32,12 @@ PAGES = [
         help="What the expert did: choose a shipped set or upload your own, and look at it.",
     ),
     st.Page(
+        "names.py",
+        title="Names",
+        icon=":material/label:",
+        help="What features, units, actions and labels are called, everywhere.",
+    ),
+    st.Page(
         "thresholds.py",
         title="Thresholds",
         icon=":material/tune:",
@@ -42,6 +48,12 @@ PAGES = [
         title="Rules",
         icon=":material/rule:",
         help="Every rule in plain language, with the evidence behind it.",
+    ),
+    st.Page(
+        "evidence.py",
+        title="Evidence",
+        icon=":material/verified:",
+        help="How sure each rule is, and whether the demonstrations are enough and agree.",
     ),
     st.Page(
         "edit.py",
@@ -56,6 +68,12 @@ PAGES = [
         help="Two rule sets side by side: their rules, and the states they decide differently.",
     ),
     st.Page(
+        "carry.py",
+        title="Export",
+        icon=":material/ios_share:",
+        help="Carry the rules away: as code, as a table, on paper.",
+    ),
+    st.Page(
         "replay.py",
         title="Replay",
         icon=":material/play_circle:",
@@ -66,6 +84,18 @@ PAGES = [
         title="Shield",
         icon=":material/shield:",
         help="What a shield is worth: agents with the rules and without, over many episodes.",
+    ),
+    st.Page(
+        "report.py",
+        title="Report",
+        icon=":material/summarize:",
+        help="The rules in one file, for people who know only the task.",
+    ),
+    st.Page(
+        "ablation.py",
+        title="Ablation",
+        icon=":material/content_cut:",
+        help="What each rule is worth: the same episodes again, with one rule taken out.",
     ),
     st.Page(
         "improve.py",

@@ -22,8 +22,8 @@ VERDICTS: dict[Verdict, str] = {"below": "too low", "open": "open", "reached": "
 """What each verdict is called on screen."""
 VERDICT_COLOURS: dict[Verdict, str] = {
     "below": INTERVENTION_COLOUR,
-    "open": MUTED_COLOUR,
-    "reached": "#009E73",
+    "open": "#4A6FA5",
+    "reached": "#2E8B6F",
 }
 _DIGITS = 4
 

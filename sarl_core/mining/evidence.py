@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -90,5 +91,14 @@ def wilson(correct: float, samples: float) -> Interval:
     Returns:
         0 to 1 without a trial.
     """
-    low, high = wilson_bounds(correct, samples)
-    return Interval(float(low), float(high))
+    if not samples > 0:
+        return Interval(0.0, 1.0)
+    # Written again for single numbers: arrays of one take thirty times as long.
+    share, square = correct / samples, Z_95**2
+    centre = (share + square / (2 * samples)) / (1 + square / samples)
+    spread = share * (1 - share) / samples + square / (4 * samples**2)
+    reach = Z_95 / (1 + square / samples) * math.sqrt(spread)
+    return Interval(
+        0.0 if correct <= 0 else max(centre - reach, 0.0),
+        1.0 if correct >= samples else min(centre + reach, 1.0),
+    )

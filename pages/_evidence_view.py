@@ -1,0 +1,422 @@
+"""What the Evidence page shows: the overview, what is missing, curve, stability, contradictions."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import _hold_out
+import _state as state
+import streamlit as st
+from _evidence_work import worked_out
+from _rule_table import table_height
+from _words import escaped
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining import evidence_figures as figures
+from sarl_core.explaining.evidence_tables import (
+    enough_columns,
+    episode_columns,
+    pair_columns,
+    stability_columns,
+)
+from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS, verdict_counts
+from sarl_core.explaining.language import counted, share_text
+from sarl_core.mining.contradictions import NEAR, Contradictions, by_episode, find_contradictions
+from sarl_core.mining.holding_out import more_episodes
+from sarl_core.mining.learning_curve import LearningCurve, learning_curve
+from sarl_core.mining.progress import Progress
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.stability import SAME_RULE, Stability, rule_stability
+
+MOST_DRAWN = 600
+TABLE_ROWS = 12
+ORDERS = 6
+AT_ONCE = 50_000  # pairs up to which contradictions are looked for without being asked
+PLAIN = {"displayModeBar": False}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the page says of a rule set.
+
+    Attributes:
+        rules: The most support first.
+        missing: Episodes that each still misses.
+        threshold: The minimum confidence.
+    """
+
+    rules: tuple[Rule, ...]
+    missing: tuple[float, ...]
+    threshold: float
+
+
+@st.cache_resource(max_entries=12, show_spinner="Weighing the evidence …")
+def _found(key: tuple[object, ...], episodes: int, _rule_set: RuleSet) -> Found:
+    rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
+    threshold = _rule_set.thresholds.confidence
+    missing = tuple(more_episodes(rule, episodes, threshold) for rule in rules)
+    return Found(rules, missing, threshold)
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
+    return figures.overview_figure(_found.rules[:MOST_DRAWN], _rule_set, _found.threshold)
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _enough(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
+    import pandas as pd
+
+    return pd.DataFrame(enough_columns(_found.rules, _rule_set, _found.missing, _found.threshold))
+
+
+class Evidence:
+    """The rules at the thresholds with everything that is known about them."""
+
+    def __init__(self) -> None:
+        """Take what is chosen."""
+        parts = state.parts()
+        assert parts is not None
+        self.parts = parts
+        self.divider = state.chosen_divider()
+        self.rule_set = state.rule_set()
+        self.thresholds = self.rule_set.thresholds
+        held = "" if parts.held_out is None else parts.held_out.digest
+        self.key = (parts.mined.digest, held, self.thresholds, self.rule_set.divider)
+        self.found = _found(self.key, parts.remaining.n_episodes, self.rule_set)
+
+
+def show_overview(evidence: Evidence) -> None:
+    """All rules with their intervals, and how many of them are certain."""
+    found, held_out = evidence.found, evidence.parts.held_out
+    counts = verdict_counts(found.rules, found.threshold)
+    with st.container(horizontal=True, key="verdicts"):
+        st.metric("Rules", f"{len(found.rules):,}")
+        if held_out is not None:
+            tried = [rule.held_out for rule in found.rules if rule.held_out is not None]
+            samples = sum(one.samples for one in tried)
+            right = sum(one.correct for one in tried) / samples if samples else float("nan")
+            st.metric(
+                "Held-out fidelity",
+                share_text(right, decimals=1),
+                help="Share of the held-out states with a rule in which the expert did what it "
+                "says",
+            )
+        for name, hint in (
+            ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
+            ("open", "The minimum confidence lies within the interval: not enough is known"),
+            ("below", "The whole interval lies below the minimum confidence"),
+        ):
+            st.metric(VERDICTS[name].capitalize(), f"{counts[name]:,}", help=hint)
+    st.plotly_chart(
+        _overview(evidence.key, found, evidence.rule_set),
+        config=PLAIN,
+        key="overview",
+        alt="The 95 % interval of every rule's confidence, with the minimum confidence as a line",
+    )
+    ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
+    words = (
+        f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
+        + ("grey: on what it was mined from &ensp; " if held_out is not None else "")
+        + f"dotted: minimum confidence {found.threshold:g}"
+    )
+    st.html(f"<div style='font-size:0.85rem;opacity:0.9'>{words}</div>")
+    if len(found.rules) > MOST_DRAWN:
+        st.caption(f"The {MOST_DRAWN} rules with the most support, of {len(found.rules):,}.")
+
+
+def show_enough(evidence: Evidence) -> None:
+    """How many more episodes each rule would take."""
+    found = evidence.found
+    st.caption(
+        "How many more episodes until the lower end of a rule's interval would reach the minimum "
+        "confidence, if every further episode brought as many states of it as one did so far, as "
+        "often right. Where the confidence itself does not lie above the minimum, no number is "
+        "enough."
+    )
+    left, right = st.columns([2, 3], gap="medium")
+    with left:
+        st.plotly_chart(
+            figures.enough_figure(found.missing),
+            config=PLAIN,
+            key="enough",
+            alt="How many rules would be certain after so many more episodes",
+        )
+    with right:
+        column = st.column_config
+        st.dataframe(
+            _enough(evidence.key, found, evidence.rule_set),
+            hide_index=True,
+            height=table_height(len(found.rules), 6),
+            key="enough_table",
+            column_order=("Action", "Still missing", "Evidence", "Interval", "When"),
+            column_config={
+                "Action": column.TextColumn(width=130),
+                "Still missing": column.TextColumn(width=125),
+                "Evidence": column.TextColumn(width=215),
+                "Interval": column.TextColumn(width=230),
+                "When": column.TextColumn(width=420),
+            },
+            alt="What each rule still misses",
+        )
+
+
+def show_curve(evidence: Evidence) -> None:
+    """What rules of fewer episodes would have been."""
+    parts = evidence.parts
+    if parts.mined.n_episodes < 2:
+        st.info(
+            "There is one episode only. A learning curve needs several; give demonstrations with "
+            "more episodes.",
+            icon=":material/info:",
+        )
+        return
+    mined, held_out = parts.mined, parts.held_out
+    thresholds, divider = evidence.thresholds, evidence.rule_set.divider
+    st.caption(
+        "Rules are mined from one episode, from a few more, and so on to all, at the present "
+        f"thresholds, in {ORDERS} orders of the episodes. A curve that still climbs at its end "
+        "says that more demonstrations would help. "
+        + (
+            "Tried on the held-out episodes."
+            if held_out is not None
+            else "Tried on the episodes that come later in the order, so the last point has none; "
+            "hold some out above to have it."
+        )
+    )
+
+    def work(executor: Executor, progress: Progress) -> LearningCurve:
+        return learning_curve(
+            mined,
+            thresholds,
+            divider=divider,
+            held_out=held_out,
+            orders=ORDERS,
+            executor=executor,
+            progress=progress,
+        )
+
+    worked_out(
+        "curve",
+        ("curve", evidence.key),
+        work,
+        f"Mines up to {8 * ORDERS} rule sets.",
+        _show_curve,
+    )
+
+
+def _show_curve(curve: LearningCurve) -> None:
+    with st.grid(4, min_column_width=240, gap="small") as grid:
+        for layer, title in figures.CURVE_TITLES.items():
+            with grid.cell():
+                st.markdown(f"**{title}**")
+                st.plotly_chart(
+                    figures.curve_figure(curve, layer),
+                    config=PLAIN,
+                    key=f"curve_{layer}",
+                    alt=f"{title} over the number of episodes",
+                )
+    st.caption(
+        f"Line: the mean of {counted(curve.orders, 'order')}. Band: from the least to the most."
+    )
+
+
+def show_stability(evidence: Evidence) -> None:
+    """How often each rule comes back."""
+    mined = evidence.parts.mined
+    if not evidence.rule_set.rules or mined.n_episodes < 2:
+        st.info(
+            "There is no rule to look for; lower a threshold."
+            if mined.n_episodes > 1
+            else "There is one episode only, so none can be drawn again.",
+            icon=":material/info:",
+        )
+        return
+    with st.container(horizontal=True, vertical_alignment="bottom"):
+        rounds = int(
+            st.number_input(
+                "Rounds",
+                5,
+                500,
+                30,
+                key="rounds",
+                bind="query-params",
+                width=130,
+                help="In each, as many episodes as there are are drawn, some of them several "
+                "times and others not at all, and the rules are mined again.",
+            )
+        )
+        st.caption(
+            "A rule has come back if a new one with the same action covers mostly the same "
+            f"states: those that both cover are at least {SAME_RULE:.0%} of those that either "
+            "covers. In brackets: where nine in ten of the new thresholds lay."
+        )
+    rule_set = evidence.rule_set
+
+    def work(executor: Executor, progress: Progress) -> Stability:
+        return rule_stability(rule_set, mined, rounds=rounds, executor=executor, progress=progress)
+
+    worked_out(
+        "stability",
+        ("stability", evidence.key, rounds),
+        work,
+        f"Mines {rounds} rule sets.",
+        partial(_show_stability, rule_set),
+    )
+
+
+def _show_stability(rule_set: RuleSet, stability: Stability) -> None:
+    import pandas as pd
+
+    table = pd.DataFrame(stability_columns(rule_set.rules, rule_set, stability))
+    table = table.sort_values(["Comes back", "States"], ascending=False)
+    often = sum(one.returns >= 0.5 for one in stability.rules)
+    st.markdown(
+        f"**{often:,} of {counted(len(stability.rules), 'rule')}** came back in at least half of "
+        f"{counted(stability.rounds, 'round')}."
+    )
+    share = {"min_value": 0.0, "max_value": 1.0, "format": "percent", "color": "gray"}
+    column = st.column_config
+    st.dataframe(
+        table,
+        hide_index=True,
+        height=table_height(len(table), TABLE_ROWS),
+        key="stability_table",
+        column_config={
+            "Action": column.TextColumn(width=150),
+            "Comes back": column.ProgressColumn(
+                width=120, help="Share of the rounds in which it came back", **share
+            ),
+            "Overlap": column.ProgressColumn(
+                width=120,
+                help="With the most similar new rule, in the middle of all rounds: states that "
+                "both cover over states that either covers",
+                **share,
+            ),
+            "States": column.NumberColumn(width=75, format="localized"),
+            "Thresholds and their bands": column.TextColumn(width=540),
+            "Rule": column.TextColumn(width=75),
+        },
+        alt="How often each rule came back, and how far its thresholds moved",
+    )
+
+
+@st.cache_resource(max_entries=8, show_spinner="Comparing every state with those near it …")
+def _contradictions(
+    digest: str, divider: int, reach: float, _demonstrations: Demonstrations
+) -> Contradictions:
+    return find_contradictions(_demonstrations, divider=divider, reach=reach)
+
+
+def show_contradictions(evidence: Evidence) -> None:
+    """States on which demonstrations disagree, and which episode does so most."""
+    remaining, divider = evidence.parts.remaining, evidence.rule_set.divider
+    reach = float(
+        st.select_slider(
+            "How near is near",
+            [0.0, 0.02, 0.05, NEAR, 0.2, 0.3],
+            value=NEAR,
+            key="reach",
+            bind="query-params",
+            width=340,
+            help="No feature of the two states differs by more than this share of its standard "
+            "deviation over all states.",
+        )
+    )
+    st.caption(
+        "A state contradicts another one if it is the very same and was shown with another "
+        "action, or if its nearest state of another episode is near and was shown with another "
+        "one. Where the expert changes its mind within a short way, near states may differ "
+        "rightly; an episode far above the others is what to look at."
+    )
+    if len(remaining) > AT_ONCE:
+        worked_out(
+            "contradictions",
+            ("contradictions", remaining.digest, divider, reach),
+            lambda executor, progress: executor.submit(
+                find_contradictions, remaining, divider=divider, reach=reach
+            ).result(),
+            f"Compares {len(remaining):,} states, which takes a while.",
+            partial(_show_contradictions, evidence),
+        )
+        return
+    _show_contradictions(evidence, _contradictions(remaining.digest, divider, reach, remaining))
+
+
+def _show_contradictions(evidence: Evidence, found: Contradictions) -> None:
+    remaining = evidence.parts.remaining
+    dimension = None
+    actions = evidence.rule_set.actions
+    if len(actions) > 1:
+        names = ["any action", *(action.name for action in actions)]
+        name = st.selectbox("Action", names, key="contradiction", bind="query-params", width=260)
+        dimension = names.index(name) - 1 if name in names[1:] else None
+    flags = found.found(dimension)
+    which = slice(None) if dimension is None else [dimension]
+    identical = int(found.identical[:, which].any(axis=1).sum())
+    near = int(found.near[:, which].any(axis=1).sum())
+    compared = int((found.neighbour >= 0).sum())
+    st.markdown(
+        f"**{int(flags.sum()):,} of {counted(len(remaining), 'state')}** contradict another: "
+        f"{identical:,} are identical to one with another action, {near:,} of {compared:,} that "
+        "have a near one in another episode differ from it."
+    )
+    episodes = by_episode(remaining, found, dimension)
+    if not flags.any():
+        st.info(
+            "No demonstrations disagree at this distance. Widen it to look further.",
+            icon=":material/check_circle:",
+        )
+        return
+    left, right = st.columns([3, 2], gap="medium")
+    with left:
+        st.plotly_chart(
+            figures.contradictions_figure(episodes),
+            config=PLAIN,
+            key="contradictions",
+            alt="Share of contradicting steps of each episode",
+        )
+    with right:
+        selected = st.dataframe(
+            episode_columns(episodes),
+            hide_index=True,
+            height=table_height(len(episodes), 6),
+            key="episode_table",
+            on_select="rerun",
+            selection_mode="multi-row",
+            column_config={
+                "Share": st.column_config.ProgressColumn(
+                    min_value=0.0, max_value=1.0, format="percent", color="gray", width=110
+                ),
+            },
+            alt="Episodes by how much they contradict others",
+        )
+        rows = [row for row in selected.selection.rows if row < len(episodes)]
+        chosen = tuple(episodes[row].episode for row in rows)
+        st.button(
+            f"Leave out {counted(len(chosen), 'episode')}" if chosen else "Leave out",
+            icon=":material/playlist_remove:",
+            key="leave_out_selected",
+            disabled=not chosen,
+            on_click=_leave_out,
+            args=(chosen,),
+            help="Tick episodes in the table. Every page follows, and nothing is deleted.",
+        )
+    for place, action in enumerate(actions):
+        if dimension in (None, place) and found.near[:, place].any():
+            st.markdown(f"**The nearest pairs: {escaped(action.name)}**")
+            st.dataframe(
+                pair_columns(remaining, found, divider=evidence.rule_set.divider, dimension=place),
+                hide_index=True,
+                height=table_height(int(found.near[:, place].sum()), 6),
+                key=f"pairs_{place}",
+                column_config={"Distance": st.column_config.NumberColumn(format="%.3f")},
+                alt="States and their nearest ones with another action",
+            )
+
+
+def _leave_out(episodes: tuple[int, ...]) -> None:
+    _hold_out.leave_out((*_hold_out.chosen().left_out, *episodes))
