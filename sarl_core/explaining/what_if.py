@@ -1,0 +1,186 @@
+"""What the shield would do in one state, in words: the rule, what is near, what would change it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.language import action_text, is_flag, number_text, short_condition
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.shielding.near import Change
+
+
+@dataclass(frozen=True)
+class ConditionView:
+    """One condition of a rule, and how a state meets it.
+
+    Attributes:
+        condition: As "pole angle > 0.02 rad".
+        value: The state's value, with its unit.
+        room: How far the value can move before the condition fails, with its unit.
+    """
+
+    condition: str
+    value: str
+    room: str
+
+
+def condition_views(
+    rule: Rule, state: tuple[float, ...], rule_set: RuleSet
+) -> tuple[ConditionView, ...]:
+    """The conditions of a rule beside a state that meets them.
+
+    Args:
+        rule: One that applies.
+        state: d values.
+        rule_set: Knows the names.
+
+    Returns:
+        One entry a feature that it asks about.
+    """
+    views = []
+    for bounds in rule.bounds:
+        feature, value = rule_set.source.features[bounds.feature], state[bounds.feature]
+        room = min(value - bounds.low, bounds.high - value)
+        views.append(
+            ConditionView(
+                short_condition(bounds, feature),
+                with_unit(number_text(value), feature),
+                with_unit(number_text(room), feature),
+            )
+        )
+    return tuple(views)
+
+
+def outside_texts(
+    rule: Rule, state: tuple[float, ...], features: tuple[Feature, ...]
+) -> tuple[str, ...]:
+    """Where a state lies outside the data of a rule.
+
+    Args:
+        rule: With a data box, or without.
+        state: d values.
+        features: The d features.
+
+    Returns:
+        As "pole angle 0.31 rad is above 0.21 rad, the largest that was seen"; none where the
+        state lies inside, or the rule has no box.
+    """
+    if rule.box is None:
+        return ()
+    texts = []
+    for value, least, most, feature in zip(
+        state, rule.box.least, rule.box.most, features, strict=True
+    ):
+        if least <= value <= most:
+            continue
+        below = value < least
+        edge = least if below else most
+        texts.append(
+            f"{feature.name} {with_unit(number_text(value, apart_from=edge), feature)} is "
+            f"{'below' if below else 'above'} "
+            f"{with_unit(number_text(edge, apart_from=value), feature)}, the "
+            f"{'smallest' if below else 'largest'} that was seen"
+        )
+    return tuple(texts)
+
+
+def change_text(change: Change, feature: Feature) -> str:
+    """A change of one feature, after "if".
+
+    Args:
+        change: How far it moves.
+        feature: Its name and unit.
+
+    Returns:
+        As "pole angle were 0.03 rad less", or "there were no left leg contact".
+    """
+    if _is_contact(change, feature):
+        return f"there were {'no ' if change.by < 0 else ''}{feature.name}"
+    way = "less" if change.by < 0 else "more"
+    return f"{feature.name} were {with_unit(number_text(abs(change.by)), feature)} {way}"
+
+
+def near_miss_text(changes: tuple[Change, ...], features: tuple[Feature, ...]) -> str:
+    """What a rule that nearly applies lacks.
+
+    Args:
+        changes: What has to move.
+        features: The d features.
+
+    Returns:
+        As "would apply if pole angle were 0.03 rad less".
+    """
+    parts = [change_text(change, features[change.feature]) for change in changes]
+    return f"would apply if {' and '.join(parts)}"
+
+
+def exact_text(value: float) -> str:
+    """A float32 number with every digit it needs to be read back.
+
+    Args:
+        value: A float32 number.
+
+    Returns:
+        As "0.020938473".
+    """
+    return np.format_float_positional(np.float32(value), trim="-")
+
+
+def executed_text(values: tuple[float, ...], dimensions: tuple[LabelledDimension, ...]) -> str:
+    """An action in words.
+
+    Args:
+        values: One an action dimension.
+        dimensions: The m action dimensions.
+
+    Returns:
+        As "fire main engine" or "hip −0.5, knee 0.25".
+    """
+    parts = []
+    for value, dimension in zip(values, dimensions, strict=True):
+        label = dimension.label_of(value)
+        if dimension.is_interval:
+            parts.append(f"{dimension.name} {number_text(value)}")
+        elif not 0 <= label < dimension.n_labels:
+            parts.append(f"{dimension.name} {value:g}")
+        elif len(dimensions) > 1:
+            parts.append(f"{dimension.name}: {dimension.label_names[label]}")
+        else:
+            parts.append(action_text(label, dimension))
+    return ", ".join(parts)
+
+
+def with_unit(text: str, feature: Feature) -> str:
+    """A number with the unit of a feature, where it has one."""
+    return f"{text} {feature.unit}" if feature.unit else text
+
+
+def by_use(rule_set: RuleSet) -> tuple[int, ...]:
+    """The features in the order in which people want to see them.
+
+    Args:
+        rule_set: In force.
+
+    Returns:
+        Indexes of all d features; first those that the rules of the most states ask about.
+    """
+    count = len(rule_set.source.features)
+    asked, rules = np.zeros(count), np.zeros(count)
+    for rule in rule_set.rules:
+        if rule.enabled:
+            for bounds in rule.bounds:
+                asked[bounds.feature] += rule.samples
+                rules[bounds.feature] += 1
+    return tuple(sorted(range(count), key=lambda index: (-asked[index], -rules[index], index)))
+
+
+def _is_contact(change: Change, feature: Feature) -> bool:
+    """Whether the change turns a yes into a no, or back."""
+    between = (change.before + change.after) / 2
+    crosses = min(change.before, change.after) < 1 and max(change.before, change.after) > 0
+    return crosses and is_flag(feature, Bounds(change.feature, between, math.inf))
