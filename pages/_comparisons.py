@@ -143,6 +143,16 @@ class Comparing(Job):
         self._results, self._pool = results(), pool()
         super().__init__(self._compare, len(self._rows) * episodes)
 
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """What was asked for."""
+        return self._rows
+
+    @property
+    def episodes(self) -> int:
+        """How many of each row."""
+        return self._episodes
+
     def _compare(self, _: Job) -> None:
         todo, tasks = [], []
         for row in self._rows:

@@ -24,11 +24,12 @@ from sarl_core.rollouts.filming import _no_display as no_display
 from sarl_core.rollouts.filming import _picture as draw
 from sarl_core.rollouts.filming import picture_speed
 from sarl_core.rollouts.progress import CancelledError, Progress, report
+from sarl_core.rollouts.seeds import FRESH
 from sarl_core.rollouts.spaces import SpaceAdapter, adapt
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Shield
 
-FIRST_SEED = 100_000  # far from those the demonstrations were recorded with
+FIRST_SEED = FRESH
 EPISODES = 12
 _LEAST_HEIGHT = 0.4  # of the width, below which nothing more is cut off
 _COLOURS = 64  # that all frames share: the scenes hold few

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import base64
+import time
+from pathlib import Path
+
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import load_demonstrations, mine_rules
+from sarl_core.cli import main
+from sarl_core.mining.rule_files import rules_to_json
+from tests.app.screens import errors, open_page, texts
+
+DATA = Path(__file__).parents[2] / "data"
+CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+
+
+def made(app: AppTest) -> AppTest:
+    """Press the button, and look in until the report is there, as the browser does."""
+    app.button(key="make_report").click().run()
+    for _ in range(3_000):
+        assert not app.exception, app.exception
+        if "cancel_report" not in [button.key for button in app.button]:
+            return app
+        time.sleep(0.1)
+        app.run()
+    raise AssertionError("the work does not end")
+
+
+def shown(app: AppTest) -> str:
+    """The report in the frame."""
+    (frame,) = app.get("iframe")
+    head, content = frame.proto.src.split(",", 1)
+    assert head == "data:text/html;base64"
+    return base64.b64decode(content).decode()
+
+
+def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkeypatch) -> None:
+    app = open_page("report", data="cartpole", frames="1")
+    assert not errors(app)
+    assert "5 rules, 5 of them in full" in texts(app)
+    assert not app.get("iframe")
+    html = shown(made(app))
+    assert app.button(key="make_report").disabled
+    assert [button.label for button in app.get("download_button")] == ["Download the report"]
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data").symlink_to(DATA)
+    cart = "data/demonstrations/cartpole.parquet"
+    assert main(["mine", cart, "--setting", "filtered", "--out", "rules.json"]) == 0
+    assert (
+        main(
+            [
+                "report",
+                "rules.json",
+                "--demonstrations",
+                cart,
+                "--frames",
+                "1",
+                "--out",
+                "report.html",
+            ]
+        )
+        == 0
+    )
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == html
+
+
+def test_rules_for_other_features_are_refused_in_place() -> None:
+    app = open_page("report", data="lunar_lander", report_rules="own file")
+    assert "Upload the rule file" in texts(app)
+    content = rules_to_json(mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)).encode()
+    app.file_uploader(key="report_rule_file").set_value(("cart.json", content, "")).run()
+    (sentence,) = errors(app)
+    assert "4 features and the demonstrations have 8" in sentence
+    assert "make_report" not in [button.key for button in app.button]
+
+
+def test_without_demonstrations_the_page_says_what_to_do() -> None:
+    assert "Nothing has been uploaded" in texts(open_page("report", data="upload"))
+
+
+def test_results_come_from_files_and_wrong_ones_are_named() -> None:
+    app = open_page("report", data="cartpole", frames="0")
+    header = "arm,episodes,mean,std,iqm,iqm_low,iqm_high\n"
+    row = "novice & friends,20,22.5,3,22,21,24\n"
+    results = app.file_uploader(key="report_results")
+    results.set_value([("r.csv", (header + row).encode(), "")]).run()
+    html = shown(made(app))
+    assert "novice &amp; friends" in html
+    assert "<img" not in html
+    results = app.file_uploader(key="report_results")
+    results.set_value([("r.csv", b"arm,episodes\n", "")]).run()
+    (sentence,) = errors(app)
+    assert "no column 'mean'" in sentence
