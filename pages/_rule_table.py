@@ -8,6 +8,8 @@ from typing import Any, Literal
 import streamlit as st
 
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.evidence_tables import held_out_columns
+from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.tables import rule_columns
 from sarl_core.mining.rules import Rule, RuleSet
@@ -62,6 +64,22 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             width=72, format="localized", help="Demonstrated states to which the rule applies"
         ),
         "Length": column.NumberColumn(width=68, help="Number of conditions on the way to the rule"),
+        "Held out": column.TextColumn(
+            width=106, help="Confidence on the episodes held out, and on how many of their states"
+        ),
+        "Verdict": column.MultiselectColumn(
+            width=90,
+            help="Where the 95 % interval of the held-out confidence lies: at or above the minimum "
+            "confidence (reached), below it (too low), or on both sides (open)",
+            options=list(VERDICTS.values()),
+            color=[VERDICT_COLOURS[name] for name in VERDICTS],
+        ),
+        "Lower bound": column.NumberColumn(
+            width=95,
+            format="%.3f",
+            help="Lower end of the 95 % interval of the held-out confidence; of the confidence "
+            "itself where no held-out state is the rule's",
+        ),
     }
 
 
@@ -72,6 +90,14 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
     columns = rule_columns(rules, rule_set)
     # A list of one, which the table shows in the action's colour.
     columns["Action"] = [[action] for action in columns["Action"]]
+    tried = held_out_columns(rules, rule_set.thresholds.confidence)
+    if tried:
+        tried["Verdict"] = [[word] for word in tried["Verdict"]]
+        # Next to what they compare with; the rarer measures go to the end.
+        order = ("Action", "When", "Support", "Confidence", "Held out", "Verdict", "States")
+        columns |= tried
+        others = [name for name in columns if name not in order]
+        columns = {name: columns[name] for name in (*order, *others)}
     return pd.DataFrame(columns)
 
 

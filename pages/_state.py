@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import _hold_out
+import _names
 import numpy as np
 import streamlit as st
 from _hold_out import Parts
@@ -86,8 +87,8 @@ def uploaded() -> Demonstrations | None:
     return cast("Demonstrations | None", st.session_state.get("_upload"))
 
 
-def all_demonstrations() -> Demonstrations | None:
-    """The chosen demonstrations with every episode; None while nothing is uploaded.
+def raw_demonstrations() -> Demonstrations | None:
+    """The chosen demonstrations as they were read; None while nothing is uploaded.
 
     A shipped file that cannot be read is said on the page, which then stops.
     """
@@ -101,8 +102,22 @@ def all_demonstrations() -> Demonstrations | None:
         st.stop()
 
 
-# The way of the data: as it was read (`all_demonstrations`), less what is left out, less what is
-# held out (`_hold_out`). What rules are mined from is what remains.
+# The way of the data: as it was read (`raw_demonstrations`), under the names given to it
+# (`all_demonstrations`), less what is left out, less what is held out (`_hold_out`). What rules are
+# mined from is what remains.
+
+
+def all_demonstrations() -> Demonstrations | None:
+    """The chosen demonstrations with every episode; None while nothing is uploaded."""
+    raw = raw_demonstrations()
+    return None if raw is None else _names.named(raw)
+
+
+def data_key() -> str:
+    """What tells the data that rules are mined from, whatever names were given to them."""
+    raw, choice = raw_demonstrations(), _hold_out.chosen()
+    drawn = (choice.share, choice.seed) if choice.share else ()
+    return repr(("" if raw is None else raw.digest, choice.left_out, drawn))
 
 
 def parts() -> Parts | None:
@@ -124,6 +139,11 @@ def held_out() -> Demonstrations | None:
     """The episodes that rules are tried on; None where nothing is held out."""
     found = parts()
     return None if found is None else found.held_out
+
+
+def held_out_digest() -> str:
+    """What tells the held-out episodes from others; "" where nothing is held out."""
+    return _digest(held_out())
 
 
 def require_demonstrations() -> Demonstrations:

@@ -7,6 +7,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import _hold_out
 import _state as state
 import plotly.graph_objects as go
 import streamlit as st
@@ -299,6 +300,22 @@ def downloads(demonstrations: Demonstrations) -> None:
             )
 
 
+def episodes_section() -> None:
+    """Leave episodes out; what is then shown is what remains."""
+    whole = state.all_demonstrations()
+    if whole is None or whole.n_episodes < 2:
+        return
+    lines = _hold_out.told(whole)
+    with st.expander("Leave episodes out", icon=":material/playlist_remove:"):
+        _hold_out.leave_out_choice(whole)
+        st.caption(
+            "Rules are mined without them, on every page; the file stays as it is. The page "
+            "Evidence says which episodes contradict the others."
+        )
+    if lines:
+        st.caption(f"This page shows the episodes that rules are mined from: {', '.join(lines)}.")
+
+
 st.title("Demonstrations")
 st.caption(
     "What the expert did: at every step a state, and the action taken in it. Rules are "
@@ -316,6 +333,7 @@ if chosen is None:
 numbers = contents(chosen.digest, chosen)
 intervals = state.chosen_divider()
 overview(chosen, numbers)
+episodes_section()
 actions_section(chosen, intervals)
 features_section(chosen, numbers, intervals)
 downloads(chosen)

@@ -16,6 +16,7 @@ from _words import escaped
 from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
+from sarl_core.explaining.evidence_words import evidence_bar, evidence_text, intervals_text
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import (
     action_text,
@@ -25,6 +26,7 @@ from sarl_core.explaining.language import (
     share_text,
 )
 from sarl_core.explaining.path_table import path_table
+from sarl_core.mining.holding_out import lower_bound, verdict, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
 from sarl_core.mining.tree import LEAF
@@ -124,12 +126,18 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
             width=220,
             label_visibility="collapsed",
         )
-        downloads(rule_set if compact is None else compact.shipped)
+        least = lower_bound_choice() if compact is None else 0.0
+        if compact is not None:
+            downloads(compact.shipped)
+        else:
+            downloads(with_lower_bound(rule_set, least) if least else rule_set)
     wanted = (words or "").lower().split()
     places = []
     for place, rule in enumerate(rules):
         does = action_text(rule.action, rule_set.actions[rule.dimension])
         if action not in ("every action", does):
+            continue
+        if least and lower_bound(rule) < least:
             continue
         if wanted:
             text = f"{conditions_text(rule, rule_set)} {does} {rule.id}".lower()
@@ -139,10 +147,27 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
     return places
 
 
+def lower_bound_choice() -> float:
+    """The least lower bound of a rule; 0 for any."""
+    least = st.number_input(
+        "Lower bound at least",
+        0.0,
+        1.0,
+        0.0,
+        0.05,
+        key="lower",
+        bind="query-params",
+        width=150,
+        help="Only rules whose confidence is at least this with 95 % certainty, on the held-out "
+        "episodes where there are some. The downloads hold these rules. 0: all.",
+    )
+    return float(least or 0.0)
+
+
 def show_table(rule_set: RuleSet) -> Rule | None:
     """The table of all rules; returns the chosen one."""
     key = (
-        (rule_set.source.digest, rule_set.divider, thresholds)
+        (rule_set.source.digest, rule_set.divider, thresholds, state.held_out_digest())
         if compact is None
         else (compact.digest,)
     )
@@ -150,7 +175,10 @@ def show_table(rule_set: RuleSet) -> Rule | None:
     shown = matching(rules, rule_set)
     chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
     if not shown:
-        st.info("No rule matches the search; clear it to see all.", icon=":material/search_off:")
+        st.info(
+            "No rule matches the search; clear it, and the lower bound, to see all.",
+            icon=":material/search_off:",
+        )
         return None
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
     st.dataframe(
@@ -188,6 +216,8 @@ def show_rule(rule: Rule, rule_set: RuleSet) -> None:
         )
         if compact is not None:
             show_origin(compact.as_shipped(rule), compact.shipped)
+        elif reached:
+            show_sureness(rule)
         if not reached:
             st.info(
                 "No demonstrated state reaches this rule. It is for states that the expert never "
@@ -218,6 +248,14 @@ def measures(rule: Rule) -> str:
         f"support {share_text(rule.support)} · confidence {share_text(rule.confidence)} · "
         f"lift {rule.lift:.2f} · joint support {share_text(rule.joint_support)}"
     )
+
+
+def show_sureness(rule: Rule) -> None:
+    """How sure the rule is, on what it was mined from and on what was held out."""
+    words = f"{evidence_text(rule)} · {intervals_text(rule)}"
+    below = rule.held_out is not None and verdict(rule, thresholds.confidence) == "below"
+    st.caption(f":red[{words}; too low]" if below else words)
+    st.html(evidence_bar(rule, thresholds.confidence))
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
