@@ -194,9 +194,11 @@ def table(of: Base, found: Verdicts) -> Rule | None:
     ids = [rule_set.rules[at].id for at in order]
     chosen = state.url_choice("rule", [rule.id for rule in rule_set.rules], ids[0])
     row = ids.index(chosen) if chosen in ids else None
+    # What is selected is a row: where the rows change places, it is another table.
+    key = f"edit_table_{hash(tuple(ids))}"
 
     def pick() -> None:
-        rows = st.session_state["edit_table"].selection.rows
+        rows = st.session_state[key].selection.rows
         if rows and rows[0] < len(ids):
             state.set_url_choice("rule", ids[rows[0]])
 
@@ -205,7 +207,7 @@ def table(of: Base, found: Verdicts) -> Rule | None:
         hide_index=True,
         column_config=_columns(rule_set),
         height=table_height(len(order), TABLE_ROWS),
-        key="edit_table",
+        key=key,
         on_select=pick,
         selection_mode="single-row",
         selection_default={"selection": {"rows": [] if row is None else [row]}},
@@ -289,7 +291,7 @@ def chosen_rule(of: Base, rule: Rule, found: Verdicts) -> str | None:
     rule_set, wish = found.rule_set, None
     with st.container(border=True, key="chosen_rule"):
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
-        at = rule_set.rules.index(rule)
+        at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
         decides = f"decides {counted(int(found.decided[at]), _edits.basis(of).noun)}"
         st.caption(f"Rule {escaped(rule.id)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):

@@ -17,6 +17,7 @@ from sarl_core.explaining.difference_figures import confusion_figure
 from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
 from sarl_core.explaining.difference_words import decided_text, kinds_text, rows_text
 from sarl_core.explaining.language import action_text, counted
+from sarl_core.mining.difference import check_comparable
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
@@ -61,6 +62,7 @@ def compared(
     digests: tuple[str, str, str], _first: RuleSet, _second: RuleSet, _demonstrations: Any
 ) -> tuple[Disagreement, Any]:
     """The comparison, and the states."""
+    check_comparable(_first, _second)
     states = (
         sampled_states([_first, _second])
         if _demonstrations is None

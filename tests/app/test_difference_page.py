@@ -1,0 +1,74 @@
+"""The page Difference: any two rule sets, counted by two shields."""
+
+from __future__ import annotations
+
+import json
+
+from sarl_core import Shield, load_demonstrations, mine_rules
+from sarl_core.mining.rule_files import rules_to_json
+from tests.app.screens import ROUTER, errors, open_page, texts
+
+DATA = ROUTER.parents[1] / "data" / "demonstrations"
+CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
+COARSE = mine_rules(CARTPOLE, supp_min=0.05, conf_min=0.8)
+FINE = mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0)
+
+
+def said(rules):  # type: ignore[no-untyped-def]
+    found = Shield(rules).decide_batch(CARTPOLE.observations, CARTPOLE.actions).rules[:, 0]
+    return [rules.rules[index].action if index >= 0 else 2 for index in found.tolist()]
+
+
+def test_two_sets_are_compared_on_the_demonstrations() -> None:
+    app = open_page("difference", data="cartpole", support="0.05", confidence="0.8")
+    one, other = said(COARSE), said(FINE)
+    different = sum(a != b for a, b in zip(one, other, strict=True))
+    assert f"decide {different:,} of {len(CARTPOLE):,} demonstrated states" in texts(app)
+    chart = json.loads(app.get("plotly_chart")[0].proto.spec)
+    cells = next(trace for trace in chart["data"] if trace["name"] == "different")["text"]
+    for row in range(3):
+        for column in range(3):
+            count = sum((a, b) == (row, column) for a, b in zip(one, other, strict=True))
+            assert cells[row][column] == (f"{count:,}" if count else "")
+    examples = app.dataframe[0].value
+    assert len(examples) == min(50, different)
+    shown = examples[["At the thresholds says", "Unfiltered says"]]
+    assert (shown.iloc[:, 0] != shown.iloc[:, 1]).all()
+    rules = app.dataframe[1].value
+    counts = rules["What"].value_counts()
+    assert counts.get("added", 0) - counts.get("removed", 0) == len(FINE) - len(COARSE)
+    app.button_group(key="kind").set_value("added").run()
+    assert set(app.dataframe[1].value["What"]) == {"added"}
+
+
+def test_a_set_and_itself() -> None:
+    app = open_page("difference", data="cartpole", first="filtered", second="filtered")
+    assert "decide none" in texts(app)
+    assert len(app.dataframe) == 0
+
+
+def test_an_own_file_is_asked_for_and_one_for_something_else_is_refused() -> None:
+    app = open_page("difference", data="cartpole", first="filtered", second="own file")
+    assert "No rule file has been uploaded" in texts(app)
+    pendulum = mine_rules(
+        load_demonstrations(DATA / "pendulum.parquet"), supp_min=0.1, conf_min=0.8
+    )
+    content = rules_to_json(pendulum).encode()
+    app.file_uploader(key="second_file").set_value(("far.json", content, "application/json"))
+    app.run()
+    (sentence,) = errors(app)
+    assert "different features" in sentence
+    content = rules_to_json(FINE).encode()
+    app.file_uploader(key="second_file").set_value(("fine.json", content, "application/json"))
+    app.run()
+    assert not errors(app)
+    assert "fine.json" in texts(app)
+
+
+def test_one_action_of_several_at_a_time() -> None:
+    app = open_page("difference", data="bipedal_walker", first="filtered", second="unfiltered")
+    names = app.button_group(key="decided").options
+    assert len(names) == 4
+    app.button_group(key="decided").set_value(names[1]).run()
+    assert not app.exception
+    assert "action" not in app.query_params

@@ -1,0 +1,232 @@
+"""The page Edit: every edit, what it changes, undo and redo, files, and who else knows of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import Shield, load_demonstrations, mine_rules
+from sarl_core.explaining.language import share_text
+from sarl_core.mining.editing import Add, apply
+from sarl_core.mining.manual_rules import Ask, manual_rule
+from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rules import RuleSet
+from tests.app.screens import ROUTER, errors, metrics, open_page, texts
+
+DATA = ROUTER.parents[1] / "data" / "demonstrations"
+CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
+FILTERED = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
+
+
+def click(app: AppTest, key: str) -> None:
+    app.button(key=key).click().run()
+    assert not app.exception, app.exception
+
+
+def draft(app: AppTest, name: str) -> str:
+    """The key of a widget of the form, whichever draft it is."""
+    keys = [widget.key for kind in (app.button, app.selectbox, app.number_input) for widget in kind]
+    return next(key for key in keys if key.startswith("draft") and key.split("_", 1)[1] == name)
+
+
+def warnings(app: AppTest) -> str:
+    return "\n".join(str(one.value).replace("\\", "") for one in app.warning)
+
+
+def labels(app: AppTest) -> list[str]:
+    return [button.label.replace("\\", "") for button in app.button]
+
+
+def table(app: AppTest):  # type: ignore[no-untyped-def]
+    return app.dataframe[0].value
+
+
+def differently(before: RuleSet, after: RuleSet) -> int:
+    """On how many demonstrated states two shields say different things of some action."""
+    said = []
+    for rules in (before, after):
+        found = Shield(rules).decide_batch(CARTPOLE.observations, CARTPOLE.actions).rules[:, 0]
+        said.append([rules.rules[index].action if index >= 0 else None for index in found])
+    return sum(one != other for one, other in zip(*said, strict=True))
+
+
+def fill_in(app: AppTest, feature: str, sign: str, number: float, action: int) -> None:
+    app.selectbox(key=draft(app, "feature_0")).select(feature)
+    app.selectbox(key=draft(app, "sign_0")).select(sign)
+    app.number_input(key=draft(app, "at_0")).set_value(number)
+    app.selectbox(key=draft(app, "action")).set_value(action).run()
+    assert not app.exception, app.exception
+
+
+def test_each_edit_says_what_it_changes_and_every_step_is_undone() -> None:
+    rule = max(FILTERED.rules, key=lambda one: one.samples)
+    app = open_page("edit", data="cartpole", rule=rule.id)
+    plain = metrics(app)
+    assert plain["Rules in force"] == str(len(FILTERED))
+    assert plain["Coverage"] == share_text(FILTERED.coverage, decimals=1)
+    assert plain["Fidelity"] == share_text(FILTERED.fidelity, decimals=1)
+    assert table(app)["Decides"].tolist() == sorted(
+        (r.samples for r in FILTERED.rules), reverse=True
+    )
+    click(app, "edit_switch")
+    assert metrics(app)["Decided differently"] == f"{rule.samples:,}"
+    assert metrics(app)["Rules in force"] == str(len(FILTERED) - 1)
+    assert f"Undo: switch off {rule.id}" in labels(app)
+    assert f"{rule.samples:,} had a rule and now have none" in texts(app)
+    click(app, "edit_pin")
+    assert table(app)["Kind"].tolist()[0] == "pinned"
+    assert "Unpin" in labels(app)
+    click(app, "undo")
+    click(app, "undo")
+    assert metrics(app) == plain
+    assert f"Redo: switch off {rule.id}" in labels(app)
+    click(app, "redo")
+    assert metrics(app)["Decided differently"] == f"{rule.samples:,}"
+    # The thresholds move: the edit waits, and comes back with its rule.
+    app.switch_page("thresholds.py").run()
+    app.select_slider(key="confidence").set_value(0.5).run()
+    app.switch_page("edit.py").run()
+    assert metrics(app)["Decided differently"] == "0"
+    assert f"Undo: switch off {rule.id}" in labels(app)
+
+
+def test_a_rule_by_hand_is_previewed_added_moved_changed_and_removed() -> None:
+    app = open_page("edit", data="cartpole")
+    fill_in(app, "pole angle", "above", 0.0, 0)
+    by_hand = manual_rule(FILTERED, [Ask("pole angle", ">", 0.0)], rule_id="manual.1", action=0)
+    after = apply(FILTERED, [Add(by_hand)])
+    states = CARTPOLE.observations[:, 2] > 0
+    words = texts(app)
+    assert f"It would decide {int(states.sum()):,} of {len(CARTPOLE):,}" in words
+    assert f"did as it says in {int((CARTPOLE.actions[states] == 0).sum()):,} of them" in words
+    assert f"{differently(FILTERED, after):,} of {len(CARTPOLE):,}" in words
+    assert metrics(app)["Decided differently"] == "0"  # it is not there yet
+    click(app, draft(app, "save"))
+    assert metrics(app)["Decided differently"] == f"{differently(FILTERED, after):,}"
+    assert (table(app)["Rule"][0], table(app)["Kind"][0]) == ("manual.1", "manual")
+    overruled = app.dataframe[1].value
+    assert overruled["States"].sum() == int(metrics(app)["Conflicts"].replace(",", ""))
+    assert set(overruled["Rule"]) == {"manual.1"}
+    # A second one, and the order.
+    fill_in(app, "pole angle", "above", 0.0, 1)
+    click(app, draft(app, "save"))
+    assert table(app)["Rule"].tolist()[:2] == ["manual.1", "manual.2"]
+    click(app, "edit_up")
+    assert table(app)["Rule"].tolist()[:2] == ["manual.2", "manual.1"]
+    assert table(app)["Decides"].tolist()[:2] == [int(states.sum()), 0]
+    click(app, "change_rule")
+    app.number_input(key=draft(app, "at_0")).set_value(0.05).run()
+    click(app, draft(app, "save"))
+    assert any(label.startswith("Undo: change manual.2") for label in labels(app))
+    assert table(app)["Decides"][0] == int((CARTPOLE.observations[:, 2] > 0.05).sum())
+    click(app, "edit_remove")
+    assert table(app)["Rule"].tolist()[0] == "manual.1"
+    assert "Undo: remove manual.2" in labels(app)
+
+
+def test_what_is_wrong_with_a_rule_is_said_and_nothing_is_lost() -> None:
+    app = open_page("edit", data="cartpole")
+    click(app, "edit_switch")
+    fill_in(app, "pole angle", "above", 2.0, 0)
+    click(app, draft(app, "more"))
+    app.selectbox(key=draft(app, "feature_1")).select("pole angle")
+    app.selectbox(key=draft(app, "sign_1")).select("at most")
+    app.number_input(key=draft(app, "at_1")).set_value(1.0).run()
+    assert "'pole angle' cannot be above 2 and at most 1" in warnings(app)
+    assert app.button(key=draft(app, "save")).disabled
+    # Elsewhere and back: the edit and what was filled in are still there.
+    app.switch_page("rules.py").run()
+    assert "You have made 1 edit of these rules" in texts(app)
+    app.switch_page("edit.py").run()
+    assert any(label.startswith("Undo: switch off") for label in labels(app))
+    assert "cannot be above 2 and at most 1" in warnings(app)
+    click(app, draft(app, "fewer_0"))
+    click(app, draft(app, "fewer_1"))
+    assert "Without conditions the rule applies always" in warnings(app)
+    assert not app.button(key=draft(app, "save")).disabled
+
+
+def test_a_rule_file_is_edited_and_one_that_is_none_loses_nothing(tmp_path: Path) -> None:
+    given = apply(
+        FILTERED,
+        [Add(manual_rule(FILTERED, [Ask("pole angle", ">", 0.1)], rule_id="manual.1", action=1))],
+    )
+    app = open_page("edit", data="cartpole", base="own file")
+    assert "No rule file has been uploaded" in texts(app)
+    content = rules_to_json(given).encode()
+    app.file_uploader(key="edit_rule_file").set_value(("mine.json", content, "application/json"))
+    app.run()
+    assert table(app)["Rule"].tolist()[0] == "manual.1"
+    assert "The rules of mine.json" in texts(app)
+    click(app, "edit_remove")
+    assert "manual.1" not in table(app)["Rule"].tolist()
+    app.file_uploader(key="edit_rule_file").set_value(("torn.json", b"{", "application/json"))
+    app.run()
+    (sentence,) = errors(app)
+    assert "torn.json is not JSON" in sentence
+    assert "manual.1" not in table(app)["Rule"].tolist()
+    click(app, "undo")
+    assert table(app)["Rule"].tolist()[0] == "manual.1"
+
+
+def test_rules_of_something_else_are_counted_on_random_states() -> None:
+    app = open_page("edit", data="pendulum", base="own file")
+    content = rules_to_json(FILTERED).encode()
+    app.file_uploader(key="edit_rule_file").set_value(("cart.json", content, "application/json"))
+    app.run()
+    assert not app.exception
+    assert "counted on random states" in texts(app)
+    assert metrics(app)["Fidelity"] == "–"
+    click(app, "edit_switch")
+    assert int(metrics(app)["Decided differently"].replace(",", "")) > 0
+
+
+def test_the_file_holds_the_edits_and_others_can_choose_them() -> None:
+    app = open_page("edit", data="cartpole")
+    assert "edited" not in open_page("replay", data="cartpole").selectbox(key="rules").options
+    click(app, "edit_switch")
+    click(app, "edit_pin")
+    off = table(app)["Rule"][0]
+    button = next(one for one in app.get("download_button") if one.proto.id.count("edited_file"))
+    assert button is not None
+    app.switch_page("shield.py").run()
+    assert "edited" in app.button_group(key="shields").options
+    app.switch_page("replay.py").run()
+    app.selectbox(key="rules").select("edited")
+    app.selectbox(key="agent").select("novice").run()
+    click(app, "run")
+    assert not errors(app)
+    assert f"{len(FILTERED):,} rules (edited)" in texts(app)
+    app.switch_page("difference.py").run()
+    app.selectbox(key="first").select("before the edits")
+    app.selectbox(key="second").select("edited").run()
+    rows = app.dataframe[1].value
+    assert rows["Rule"].tolist() == [off]
+    assert rows["Change"].tolist() == ["switched off; pinned"]
+    app.switch_page("edit.py").run()
+    click(app, "undo")
+    click(app, "undo")
+    app.switch_page("shield.py").run()
+    assert "edited" not in app.button_group(key="shields").options
+
+
+def test_the_form_offers_every_action_of_every_dimension() -> None:
+    app = open_page("edit", data="bipedal_walker")
+    app.selectbox(key=draft(app, "dimension")).set_value(2)
+    app.selectbox(key=draft(app, "action")).set_value(1)
+    app.number_input(key=draft(app, "at_0")).set_value(0.0).run()
+    assert not app.exception
+    click(app, draft(app, "save"))
+    assert table(app)["Rule"][0] == "manual.1"
+    assert json.loads(json.dumps(errors(app))) == []
+
+
+def test_nothing_to_edit_leaves_room_for_a_rule_by_hand() -> None:
+    app = open_page("edit", data="cartpole", support="1", confidence="1")
+    assert "No rule is in force at these thresholds" in texts(app)
+    fill_in(app, "pole angle", "at most", 0.0, 0)
+    click(app, draft(app, "save"))
+    assert table(app)["Rule"].tolist() == ["manual.1"]
+    assert rules_from_json(rules_to_json(FILTERED)) == FILTERED

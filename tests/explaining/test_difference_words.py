@@ -1,0 +1,165 @@
+"""Edits and differences in words, tables and a figure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core import RuleSet, mine_rules
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.explaining.difference_figures import confusion_figure
+from sarl_core.explaining.difference_tables import example_rows, rule_rows
+from sarl_core.explaining.difference_words import (
+    decided_text,
+    difference_document,
+    kinds_text,
+    rows_text,
+    said_text,
+)
+from sarl_core.explaining.edit_words import change_text, conflict_text, edit_text, state_text
+from sarl_core.mining.editing import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.manual_rules import Ask, manual_rule
+from sarl_core.mining.rules import Condition, Rule, Thresholds
+from sarl_core.mining.tree import Source
+from sarl_core.shielding.deciding import ground_of
+from sarl_core.shielding.disagreement import disagreement
+from sarl_core.shielding.effects import change, expert_labels, fits, verdicts
+
+ACTIONS = (LabelledDimension("push", ("left", "right")),)
+STATES = np.linspace(0.05, 0.95, 10, dtype=np.float32).reshape(-1, 1)
+SHOWN = Demonstrations(
+    STATES,
+    (STATES[:, 0] > 0.5).astype(int),
+    np.zeros(10, dtype=int),
+    feature_names=("angle",),
+    feature_units=("rad",),
+    label_names=(("left", "right"),),
+    action_names=("push",),
+    env_id="Here-v0",
+)
+SOURCE = Source("Here-v0", (Feature("angle", "rad"),), SHOWN.digest, 10, 1)
+LOW = Rule("0.1", 0, (Condition(0, "<=", 0.5),), 0, 0.5, 1.0, 2.0, 5)
+RULES = RuleSet((LOW,), ACTIONS, SOURCE, Thresholds(0.1, 0.9))
+HAND = manual_rule(
+    RULES, [Ask("angle", ">", 0.3)], rule_id="manual.1", action=1, demonstrations=SHOWN
+)
+
+
+@pytest.mark.parametrize(
+    ("edit", "text"),
+    [
+        (Switch("0.1", False), "switch off 0.1"),
+        (Switch("0.1", True), "switch on 0.1"),
+        (Pin(LOW), "pin 0.1"),
+        (Unpin("0.1"), "unpin 0.1"),
+        (Move("manual.1", True), "move manual.1 up"),
+        (Move("manual.1", False), "move manual.1 down"),
+        (Remove("manual.1"), "remove manual.1"),
+        (Add(HAND), "add manual.1 (if the angle is above 0.3 rad, then right)"),
+        (Change(HAND), "change manual.1 (if the angle is above 0.3 rad, then right)"),
+    ],
+)
+def test_an_edit_in_words(edit, text):
+    assert edit_text(edit, RULES) == text
+
+
+def test_what_became_of_a_rule():
+    told = [LOW, replace(LOW, pinned=True), HAND, replace(HAND, enabled=False)]
+    assert [state_text(rule) for rule in told] == ["mined", "pinned", "manual", "manual, off"]
+
+
+def test_a_change_and_a_conflict_in_words():
+    ground, expert = ground_of(RULES, STATES), expert_labels(RULES, SHOWN)
+    before = verdicts(ground, RULES, expert)
+    after = verdicts(ground, apply(RULES, [Add(HAND)]), expert)
+    # Above 0.3 are 7 states: 5 had no rule, 2 (0.35 and 0.45) the other one.
+    assert change_text(change(before, after), before, after, states="state") == (
+        "7 of 10 states are decided differently (5 had no rule and now have one). Coverage rises "
+        "from 50 % to 100 % and fidelity falls from 100 % to 80 %."
+    )
+    assert change_text(change(before, before), before, before, states="state") == (
+        "None of 10 states is decided differently."
+    )
+    assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (
+        "manual.1 (right) takes 2 states from 0.1 (left); the expert did as manual.1 says in 0 of "
+        "them, as 0.1 says in 2."
+    )
+    unknown = verdicts(ground, after.rule_set)
+    assert conflict_text(unknown.conflicts[0], unknown.rule_set, states="state") == (
+        "manual.1 (right) takes 2 states from 0.1 (left)."
+    )
+
+
+EDITED = apply(RULES, [Add(HAND), Switch("0.1", False)])
+FOUND = disagreement(RULES, EDITED, STATES)
+
+
+def test_a_difference_in_words():
+    assert rows_text(FOUND) == "1 rule added, none removed, 1 rule changed, none the same."
+    assert (
+        decided_text(FOUND, states="state") == "The two decide 10 of 10 states (100 %) differently."
+    )
+    assert kinds_text(FOUND, 0, ("A", "B")) == (
+        "2 where both have a rule and they say different things, 3 where only A has a rule, 5 "
+        "where only B has a rule"
+    )
+    same = disagreement(RULES, RULES, STATES)
+    assert decided_text(same, states="state") == "The two decide none of 10 states differently."
+    assert kinds_text(same, 0, ("A", "B")) == "none"
+    assert [said_text(label, ACTIONS[0]) for label in (0, 1, 2, -1)] == [
+        "left",
+        "right",
+        "no rule",
+        "no rule",
+    ]
+
+
+def test_what_looks_the_same_is_told_in_full():
+    near = replace(LOW, conditions=(Condition(0, "<=", 0.50000001),))
+    found = disagreement(RULES, replace(RULES, rules=(near,)), STATES)
+    assert rule_rows(found)["Change"] == ["angle <= 0.50000001 instead of angle <= 0.5"]
+
+
+def test_a_document_and_tables():
+    document = difference_document(FOUND, names=("a", "b"), states_from="here")
+    assert [rule["id"] for rule in document["added"]] == ["manual.1"]
+    assert document["changed"][0]["text"] == "switched off"
+    assert document["states"] == {"from": "here", "count": 10, "different": 10, "share": 1.0}
+    assert document["dimensions"][0]["confusion"] == [[0, 2, 3], [0, 0, 0], [0, 5, 0]]
+    rows = rule_rows(FOUND)
+    assert rows["What"] == ["changed", "added"]
+    assert rows["Rule"] == ["0.1", "manual.1"]
+    assert rule_rows(FOUND, ("added",))["When"] == ["angle > 0.3 rad"]
+    examples = example_rows(FOUND, 0, STATES, names=("a", "b"), demonstrations=SHOWN, most=4)
+    assert examples["Step"] == [0, 3, 6, 9]
+    assert examples["A says"] == ["left", "left", "no rule", "no rule"]
+    assert examples["B says"] == ["no rule", "right", "right", "right"]
+    assert examples["Rule, b"] == ["–", "manual.1", "manual.1", "manual.1"]
+    assert examples["Expert did"] == ["left", "left", "right", "right"]
+    assert "Expert did" not in example_rows(FOUND, 0, STATES, names=("a", "b"))
+
+
+def test_the_figure_shows_every_cell_and_no_markup_of_a_file():
+    odd = (LabelledDimension("push", ("<b>left</b>", "right")),)
+    found = disagreement(replace(RULES, actions=odd), replace(EDITED, actions=odd), STATES)
+    figure = confusion_figure(found, 0, names=("<i>a</i>", "b"))
+    told = {trace.name: trace for trace in figure.data}
+    assert list(told["different"].text[0]) == ["", "2", "3"]
+    assert list(told["different"].text[2]) == ["", "5", ""]
+    assert "<b>left" not in figure.to_json()
+    assert "<i>" not in figure.to_json()
+    assert figure.layout.xaxis.ticktext[-1] == "no rule"
+
+
+def test_demonstrations_fit_rules_of_their_features_and_actions():
+    mined = mine_rules(SHOWN, supp_min=0.0, conf_min=1.0)
+    assert fits(mined, SHOWN)
+    renamed = replace(SOURCE, features=(Feature("tilt", ""),))
+    assert fits(replace(RULES, source=renamed), SHOWN)
+    assert not fits(replace(RULES, source=replace(renamed, env_id="")), SHOWN)
+    assert not fits(replace(RULES, actions=ACTIONS * 2), SHOWN)
+    torque = (LabelledDimension.of_edges("push", (-1, 0, 1)),)
+    assert not fits(replace(RULES, actions=torque), SHOWN)
