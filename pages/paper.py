@@ -13,7 +13,7 @@ from sarl_core.errors import SarlError
 from sarl_core.explaining.language import counted
 from sarl_core.reproducing.report import Entry, Report
 from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import VERDICTS
+from sarl_core.reproducing.study import FULL_MINUTES, VERDICTS
 
 CLAIMS = "Claims"
 ALL = "all"
@@ -32,7 +32,7 @@ def load() -> Report:
     if found is None or not found.studies:
         st.info(
             "Nothing has been reproduced yet. This command, where the dashboard runs, makes every "
-            "figure; it takes about a quarter of an hour.",
+            f"figure; it takes about {FULL_MINUTES} minutes on two busy cores.",
             icon=":material/terminal:",
         )
         st.code(paper.COMMAND, language="sh")
@@ -68,8 +68,9 @@ def show_all_claims(found: Report) -> None:
             paper.show_claims(chosen, beside=False)
     st.caption(
         "Each verdict is decided by a rule, from the numbers alone. Intervals are over episodes or "
-        "learners; the demonstrations and the expert of an environment are one each, and others "
-        "may give other numbers."
+        "learners, and ranges over trees that choose differently among equally good queries; the "
+        "demonstrations and the expert of an environment are one each, and others may give other "
+        "numbers."
     )
 
 
@@ -185,7 +186,8 @@ def how_made(entry: Entry) -> None:
 st.title("Paper")
 st.caption(
     "The figures and claims of the paper behind this method, made again with the shipped experts "
-    "and demonstrations, with several seeds and with intervals."
+    "and demonstrations: rules with several tree seeds and their range, learners and episodes with "
+    "several seeds and 95 % intervals."
 )
 report = load()
 places = {STUDIES[name].place: name for name in STUDIES}

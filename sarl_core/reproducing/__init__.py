@@ -1,1 +1,1 @@
-"""The paper's figures and claims again, with several seeds and with intervals."""
+"""The paper's figures and claims again, with several seeds, and with ranges or intervals."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, cast
 
@@ -21,6 +22,7 @@ from sarl_core.reproducing.words import COMPARED, interval, number
 from sarl_core.rollouts.divider_study import DividerStudy, study_divider
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.statistics import Interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,6 +78,8 @@ def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
             demonstrations_of(env_id),
             episodes=effort.snapped_episodes,
             seed=FIRST_SEED,
+            # The walker's physics take nearly all the time; the result is the same, bit for bit.
+            jobs=1 if effort.quick else os.cpu_count() or 1,
             progress=told,
         )
         rows += [{"environment": env_id, **row} for row in _rows(found)]
@@ -207,15 +211,15 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
                 "iqm_high": found.high,
             }
         divided = {
-            part.dimension.name: {
+            parts[0].dimension.name: {
                 f"divider {one.divider}": {
-                    "never_seen": len(one.never_seen),
+                    "occupancy": one.occupancy.tolist(),
+                    "never_seen": list(one.never_seen),
                     **{f"error_{snapping}": one.errors[snapping] for snapping in SNAPPINGS},
                 }
                 for one in parts
             }
             for parts in quantisations_of(frame, env_id)
-            for part in parts[:1]
         }
         numbers[env_id] = {"returns": returns, "actions": divided}
     return numbers
@@ -272,29 +276,39 @@ def _finer(found: dict[str, dict[tuple[int, Snapping], Episodes]]) -> Claim:
 
 def _complexity(episodes: dict[tuple[int, Snapping], Episodes]) -> Claim:
     whole = episodes[0, "clip"].statistics
-    coarse = episodes[PAPER_DIVIDER, "centre"].statistics
-    kept = coarse.iqm / whole.iqm if whole.iqm > 0 else 0.0
+    centre, expert = (
+        episodes[PAPER_DIVIDER, snapping].statistics for snapping in ("centre", "expert")
+    )
+    kept = max(centre.iqm, expert.iqm) / whole.iqm if whole.iqm > 0 else 0.0
     return Claim(
         paper="That no rules help on BipedalWalker is put down to poor demonstrations and to an "
         "environment that is too complex.",
         where="text on Figure 7",
-        ours=f"Two intervals alone, without any rule, bring the expert from {interval(whole)} to "
-        f"{interval(coarse)}: "
-        + (
-            "with them nobody walks."
-            if kept < _SOME
-            else f"it keeps {share_text(min(kept, 1.0))} of its typical return."
-        ),
+        ours="Two intervals alone, without any rule, bring the expert from "
+        f"{interval(whole)} to {interval(centre)} if each action becomes the centre of its "
+        f"interval, as under the shield of Figure 7, and to {interval(expert)} if it becomes what "
+        f"the expert typically did in it. That leaves {_of_typical(centre, whole)} and "
+        f"{_of_typical(expert, whole)} of its typical return.",
         verdict=judge(kept >= _STAYS, kept >= _SOME),
-        decided_by="Agrees if the expert keeps half of its typical return when each of its actions "
-        f"becomes the centre of one of {PAPER_DIVIDER} intervals, as the shield's do; partly if it "
-        "keeps a quarter.",
-        numbers={"as_it_is": whole.iqm, "two_intervals": coarse.iqm},
+        decided_by=f"Agrees if the expert, its actions divided into {PAPER_DIVIDER} intervals, "
+        "keeps half of its typical return with the better of the two, the centre and its own "
+        "typical value; partly if it keeps a quarter.",
+        numbers={"as_it_is": whole.iqm, "centre": centre.iqm, "expert": expert.iqm},
     )
 
 
+def _of_typical(found: Interval, whole: Interval) -> str:
+    if min(found.iqm, whole.iqm) <= 0:
+        return "nothing"
+    return share_text(min(found.iqm / whole.iqm, 1.0))
+
+
 def _draw(frame: pd.DataFrame, part: str, dark: bool) -> tuple[Drawing, ...]:
-    from sarl_core.explaining.divider_figures import error_figure, snapped_figure
+    from sarl_core.explaining.divider_figures import (
+        error_figure,
+        occupancy_figure,
+        snapped_figure,
+    )
 
     env_id = next(one for one in _environments(frame) if environment_name(one) == part)
     divided, episodes = quantisations_of(frame, env_id), episodes_of(frame, env_id)
@@ -313,6 +327,16 @@ def _draw(frame: pd.DataFrame, part: str, dark: bool) -> tuple[Drawing, ...]:
             f"How far an action moves, as a share of its range, {part}",
             error_figure(divided, dark=dark).update_layout(height=max(height, 250)),
             alt=f"Root mean square of what snapping changes, for every action and divider, {part}",
+        ),
+        *(
+            Drawing(
+                f"Share of the steps in each interval of {one[0].dimension.name}, {part}",
+                occupancy_figure(one, dark=dark),
+                share=0.5 if len(divided) > 1 else 1.0,
+                alt=f"Share of the steps in every interval of {one[0].dimension.name}, for every "
+                f"divider, {part}; intervals that were never shown are hatched",
+            )
+            for one in divided
         ),
     )
 
@@ -335,7 +359,8 @@ DIVIDING = Study(
     about="Not in the paper, which leaves it open: the expert itself acts, and each of its actions "
     "is replaced by what stands for its own interval, the centre or what the expert typically did "
     "in it. Clip, the nearest value in the interval, is the action itself. What is lost is lost to "
-    "the division alone.",
+    "the division alone. Below, how often each interval was demonstrated; those that never were, "
+    "and that no rule can ask for, are hatched.",
     measure=measure,
     settings=_settings,
     numbers=_numbers,

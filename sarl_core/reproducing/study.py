@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 Verdict = Literal["agrees", "partly", "does not agree"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "partly", "does not agree")
 
+FULL_MINUTES = 75
+"""What all studies together took when their results were committed, on two busy cores."""
+
 FIRST_SEED = REPRODUCED  # of the episodes; no expert was trained or chosen by them
 
 

@@ -10,8 +10,11 @@ import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
+from sarl_core.reproducing.dividing import continuous
 from sarl_core.reproducing.report import Report, write_report
+from sarl_core.reproducing.shipped import environments, fingerprints
 from sarl_core.reproducing.studies import STUDIES
+from sarl_core.reproducing.study import FULL, FULL_MINUTES
 from sarl_core.reproducing.tables import write_table
 from tests.app.screens import ROUTER, errors, open_page, texts
 from tests.reproducing.frames import landscapes, learning
@@ -77,6 +80,7 @@ def charts(app: AppTest) -> list[dict[str, object]]:
 def test_before_anything_is_reproduced_the_page_says_how(folder: Path) -> None:
     app = open_page("paper")
     assert "Nothing has been reproduced yet" in texts(app)
+    assert f"takes about {FULL_MINUTES} minutes" in texts(app)
     assert [code.value for code in app.code] == ["python -m sarl_core reproduce --out docs/paper"]
     assert not charts(app)
 
@@ -106,7 +110,7 @@ def test_claims_are_sorted_by_their_verdict(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "figures", "claims"),
-    [("2", 2, 4), ("4", 3, 5), ("5", 2, 7), ("7", 2, 6), ("divider", 2, 2)],
+    [("2", 2, 4), ("4", 3, 5), ("5", 2, 7), ("7", 2, 6), ("divider", 3, 2)],
 )
 def test_a_figure_stands_beside_its_claims(
     name: str, figures: int, claims: int, folder: Path
@@ -206,8 +210,15 @@ def test_the_committed_results_are_whole() -> None:
         sys.path.pop(0)
     report = paper.report()
     assert list(report.studies) == list(STUDIES)
+    # What the page and the README say it takes is what it took.
+    took = sum(entry.seconds for entry in report.studies.values()) / 60
+    assert took == pytest.approx(FULL_MINUTES, rel=0.2)
     for name, entry in report.studies.items():
         assert not entry.quick, name
+        # Made of what is shipped now, all of it, in the way that this version knows.
+        assert entry.settings == json.loads(json.dumps(STUDIES[name].settings(FULL)))
+        own = entry.settings.get("environments", [entry.settings.get("environment")])
+        assert entry.inputs == {env_id: fingerprints(env_id) for env_id in own}, name
         frame = paper.table(name, entry)
         assert json.loads(json.dumps(STUDIES[name].numbers(frame))) == entry.numbers
         for file in entry.files.values():
@@ -221,4 +232,7 @@ def test_the_committed_results_are_whole() -> None:
             "Data (CSV)",
             "All numbers (JSON)",
         }
+    for name in ("2", "3", "table-1"):
+        assert report.studies[name].settings["environments"] == list(environments())
+    assert report.studies["divider"].settings["environments"] == list(continuous())
     assert sum(path.stat().st_size for path in paper.FOLDER.iterdir()) < 10_000_000

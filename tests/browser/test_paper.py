@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from playwright.sync_api import Page, expect
+from plotly.offline import get_plotlyjs
 
+from sarl_core.reproducing.sheets import SCRIPT
 from tests.browser.walking import no_trace, parameters, settle, visit
+
+PAPER = Path(__file__).parents[2] / "docs" / "paper"
 
 
 def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> None:
@@ -32,3 +37,21 @@ def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> 
     expect(screen.get_by_role("heading", name="Figure 2. Number of rules")).to_be_visible()
     expect(screen.locator(".js-plotly-plot .main-svg").first).to_be_visible()
     assert screen.locator(".js-plotly-plot").count() >= 8
+
+
+def test_a_page_in_a_clone_shows_its_picture_until_the_script_is_back(
+    screen: Page, tmp_path: Path
+) -> None:
+    for name in ("table_1.html", "table_1.png"):
+        shutil.copy(PAPER / name, tmp_path)
+    address = (tmp_path / "table_1.html").as_uri()
+    picture = screen.get_by_role("img", name="Table 1. The two named settings", exact=True)
+    screen.goto(address)
+    expect(picture).to_be_visible()
+    screen.wait_for_function("document.querySelector('.still img').naturalWidth > 1000")
+    expect(screen.get_by_text("is not beside this page")).to_be_visible()
+    assert screen.locator(".row:visible").count() == 0
+    (tmp_path / SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
+    screen.goto(address)
+    expect(screen.locator(".js-plotly-plot .main-svg").first).to_be_visible()
+    expect(picture).not_to_be_visible()

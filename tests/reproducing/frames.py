@@ -25,6 +25,7 @@ def landscapes(
                 {
                     "environment": env_id,
                     "divider": 0,
+                    "tree_seed": 0,
                     "support": supports.ravel(),
                     "confidence": confidences.ravel(),
                     "rule_count": np.asarray(values).ravel(),

@@ -20,18 +20,27 @@ WALKER, PENDULUM = "BipedalWalker-v3", "Pendulum-v1"
 WHOLE = np.linspace(280, 290, 20)
 
 
-def table(walker: Mapping[int, float], pendulum: Mapping[int, float] | None = None) -> pd.DataFrame:
-    """Returns around a value for each divider, snapped to the centre; 0 is the expert as it is."""
+def table(
+    walker: Mapping[int, float],
+    pendulum: Mapping[int, float] | None = None,
+    *,
+    typical: float | None = None,
+) -> pd.DataFrame:
+    """Returns around a value for each divider; 0 is the expert as it is.
+
+    Those of the two ways to snap are the same, but with two intervals what the expert typically
+    did brings the walker `typical`, where that is given.
+    """
     found = {WALKER: walker} | ({PENDULUM: pendulum} if pendulum else {})
-    return divided(
-        {
-            env_id: {
-                (divider, "centre" if divider else "clip"): WHOLE - 285 + value
-                for divider, value in values.items()
-            }
-            for env_id, values in found.items()
-        }
-    )
+    returns: dict[str, dict[tuple[int, str], np.ndarray]] = {}
+    for env_id, values in found.items():
+        returns[env_id] = {(0, "clip"): WHOLE - 285 + values[0]}
+        for divider, value in values.items():
+            for snapping in ("centre", "expert") if divider else ():
+                returns[env_id][divider, snapping] = WHOLE - 285 + value
+    if typical is not None:
+        returns[WALKER][2, "expert"] = WHOLE - 285 + typical
+    return divided(returns)
 
 
 def verdicts(frame: pd.DataFrame) -> list[Verdict]:
@@ -47,7 +56,33 @@ def test_two_intervals_that_cost_everything() -> None:
     assert "with 5, 285 as it is" in finer.ours
     assert "from 285 (" in complexity.ours
     assert " to −35 (" in complexity.ours
-    assert "nobody walks" in complexity.ours
+
+
+@pytest.mark.parametrize(
+    ("centre", "typical", "expected"),
+    [
+        (-58, -58, "does not agree"),
+        (-58, 70, "does not agree"),  # of 285, a quarter is 71.25 and a half 142.5
+        (-58, 73, "partly"),
+        (-58, 135, "partly"),
+        (-58, 144, "agrees"),
+        (135, -58, "partly"),
+        (144, -58, "agrees"),
+        (144, 135, "agrees"),
+    ],
+)
+def test_the_better_way_to_snap_decides_whether_two_intervals_are_enough(
+    centre: float, typical: float, expected: Verdict
+) -> None:
+    frame = table({0: 285, 2: centre, 3: 284}, typical=typical)
+    complexity = DIVIDING.claims({"divider": frame})[1]
+    assert complexity.verdict == expected
+    assert complexity.numbers == pytest.approx(
+        {"as_it_is": 285, "centre": centre, "expert": typical}, abs=1
+    )
+    # Both are told, whichever decides.
+    for value in (centre, typical):
+        assert f"{value} (".replace("-", "−") in complexity.ours
 
 
 @pytest.mark.parametrize(
@@ -100,6 +135,7 @@ def test_the_table_holds_what_the_expert_brings(
     numbers = DIVIDING.numbers(frame)[PENDULUM]
     assert numbers["returns"]["as it is"]["mean"] == pytest.approx(own.returns.mean())
     assert set(numbers["actions"]["torque"]["divider 9"]) == {
+        "occupancy",
         "never_seen",
         "error_centre",
         "error_clip",
@@ -111,8 +147,37 @@ def test_the_table_holds_what_the_expert_brings(
 def test_figures_show_returns_and_errors(dark: bool) -> None:
     frame = table({0: 285, 2: -35, 3: 180}, {0: -150, 2: -400, 3: -150})
     assert DIVIDING.parts(frame) == ("Bipedal Walker", "Pendulum")
-    returns, errors = DIVIDING.draw(frame, "Pendulum", dark)
+    returns, errors, _ = DIVIDING.draw(frame, "Pendulum", dark)
     centre, clip, _ = np.asarray(returns.figure.data[0].z, dtype=float)
     assert centre == pytest.approx([-400, -150], abs=1)
     assert clip == pytest.approx([-150, -150], abs=1)
     assert np.asarray(errors.figure.data[0].z)[0] == pytest.approx([0.125, 0.5 / 6])
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_figures_show_how_often_each_interval_was_demonstrated(dark: bool) -> None:
+    frame = table({0: 285, 2: -35, 3: 180})
+    # The first interval of each divider was never demonstrated.
+    *_, lies = DIVIDING.draw(frame, "Bipedal Walker", dark)
+    assert "torque" in lies.title
+    assert "never shown" in lies.alt
+    bars = {bar.y[0]: bar for bar in lies.figure.data}
+    assert list(bars) == ["2 intervals", "3 intervals"]
+    halves, thirds = bars.values()
+    assert list(halves.marker.color) == [0, 1]
+    assert list(thirds.marker.color) == [0, 0.5, 0.5]
+    assert [bool(shape) for shape in thirds.marker.pattern.shape] == [True, False, False]
+    assert list(thirds.base) == pytest.approx([-1, -1 / 3, 1 / 3])
+    numbers = DIVIDING.numbers(frame)[WALKER]["actions"]["torque"]
+    assert numbers["divider 3"]["occupancy"] == [0, 0.5, 0.5]
+    assert numbers["divider 3"]["never_seen"] == [0]
+
+
+def test_every_action_has_its_own_figure_of_where_it_lies() -> None:
+    frame = table({0: 285, 2: -35, 3: 180})
+    other = frame[frame["what"] != "return"].assign(action="knee")
+    drawn = DIVIDING.draw(pd.concat([frame, other]), "Bipedal Walker", False)
+    assert [one.title for one in drawn[2:]] == [
+        "Share of the steps in each interval of torque, Bipedal Walker",
+        "Share of the steps in each interval of knee, Bipedal Walker",
+    ]

@@ -4,9 +4,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sarl_core import mine_rules
-from sarl_core.reproducing.landscapes import COUNT, LENGTH, landscape_of
-from sarl_core.reproducing.shipped import demonstrations_of, environments, trees_of
+from sarl_core import grow_policy_trees, mine_rules
+from sarl_core.reproducing import landscape_table
+from sarl_core.reproducing.landscape_table import landscape_of
+from sarl_core.reproducing.landscapes import COUNT, LENGTH
+from sarl_core.reproducing.shipped import (
+    TREE_SEEDS,
+    demonstrations_of,
+    environments,
+    trees_of,
+)
 from sarl_core.reproducing.study import QUICK, Verdict
 from tests.reproducing.frames import landscapes
 
@@ -20,13 +27,23 @@ def verdicts(frame: pd.DataFrame, name: str = "2") -> list[Verdict]:
     return [claim.verdict for claim in study.claims({name: frame})]
 
 
-def test_the_table_is_what_mining_at_each_cell_gives() -> None:
+def test_the_table_is_what_mining_at_each_cell_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds = (0, 4)
+    assert set(seeds) < set(TREE_SEEDS)
+    monkeypatch.setattr(landscape_table, "TREE_SEEDS", seeds)  # two are enough here
     told = []
     frame = COUNT.measure(QUICK, lambda done, total: told.append((done, total)))
-    assert told == [(done, len(environments())) for done in range(len(environments()) + 1)]
-    assert len(frame) == 231 * len(environments())
+    every = len(environments()) * len(seeds)
+    assert told == [(done, every) for done in range(every + 1)]
+    assert len(frame) == 231 * every
     assert tuple(frame.columns) == COUNT.columns
-    chosen = frame[frame["environment"] == "LunarLander-v3"]
+    lander = frame[frame["environment"] == "LunarLander-v3"]
+    last = lander[lander["tree_seed"] == seeds[-1]]
+    trees = grow_policy_trees(demonstrations_of("LunarLander-v3"), seed=seeds[-1])
+    corner = mine_rules(trees, supp_min=0, conf_min=1)
+    assert last["rule_count"].iloc[20] == corner.rule_count
+    assert last["mean_length"].iloc[20] == pytest.approx(corner.mean_length)
+    chosen = lander[lander["tree_seed"] == 0]
     for row in chosen.iloc[[0, 20, 34, 52, 230]].itertuples():
         rules = mine_rules(
             demonstrations_of("LunarLander-v3"), supp_min=row.support, conf_min=row.confidence
@@ -34,7 +51,7 @@ def test_the_table_is_what_mining_at_each_cell_gives() -> None:
         assert row.rule_count == rules.rule_count
         assert row.mean_length == pytest.approx(rules.mean_length)
         assert row.coverage == pytest.approx(rules.coverage)
-    walker = frame[frame["environment"] == "BipedalWalker-v3"]
+    walker = frame[(frame["environment"] == "BipedalWalker-v3") & (frame["tree_seed"] == 0)]
     assert walker["divider"].unique().tolist() == [2]
     assert walker["rule_count"].max() == sum(
         len(mine_rules([tree], supp_min=0, conf_min=1)) for tree in trees_of("BipedalWalker-v3")
@@ -123,7 +140,44 @@ def test_numbers_name_the_greatest_value_and_its_place() -> None:
         "at_support": 0.0,
         "at_confidence": 1.0,
         "at_support_0_confidence_1": 90.0,
+        "at_support_0_confidence_1_over_tree_seeds": [90.0, 90.0],
+        "mean_range_over_tree_seeds": 0.0,
+        "widest_range_over_tree_seeds": 0.0,
     }
+
+
+# --- several tree seeds --------------------------------------------------------------------------
+
+
+def seeded(*counts: np.ndarray) -> pd.DataFrame:
+    """A table of Cart Pole with one landscape a tree seed."""
+    parts = [
+        landscapes({"CartPole-v1": one}).assign(tree_seed=seed) for seed, one in enumerate(counts)
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_numbers_tell_how_far_tree_seeds_lead_apart() -> None:
+    other = AS_THE_PAPER.copy()
+    other[0, 3], other[1, 2] = 96, 1
+    found = COUNT.numbers(seeded(AS_THE_PAPER, other))["CartPole-v1"]
+    assert found["at_support_0_confidence_1"] == 90  # of the first
+    assert found["at_support_0_confidence_1_over_tree_seeds"] == [90, 96]
+    assert found["widest_range_over_tree_seeds"] == 6
+    assert found["mean_range_over_tree_seeds"] == pytest.approx((6 + 2) / 12)
+
+
+def test_a_verdict_holds_for_every_tree_seed() -> None:
+    same = COUNT.claims({"2": seeded(AS_THE_PAPER, AS_THE_PAPER, AS_THE_PAPER)})
+    assert [claim.verdict for claim in same] == ["agrees", "agrees", "partly", "agrees"]
+    assert all(claim.ours.endswith("with all of 3 tree seeds.") for claim in same)
+    more = AS_THE_PAPER.copy()
+    more[1, 2] = 91  # more rules there than at support 0 and confidence 1
+    most = COUNT.claims({"2": seeded(AS_THE_PAPER, more, AS_THE_PAPER)})[0]
+    assert most.verdict == "partly"
+    assert "90 rules" in most.ours  # tree seed 0 is told, and how many are like it
+    assert "of 3, 2 lead to its verdict" in most.ours
+    assert most.numbers["tree_seeds_of_this_verdict"] == 2
 
 
 @pytest.mark.parametrize("dark", [False, True])
