@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,3 +53,50 @@ def _first(
     rules = shield.decide_batch(states, any_action).rules
     found = np.flatnonzero((rules >= 0).all(axis=1) == covered)
     return states[found[0]].copy() if len(found) else None
+
+
+class Span(NamedTuple):
+    """Where the demonstrated values of one feature lie, as float32 numbers.
+
+    Attributes:
+        low: The least, lower where all are the same.
+        middle: The median.
+        high: The largest, higher where all are the same.
+    """
+
+    low: float
+    middle: float
+    high: float
+
+
+def feature_spans(observations: NDArray[np.float32]) -> tuple[Span, ...]:
+    """Where the demonstrated values of each feature lie.
+
+    Args:
+        observations: Shape (N, d).
+
+    Returns:
+        One entry a feature; `low` is below `high`.
+    """
+    low, high = observations.min(axis=0), observations.max(axis=0)
+    same = low == high
+    low, high = (
+        np.where(same, low - np.float32(0.5), low),
+        np.where(same, high + np.float32(0.5), high),
+    )
+    middle = np.median(observations, axis=0).astype(np.float32)
+    return tuple(map(Span, low.tolist(), middle.tolist(), high.tolist()))
+
+
+def within(state: NDArray[np.float32], spans: Sequence[Span]) -> NDArray[np.float32]:
+    """The nearest state whose every value was demonstrated.
+
+    Args:
+        state: Shape (d,).
+        spans: Of the d features.
+
+    Returns:
+        Shape (d,); the same where it lies within.
+    """
+    low, _, high = (np.array(ends, dtype=np.float32) for ends in zip(*spans, strict=True))
+    return np.clip(state, low, high)

@@ -1,0 +1,319 @@
+"""What if: one state, and what the shield would do in it, why, and what would change that."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import _compact
+import _edits
+import _state as state
+import numpy as np
+import streamlit as st
+from _choices import PROJECTIONS
+from _outside import no_boxes_notice, outside_choice
+from _replays import kept_replays
+from _what_if_view import show
+from _words import escaped
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.language import label_text
+from sarl_core.explaining.what_if import by_use
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.near import Neighbourhood, feature_spreads
+from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
+from sarl_core.shielding.shield import Outside, Projection, Shield
+
+MEDIAN = "the median of every feature"
+DEMONSTRATED = "a demonstrated state"
+REPLAY = "a step of the replay"
+COVERED = "a random covered state"
+UNCOVERED = "a random uncovered state"
+SOURCES = (MEDIAN, DEMONSTRATED, REPLAY, COVERED, UNCOVERED)
+IN_FORCE, EDITED = "as mined", "edited"
+FIRST = 8  # features whose sliders are not folded away
+STEPS = 400  # of a slider
+
+
+@st.cache_resource(max_entries=24, show_spinner="Laying out the rules …")
+def prepared(
+    key: str, projection: Projection, outside: Outside, _rule_set: RuleSet
+) -> Neighbourhood:
+    """A shield, and its rules laid out for questions about single states."""
+    return Neighbourhood(Shield(_rule_set, projection=projection, outside=outside))
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def spans_of(
+    digest: str, _demonstrations: Demonstrations
+) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
+    """Where the values of each feature lie, and what a change of it is measured in."""
+    return feature_spans(_demonstrations.observations), feature_spreads(
+        _demonstrations.observations
+    )
+
+
+@st.cache_resource(max_entries=24, show_spinner=False)
+def order_of(key: str, _rule_set: RuleSet) -> tuple[int, ...]:
+    """The features that most rules ask about first."""
+    return by_use(_rule_set)
+
+
+def put(values: NDArray[np.float32], spans: tuple[Span, ...]) -> None:
+    """Move the sliders; for callbacks, and before they are drawn."""
+    near = within(values, spans)
+    for index, value in enumerate(near.tolist()):
+        st.session_state[f"x{index}"] = value
+    moved = int((near != values).sum())
+    st.session_state["_what_if_moved"] = moved
+
+
+def replayed() -> NDArray[np.float32] | None:
+    """The states of the latest replay, if it is of as many features."""
+    order = st.session_state.get("_replay")
+    found = kept_replays().get(order.request) if order is not None else None
+    if found is None or found.shown.steps is None:
+        return None
+    observations: NDArray[np.float32] = found.shown.steps.observation
+    return observations if observations.shape[1] == len(spans) else None
+
+
+def take(more: int = 0) -> None:
+    """Take the chosen state; for callbacks.
+
+    Args:
+        more: Added to the number first, for another one.
+    """
+    st.session_state["_what_if_none"] = ""
+    source = st.session_state.get("take", MEDIAN)
+    number = max(int(st.session_state.get("number") or 0) + more, 0)
+    if more:
+        st.session_state["number"] = number
+    if source == MEDIAN:
+        put(np.array([span.middle for span in spans], dtype=np.float32), spans)
+        return
+    if source in (COVERED, UNCOVERED):
+        found = random_state(
+            neighbourhood.shield,
+            demonstrations.observations,
+            covered=source == COVERED,
+            seed=number,
+        )
+        if found is None:
+            st.session_state["_what_if_none"] = (
+                "No state without a rule was found: these rules cover every state that was tried."
+                if source == UNCOVERED
+                else "No state was found that has a rule for every action dimension."
+            )
+            return
+        put(found, spans)
+        return
+    rows = demonstrations.observations if source == DEMONSTRATED else replayed()
+    if rows is None:
+        st.session_state["_what_if_none"] = (
+            "There is no replay of these features in this session. Run one on the Replay page, "
+            "then take a step of it here."
+        )
+        return
+    put(rows[number % len(rows)], spans)
+
+
+def settings() -> None:
+    """Where the state comes from."""
+    with st.container(border=True):
+        with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
+            st.selectbox(
+                "Take a state",
+                SOURCES,
+                key="take",
+                bind="query-params",
+                on_change=take,
+                width=280,
+                help="Where the sliders are put. Then move any of them. Covered: every action "
+                "dimension has a rule. Uncovered: some dimension has none.",
+            )
+            st.number_input(
+                "Number",
+                0,
+                2**31 - 1,
+                0,
+                key="number",
+                bind="query-params",
+                on_change=take,
+                width=150,
+                help="The row of the demonstrations, the step of the replay, or the seed of a "
+                "random state. The same number gives the same state.",
+            )
+            st.button("Take it", icon=":material/my_location:", on_click=take, key="take_it")
+            st.button(
+                "Another",
+                icon=":material/shuffle:",
+                on_click=take,
+                args=(1,),
+                key="another",
+                help="The next number",
+            )
+        problem = st.session_state.get("_what_if_none", "")
+        if problem:
+            st.info(problem, icon=":material/search_off:")
+        moved = int(st.session_state.get("_what_if_moved", 0))
+        if moved:
+            st.caption(
+                f":material/info: {moved} of its values lie beyond all demonstrated ones and were "
+                "moved to the nearest that was."
+            )
+
+
+def slider(index: int) -> float:
+    """One feature's slider."""
+    feature, span = demonstrations.features[index], spans[index]
+    return float(
+        st.slider(
+            escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name),
+            span.low,
+            span.high,
+            span.middle,
+            step=(span.high - span.low) / STEPS,
+            key=f"x{index}",
+            bind="query-params",
+            format="%.4g",
+        )
+    )
+
+
+def sliders() -> NDArray[np.float32]:
+    """The state."""
+    order = order_of(rules_key, rule_set)
+    values = dict.fromkeys(order, 0.0)
+    for index in order[:FIRST]:
+        values[index] = slider(index)
+    rest = order[FIRST:]
+    if rest:
+        with st.expander(f"{len(rest)} more features", icon=":material/unfold_more:"):
+            for index in rest:
+                values[index] = slider(index)
+    return np.array([values[index] for index in range(len(order))], dtype=np.float32)
+
+
+def proposal() -> Any:
+    """What the agent wants to do, in the environment's own form."""
+    several = len(rule_set.actions) > 1
+    values: list[float] = []
+    for index, dimension in enumerate(rule_set.actions):
+        title = f"The agent wants: {dimension.name}" if several else "The agent wants"
+        if dimension.is_interval:
+            low, high = dimension.edges[0], dimension.edges[-1]
+            values.append(
+                st.slider(
+                    title,
+                    low,
+                    high,
+                    (low + high) / 2,
+                    step=(high - low) / STEPS,
+                    key=f"a{index}",
+                    bind="query-params",
+                    format="%.3g",
+                )
+            )
+            continue
+        names = [label_text(label, dimension) for label in range(dimension.n_labels)]
+        chosen = st.selectbox(title, names, key=f"a{index}", bind="query-params")
+        values.append(dimension.first + names.index(chosen))
+    if rule_set.actions[0].is_interval:
+        return np.array(values, dtype=np.float32)
+    return np.array(values, dtype=np.int64) if several else int(values[0])
+
+
+def chosen_rules() -> tuple[RuleSet, str]:
+    """The set in force, or the same with the edits, and what tells it from others."""
+    if compact is not None:
+        found, key = compact.counted, compact.digest
+    else:
+        found = state.rule_set(grown)
+        key = repr((state.data_key(), found.source.digest, found.thresholds, found.divider))
+    if _edits.offered() and (
+        st.segmented_control(
+            "Rules",
+            [IN_FORCE, EDITED],
+            default=IN_FORCE,
+            key="edits",
+            bind="query-params",
+            required=True,
+        )
+        == EDITED
+    ):
+        edited, digest = _edits.edited_rules()
+        if len(edited.source.features) == len(demonstrations.features):
+            return edited, f"edited {digest}"
+    return found, key
+
+
+@st.fragment
+def body() -> None:
+    """Everything that answers to a slider."""
+    settings()
+    left, right = st.columns([4, 7], gap="large")
+    with left:
+        action = proposal()
+        st.markdown("**The state**")
+        values = sliders()
+    show(
+        right,
+        neighbourhood,
+        values,
+        action,
+        spans,
+        spreads,
+        order_of(rules_key, rule_set),
+        trees=compact.trees if compact is not None else grown,
+        leaves=compact is not None,
+        dark=state.is_dark(),
+    )
+
+
+# --- the page ----------------------------------------------------------------------------------
+
+st.title("What if")
+st.caption(
+    "One state, and what the shield would do in it: the rule that applies, the rules that nearly "
+    "do, and the least change that makes it decide otherwise."
+)
+demonstrations = state.require_demonstrations()
+compact = _compact.chosen_compact(demonstrations)
+grown = state.trees(demonstrations, state.chosen_divider()) if compact is None else compact.trees
+rule_set, rules_key = chosen_rules()
+if not rule_set.rules:
+    st.info(
+        "No rule is in force, so there is nothing to ask. Lower a threshold on the Thresholds "
+        "page, whose maps show where there are rules.",
+        icon=":material/filter_alt_off:",
+    )
+    st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
+    st.stop()
+with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
+    beyond = outside_choice()
+    projection = cast(
+        "Projection",
+        st.selectbox(
+            "Replace by",
+            PROJECTIONS,
+            key="projection",
+            bind="query-params",
+            help="What a continuous action that breaks a rule becomes.",
+        )
+        if rule_set.actions[0].is_interval
+        else PROJECTIONS[0],
+    )
+no_boxes_notice([rule_set], beyond)
+neighbourhood = prepared(rules_key, projection, beyond, rule_set)
+spans, spreads = spans_of(demonstrations.digest, demonstrations)
+# Other data has other sliders under the same names.
+told = repr(spans)
+if st.session_state.get("_what_if_data", told) != told:
+    put(np.array([span.middle for span in spans], dtype=np.float32), spans)
+st.session_state["_what_if_data"] = told
+for place, span in enumerate(spans):
+    kept = st.session_state.get(f"x{place}")
+    if kept is not None and not span.low <= kept <= span.high:
+        st.session_state[f"x{place}"] = span.middle
+body()
