@@ -50,6 +50,12 @@ PAGES = [
         help="Every rule in plain language, with the evidence behind it.",
     ),
     st.Page(
+        "what_if.py",
+        title="What if",
+        icon=":material/help_center:",
+        help="One state: what the shield would do in it, why, and what would change that.",
+    ),
+    st.Page(
         "evidence.py",
         title="Evidence",
         icon=":material/verified:",
