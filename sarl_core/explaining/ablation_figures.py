@@ -104,18 +104,20 @@ def ablation_text(ablation: Ablation) -> tuple[str, ...]:
     """
     effects, episodes = ablation.effects, counted(len(ablation.base), "episode")
     sentences = []
-    counts = [sum(effect.verdict == verdict for effect in effects) for verdict in VERDICTS]
     if effects:
-        parts = [
-            f"{count} {'is' if count == 1 else 'are'} {verdict}"
-            if verdict != "no difference seen"
-            else f"of {count} no difference is seen"
-            for verdict, count in zip(VERDICTS, counts, strict=True)
-            if count
-        ]
-        sentences.append(
-            f"Of {counted(len(effects), 'rule')} taken out, {_joined(parts)}, over {episodes}."
+        load, idle, harm = (
+            sum(effect.verdict == verdict for effect in effects) for verdict in VERDICTS
         )
+        sentences.append(
+            f"{counted(len(effects), 'rule')} taken out, over {episodes}: {load} load-bearing, "
+            f"{harm} harmful, and of {idle} no difference is seen."
+        )
+        needed = ablation.least_episodes
+        if len(ablation.base) < needed:
+            sentences.append(
+                f"{episodes} are too few for any verdict about so many rules; give at least "
+                f"{needed}, and more to see small differences."
+            )
     unused = len(ablation.unused)
     if unused:
         others = "Another " if effects else ""
@@ -227,7 +229,3 @@ def _layout(rows: int) -> dict[str, Any]:
         "showlegend": True,
         "legend": {"orientation": "h", "x": 0, "y": 1, "xanchor": "left", "yanchor": "bottom"},
     }
-
-
-def _joined(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -79,7 +79,7 @@ def steps_to_csv(record: StepRecord) -> bytes:
     for name in frame.columns:
         if str(name).startswith("rule_id"):
             frame[name] = [
-                f"'{text}" if text is not None and text.startswith(_FORMULA_SIGNS) else text
+                f"'{text}" if isinstance(text, str) and text.startswith(_FORMULA_SIGNS) else text
                 for text in frame[name]
             ]
     return str(frame.to_csv(index=False)).encode()

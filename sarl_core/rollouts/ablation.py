@@ -7,6 +7,7 @@ nothing there, exactly.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -114,6 +115,11 @@ class Ablation:
     def tests(self) -> int:
         """How many differences were tested; those that are zero throughout need no test."""
         return int(self._p_values[2])
+
+    @property
+    def least_episodes(self) -> int:
+        """So many episodes it takes for a verdict to be possible at all, were all to agree."""
+        return 2 + math.floor(math.log2(max(self.tests, 1) / ERROR_RATE))
 
     @cached_property
     def _p_values(self) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
