@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _PIECE = 8  # episodes after which a search can be stopped with what it has found
+_PIECES = 50  # at most so many; a long search is not slowed down by being cut up
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ def gaps_so_far(
         CancelledError: If `progress` returned False.
     """
     actor = make_agent(agent, env_id, seed=seed)  # once: an untrained one is of the first seed
-    size = max(_PIECE, jobs)
+    size = max(_PIECE, jobs, -(-episodes // _PIECES))
     pieces: list[Gaps] = []
     for start in range(0, episodes, size):
         count = min(size, episodes - start)

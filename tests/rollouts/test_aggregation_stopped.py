@@ -74,8 +74,9 @@ def stop_in(monkeypatch, part):
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-def test_no_episode_is_used_for_two_things(cart, small_search, calls, seed):
-    plan = Plan(4, rounds=2, episodes=3, validation=20, generations=2, report=5, seed=seed)
+def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatch, seed):
+    monkeypatch.setattr(aggregation, "_FIRST_VALIDATION", 2)
+    plan = Plan(4, rounds=2, episodes=3, validation=5, generations=2, report=5, seed=seed)
     found = aggregate(cart, plan)
     searched = [index for index, (module, *_) in enumerate(calls) if module is refinement]
     *others, (_, _, report) = calls
