@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import _names
 import _state as state
 import streamlit as st
 from _environments import registered
@@ -18,6 +19,7 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_files import rules_from_json
+from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
 from sarl_core.rollouts.agents import EXPERT_FOLDER, Agent, make_agent, shipped_experts
 from sarl_core.rollouts.seeds import FRESH
@@ -121,12 +123,16 @@ def compact_rules() -> tuple[RuleSet, str]:
     """
     path = compact_file()
     try:
-        return _rule_file(path, path.stat().st_mtime_ns)
+        rule_set, digest = _rule_file(path, path.stat().st_mtime_ns)
     except OSError as error:
         raise InputError(
             f"there are no compact rules for {state.dataset_label(state.chosen_dataset())}; "
             "choose other rules"
         ) from error
+    names = _names.given_names(state.raw_demonstrations())
+    if names is None:
+        return rule_set, digest
+    return renamed_rules(rule_set, names), f"{digest} {_names.digest_of_names(names)}"
 
 
 def digest_of(content: bytes) -> str:

@@ -108,10 +108,10 @@ def base() -> Base:
         return kept
     if kind == COMPACT:
         rule_set, digest = compact_rules()
-        return Base(kind, f"compact {digest}", digest, rule_set)
+        return Base(kind, f"compact {digest.split()[0]}", digest, rule_set)  # whatever the names
     rule_set, digest = cast("tuple[RuleSet, str]", rules_for(CHOSEN, None))
     # A rule's number is its node's, the same at all thresholds.
-    return Base(kind, repr((rule_set.source.digest, rule_set.divider)), digest, rule_set)
+    return Base(kind, repr((state.data_key(), rule_set.divider)), digest, rule_set)
 
 
 # --- the edits ---------------------------------------------------------------------------------

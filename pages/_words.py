@@ -20,3 +20,8 @@ def escaped(text: str) -> str:
     """Text that Markdown leaves alone: names come from files."""
     broken = _BREAKS.sub(_JOINER, text)
     return "".join(f"\\{sign}" if sign in _SIGNS else sign for sign in broken)
+
+
+def file_name(env_id: str) -> str:
+    """An environment's id as the beginning of a file's name."""
+    return re.sub(r"[^\w.-]+", "-", env_id).strip("-.") or "unnamed"

@@ -1,0 +1,127 @@
+"""The names that people read: of features, units, actions and labels; and other ones for them.
+
+Names change nothing that is mined: trees, thresholds and the rules' ids stay what they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+
+
+class Names(NamedTuple):
+    """All names of demonstrations.
+
+    Attributes:
+        features: d names.
+        units: d units, "" where there is none.
+        actions: m names, one an action dimension.
+        labels: For each action dimension the names of its labels, () if continuous.
+    """
+
+    features: tuple[str, ...]
+    units: tuple[str, ...]
+    actions: tuple[str, ...]
+    labels: tuple[tuple[str, ...], ...]
+
+
+def names_of(demonstrations: Demonstrations) -> Names:
+    """The names that demonstrations have.
+
+    Args:
+        demonstrations: Any.
+
+    Returns:
+        As they stand in sentences, axes and exports.
+    """
+    dimensions = demonstrations.action_dimensions
+    return Names(
+        tuple(feature.name for feature in demonstrations.features),
+        tuple(feature.unit for feature in demonstrations.features),
+        tuple(dimension.name for dimension in dimensions),
+        tuple(dimension.labels for dimension in dimensions),
+    )
+
+
+def tidy(names: Names) -> Names:
+    """Names as a person meant them: in one line, without spaces around them.
+
+    Args:
+        names: As they were typed.
+
+    Returns:
+        The names.
+    """
+
+    def lines(texts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(" ".join(text.split()) for text in texts)
+
+    return Names(
+        lines(names.features),
+        lines(names.units),
+        lines(names.actions),
+        tuple(map(lines, names.labels)),
+    )
+
+
+def check_names(names: Names) -> None:
+    """Refuse names that nobody could tell apart.
+
+    Args:
+        names: To check.
+
+    Raises:
+        InputError: If one is empty, or two features, actions or labels of one action share one.
+    """
+    _check("feature", names.features)
+    _check("action", names.actions)
+    for action, labels in zip(names.actions, names.labels, strict=True):
+        _check(f"label of action {action!r}", labels)
+
+
+def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
+    """Demonstrations under other names.
+
+    Args:
+        demonstrations: N pairs.
+        names: As many as they have.
+
+    Returns:
+        The same pairs.
+
+    Raises:
+        InputError: If a name is empty, stands twice, or their number is another.
+    """
+    check_names(names)
+    own = names_of(demonstrations)
+    counts = [
+        (len(one.features), len(one.units), len(one.actions), tuple(map(len, one.labels)))
+        for one in (own, names)
+    ]
+    if counts[0] != counts[1]:
+        raise InputError(
+            "the names are for other demonstrations: the number of features, actions or labels "
+            "differs; name these"
+        )
+    return replace(
+        demonstrations,
+        feature_names=names.features,
+        feature_units=names.units,
+        action_names=names.actions,
+        label_names=names.labels if demonstrations.is_discrete else demonstrations.label_names,
+    )
+
+
+def _check(what: str, names: tuple[str, ...]) -> None:
+    for place, name in enumerate(names):
+        if not name.strip():
+            raise InputError(f"{what} {place} has an empty name; give it one")
+        if name in names[:place]:
+            raise InputError(
+                f"the name {name!r} stands twice, for {what} {names.index(name)} and {place}; "
+                "give each its own"
+            )

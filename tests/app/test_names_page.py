@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+from typing import Any
+
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import load_demonstrations, mine_rules
+from sarl_core.explaining.language import sentence
+from tests.app.screens import ROUTER, errors, open_page, texts
+
+CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
+
+
+def type_into(app: AppTest, table: int, rows: dict[int, dict[str, str]]) -> None:
+    """Change cells of one of the tables: features, actions, labels."""
+    key: Any = app.data_editor[table].key
+    app.session_state[key] = {"edited_rows": rows, "added_rows": [], "deleted_rows": []}
+    app.run()
+    assert not app.exception, app.exception
+
+
+def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
+    app = open_page("names", data="cartpole")
+    assert [table.value["Name"].iloc[0] for table in app.data_editor] == [
+        "cart position",
+        "push",
+        "push left",
+    ]
+    type_into(app, 0, {2: {"Name": "lean <b>*of*</b> the pole"}, 3: {"Unit": "°/s"}})
+    type_into(app, 1, {0: {"Name": "shove"}})
+    type_into(app, 2, {0: {"Name": "shove west"}})
+    assert not errors(app)
+    assert "shove west" in texts(app) or "push right" in texts(app)
+
+    app.switch_page("rules.py").run()
+    assert not app.exception
+    table = app.dataframe[0].value
+    when = " ".join(table["When"])
+    assert "lean <b>*of*</b> the pole" in when
+    assert "°/s" in when
+    assert "pole angle " not in when
+    assert {tuple(action) for action in table["Action"]} == {("shove west",), ("push right",)}
+    mined = mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95)
+    largest = max(mined.rules, key=lambda rule: rule.samples)
+    assert f"Rule {largest.id} ·" in texts(app)
+    assert table["States"].tolist() == sorted((r.samples for r in mined.rules), reverse=True)
+
+    app.switch_page("carry.py").run()
+    assert not app.exception
+    app.button_group(key="format").set_value("C").run()
+    assert "/* rule 0.2: shove west */" in str(app.get("code")[0].value)
+
+    app.switch_page("names.py").run()
+    assert list(app.data_editor[2].value["Name"]) == ["shove west", "push right"]
+    app.button(key="names_back").click().run()
+    assert "pole angle" in list(app.data_editor[0].value["Name"])
+    assert app.button(key="names_back").disabled
+    app.switch_page("rules.py").run()
+    assert sentence(largest, mined) in texts(app)
+
+
+def test_an_empty_or_doubled_name_is_refused_and_nothing_is_lost() -> None:
+    app = open_page("names", data="cartpole")
+    type_into(app, 0, {0: {"Name": "place"}})
+    type_into(app, 0, {0: {"Name": "place"}, 1: {"Name": " "}})
+    (error,) = errors(app)
+    assert error.startswith("Feature 1 has an empty name; give it one.")
+    type_into(app, 0, {0: {"Name": "place"}, 1: {"Name": "place"}})
+    (error,) = errors(app)
+    assert error.startswith("The name 'place' stands twice, for feature 0 and 1;")
+    app.switch_page("rules.py").run()
+    words = texts(app)
+    assert "cart velocity" in " ".join(app.dataframe[0].value["When"])
+    assert "place" in " ".join(app.dataframe[0].value["When"]) + words
+    app.switch_page("names.py").run()
+    # What was typed is still there, and still said.
+    assert list(app.data_editor[0].value["Name"])[:2] == ["place", "place"]
+    assert errors(app)
+    type_into(app, 0, {1: {"Name": "speed"}})
+    assert not errors(app)
+
+
+def test_intervals_need_no_names() -> None:
+    app = open_page("names", data="pendulum")
+    assert len(app.data_editor) == 2
+    assert "named by their bounds" in texts(app)
