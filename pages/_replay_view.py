@@ -72,6 +72,17 @@ def numbers(replay: Replay, unfiltered: Callable[[], None] | None) -> None:
             height="stretch",
             help=f"Some rule applied at {covered:,} of {length:,} steps.",
         )
+    beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
+    if beyond:
+        st.caption(
+            f":material/frame_inspect: At {counted(beyond, 'step')} a rule was broken outside the "
+            "data it was mined from"
+            + (
+                f"; at {withheld:,} of them it left the action as it is."
+                if withheld
+                else ": these interventions are marked as outside the data."
+            )
+        )
     if covered < FEW * length:
         followed = "" if changed else ", and the agent did what it says"
         st.markdown(
@@ -257,6 +268,9 @@ def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
                 f"The agent wanted {swatch(action.proposed, action.proposed_label)}, "
                 f"and {done} was done."
             )
+        elif action.abstains:
+            st.badge("Rule abstains", icon=":material/do_not_disturb_on:", color="gray")
+            st.html(f"The agent wanted {done}. The rule left it as it is, outside its data.")
         elif action.rule:
             st.badge("Allowed by the rules", icon=":material/check:", color="green")
             st.html(f"The agent wanted {done}, as the rule says.")
@@ -278,6 +292,11 @@ def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
                         "rule": action.rule_id,
                     },
                 )
+    if view.outside:
+        st.markdown(
+            ":material/frame_inspect: **Outside the data:** this state lies beyond the values seen "
+            "where the rule applies."
+        )
     if shielded:
         st.caption(f"{margin_text(view.margin).capitalize()}.")
     st.dataframe(

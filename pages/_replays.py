@@ -31,7 +31,7 @@ from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.forking import Fork, Rest, fork
 from sarl_core.rollouts.rendering import Replay as Film
 from sarl_core.rollouts.rendering import render_episode, side_by_side
-from sarl_core.shielding.shield import Projection, Shield
+from sarl_core.shielding.shield import Outside, Projection, Shield
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
@@ -51,6 +51,7 @@ class Request:
     rules_digest: str
     projection: Projection
     seed: int
+    outside: Outside = "act"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +116,9 @@ class Order:
         """The rules in force, or None."""
         if self.rule_set is None:
             return None
-        return Shield(self.rule_set, projection=self.request.projection)
+        return Shield(
+            self.rule_set, projection=self.request.projection, outside=self.request.outside
+        )
 
     def of_seed(self, seed: int) -> Order:
         """The same agent and rules on another seed, as in a comparison over several."""

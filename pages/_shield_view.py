@@ -16,6 +16,7 @@ from sarl_core.explaining.comparison_text import clear_change, verdict
 from sarl_core.explaining.language import share_text
 from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate, failure_known
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.flips import pace_of
 
 PLAIN = {"displayModeBar": False}
 HEIGHT = 400
@@ -165,8 +166,18 @@ def column_config() -> dict[str, Any]:
         "Changed": column.TextColumn(
             alignment="right", help="Share of the steps at which the shield changed the action"
         ),
+        "Outside": column.TextColumn(
+            alignment="right",
+            help="Share of the interventions in states outside the data of the rule, those that "
+            "it left out with them; a dash where the rules keep no data boxes",
+        ),
         "Covered": column.TextColumn(
             alignment="right", help="Share of the steps at which some rule applied"
+        ),
+        "Flips": column.TextColumn(
+            alignment="right",
+            help="How often the shield switches on or off: in a second of the environment, or, "
+            "where it does not say how many steps a second has, in 100 steps",
         ),
         "Crashes": column.TextColumn(
             alignment="right",
@@ -190,11 +201,24 @@ def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
         "95 % interval": f"{numbers.low:,.1f} to {numbers.high:,.1f}",
         "Mean return": numbers.mean,
         "Changed": share_text(summary["intervention_rate"]) if rules is not None else "–",
+        "Outside": share_text(summary["outside_rate"])
+        if rules is not None and any(rule.box is not None for rule in rules.rules)
+        else "–",
         "Covered": share_text(summary["coverage"]) if rules is not None else "–",
+        "Flips": flips_text(episodes) if rules is not None else "–",
         "Crashes": share_text(crash_rate(episodes, episodes.env_id))
         if failure_known(episodes.env_id)
         else "–",
     }
+
+
+def flips_text(episodes: Episodes) -> str:
+    """How often the shield switches on and off, over all episodes."""
+    if episodes.flips is None:
+        return "–"
+    pace = pace_of(episodes.env_id)
+    rate = pace.rate(int(episodes.flips.sum()), int(episodes.lengths.sum()))
+    return f"{rate:.2f} / {'s' if pace.unit == 'second' else pace.unit}"
 
 
 def csv(comparison: Comparison) -> bytes:
@@ -202,6 +226,8 @@ def csv(comparison: Comparison) -> bytes:
     frame = comparison.to_frame()
     projections = [arm.projection if arm.rules is not None else "" for arm in comparison.arms]
     frame.insert(2, "projection", projections)
+    ways = [arm.outside if arm.rules is not None else "" for arm in comparison.arms]
+    frame.insert(3, "outside", ways)
     frame.insert(0, "seed", comparison.seed)
     frame.insert(0, "environment", comparison.env_id)
     return str(frame.to_csv(index=False)).encode()

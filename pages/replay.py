@@ -26,6 +26,7 @@ from _choices import (
 )
 from _compact import THRESHOLDS
 from _edits import offered as edits_offered
+from _outside import no_boxes_notice, outside_choice
 from _over_view import comparison
 from _replay_view import numbers, step_by_step
 from _replays import (
@@ -58,7 +59,7 @@ def rule_sets() -> list[str]:
 def settings() -> Callable[[], Order]:
     """The widgets; what they ask for is put together when it is needed, and may be refused."""
     with st.container(border=True):
-        in_a_row = 5 if continuous(st.session_state.get("env")) else 4
+        in_a_row = 6 if continuous(st.session_state.get("env")) else 5
         with st.grid(in_a_row, min_column_width=150, gap="small"):
             env = st.selectbox(
                 "Environment",
@@ -109,6 +110,7 @@ def settings() -> Callable[[], Order]:
                     "middle of the rule's interval. Clip: the nearest value in it. Expert: "
                     "what the expert typically did there.",
                 )
+            outside = outside_choice()
         policy_file = rule_file = None
         if agent == OWN_FILE:
             policy_file = st.file_uploader(
@@ -123,7 +125,9 @@ def settings() -> Callable[[], Order]:
         rule_set, rules_digest = rules_for(rules, rule_file)
         make, digest = agent_for(agent, policy_file, env_id, int(seed or 0))
         return Order(
-            Request(env_id, agent, digest, rules, rules_digest, projection, int(seed or 0)),
+            Request(
+                env_id, agent, digest, rules, rules_digest, projection, int(seed or 0), outside
+            ),
             make,
             rule_set,
         )
@@ -197,6 +201,7 @@ st.markdown(
     + (f", {len(replayed.rule_set):,} rules ({asked.rules})" if replayed.rule_set else "")
     + ("" if same else "  \n:orange[:material/info: The settings have changed since: press Run.]")
 )
+no_boxes_notice([] if replayed.rule_set is None else [replayed.rule_set], asked.outside)
 numbers(
     replayed,
     try_unfiltered if unfiltered_differ(asked, replayed.rule_set) else None,

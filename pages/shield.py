@@ -30,6 +30,7 @@ from _choices import (
 )
 from _comparisons import Row, row_key
 from _edits import offered as edits_offered
+from _outside import no_boxes_notice, outside_choice
 from _run_bar import known, run_bar, working
 from _shield_view import Line, show
 from _words import in_full
@@ -41,7 +42,7 @@ from sarl_core.explaining.comparison_figures import arm_style
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.comparison import Arm
-from sarl_core.shielding.shield import Projection, Shield
+from sarl_core.shielding.shield import Outside, Projection, Shield
 
 NO_SHIELD = "no shield"
 # Their places give them their colours, the paper's where it has them.
@@ -59,6 +60,7 @@ class Choices:
     episodes: int
     seed: int
     projection: Projection
+    outside: Outside
     agents: list[str]
     shields: list[str]
     policy_files: list[UploadedFile]
@@ -91,7 +93,7 @@ class Guard:
 def settings() -> Choices:
     """The widgets."""
     with st.container(border=True):
-        in_a_row = 4 if continuous(st.session_state.get("env")) else 3
+        in_a_row = 5 if continuous(st.session_state.get("env")) else 4
         with st.grid(in_a_row, min_column_width=150, gap="small"):
             env = st.selectbox(
                 "Environment",
@@ -133,6 +135,7 @@ def settings() -> Choices:
                     "middle of the rule's interval. Clip: the nearest value in it. Expert: "
                     "what the expert typically did there.",
                 )
+            outside = outside_choice()
         agents = st.pills(
             "Agents",
             AGENTS,
@@ -176,6 +179,7 @@ def settings() -> Choices:
         int(episodes or 1),
         int(seed or 0),
         projection,
+        outside,
         [name for name in AGENTS if name in agents],
         [name for name in offered if name in shields],
         policy_files,
@@ -229,15 +233,20 @@ def guards(choices: Choices) -> tuple[list[Guard], list[str]]:
 def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
+    outside: Outside = choices.outside if guard.rules is not None else "act"
     name = f"{pilot.name}, {guard.name}"
-    key = row_key(env_id, pilot.digest, guard.digest, projection, choices.seed)
+    # Acting everywhere is what other pages ask for, under the same key.
+    way = projection if outside == "act" else f"{projection}, {outside}"
+    key = row_key(env_id, pilot.digest, guard.digest, way, choices.seed)
 
     def shield() -> Shield | None:
-        return None if guard.rules is None else Shield(guard.rules, projection=projection)
+        if guard.rules is None:
+            return None
+        return Shield(guard.rules, projection=projection, outside=outside)
 
     return Line(
         Row(key, name, env_id, choices.seed, pilot.make, shield),
-        Arm(name, pilot.name, guard.rules, projection),
+        Arm(name, pilot.name, guard.rules, projection, outside=outside),
         arm_style(pilot.place, guard.place),
         pilot.name,
         guard.name,
@@ -260,6 +269,7 @@ except SarlError as error:
     st.error(in_full(str(error)), icon=":material/error:")
     st.stop()
 chosen_guards, refused = guards(chosen)
+no_boxes_notice([guard.rules for guard in chosen_guards if guard.rules is not None], chosen.outside)
 for sentence in refused:
     st.error(in_full(sentence), icon=":material/error:")
 wanted = [

@@ -32,6 +32,7 @@ class ActionView:
         changed: Whether the shield changed it.
         rule: The rule in force as a sentence, "" where none applies.
         rule_id: Its id, "" where none applies.
+        abstains: Whether the action breaks the rule and was left as it is, outside its data.
     """
 
     dimension: str
@@ -42,6 +43,7 @@ class ActionView:
     changed: bool
     rule: str
     rule_id: str
+    abstains: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,9 @@ def step_view(
                 changed=bool(proposed != executed),
                 rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
                 rule_id=rule_set.rules[rule].id if known and rule_set else "",
+                abstains=known
+                and rule_set is not None
+                and dimension.label_of(float(executed)) != rule_set.rules[rule].action,
             )
         )
     state = tuple(
