@@ -251,8 +251,8 @@ def show_stability(evidence: Evidence) -> None:
         )
         st.caption(
             "A rule has come back if a new one with the same action covers mostly the same "
-            f"states: those that both cover are at least {SAME_RULE:.0%} of those that either "
-            "covers. In brackets: where nine in ten of the new thresholds lay."
+            f"states: those that both cover are at least {share_text(SAME_RULE)} of those that "
+            "either covers. In brackets: where nine in ten of the new thresholds lay."
         )
     rule_set = evidence.rule_set
 
@@ -278,7 +278,7 @@ def _show_stability(rule_set: RuleSet, stability: Stability) -> None:
         f"**{often:,} of {counted(len(stability.rules), 'rule')}** came back in at least half of "
         f"{counted(stability.rounds, 'round')}."
     )
-    share = {"min_value": 0.0, "max_value": 1.0, "format": "percent", "color": "gray"}
+    share = {"min_value": 0.0, "max_value": 1.0, "format": "%.2f", "color": "gray"}
     column = st.column_config
     st.dataframe(
         table,

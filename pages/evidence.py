@@ -25,7 +25,7 @@ CONTRADICTIONS, LEFT_OUT = "Contradictions", "Leave episodes out"
 
 def share_text(share: str) -> str:
     """A share on the slider."""
-    return "nothing" if share == _hold_out.NOTHING else f"{float(share):.0%}"
+    return "nothing" if share == _hold_out.NOTHING else f"{100 * float(share):.0f} %"
 
 
 def hold_out_choice(whole: Demonstrations) -> None:

@@ -189,6 +189,7 @@ def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
     figure.add_scatter(
         x=[*episodes, *episodes[::-1]],
         y=[*high, *low[::-1]],
+        mode="lines",
         fill="toself",
         fillcolor=faded(_LINE, 0.18),
         line={"width": 0},

@@ -1,0 +1,156 @@
+"""Held-out and left-out episodes, on the page that chooses them and on those that follow."""
+
+from __future__ import annotations
+
+import time
+from functools import cache
+
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.evidence_words import evidence_text, more_text, verdict_counts
+from sarl_core.explaining.language import share_text
+from sarl_core.mining.contradictions import by_episode, find_contradictions
+from sarl_core.mining.holding_out import Split, hold_out, lower_bound, more_episodes, with_held_out
+from tests.app.screens import ROUTER, metrics, open_page, texts
+
+CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
+HELD = {"data": "cartpole", "holdout": "0.2", "holdout_seed": "3"}
+
+
+@cache
+def parted() -> Split:
+    return hold_out(load_demonstrations(CART), 0.2, seed=3)
+
+
+@cache
+def tried() -> RuleSet:
+    mined, held_out = parted()
+    return with_held_out(mine_rules(mined, supp_min=0.005, conf_min=0.95), held_out)
+
+
+def held_out_fidelity() -> str:
+    samples, correct = map(sum, zip(*(rule.held_out for rule in tried().rules), strict=True))
+    return share_text(correct / samples, decimals=1)
+
+
+def until(app: AppTest, words: str) -> str:
+    """Look again until work beside the page has come to an end."""
+    for _ in range(900):
+        app.run()
+        assert not app.exception, app.exception
+        if words in texts(app):
+            return texts(app)
+        time.sleep(0.2)
+    raise AssertionError(texts(app))
+
+
+def test_the_page_says_what_the_library_counts() -> None:
+    app = open_page("evidence", **HELD)
+    counts = verdict_counts(tried().rules, 0.95)
+    assert metrics(app) == {
+        "Rules": str(len(tried())),
+        "Held-out fidelity": held_out_fidelity(),
+        "Reached": str(counts["reached"]),
+        "Open": str(counts["open"]),
+        "Too low": str(counts["below"]),
+    }
+    table = app.dataframe[0].value
+    rules = sorted(tried().rules, key=lambda rule: -rule.samples)
+    assert table["Evidence"].tolist() == [evidence_text(rule) for rule in rules]
+    missing = [more_text(more_episodes(rule, 30, 0.95)) for rule in rules]
+    assert table["Still missing"].tolist() == missing
+
+
+def test_a_share_is_chosen_and_taken_back() -> None:
+    app = open_page("evidence", data="cartpole")
+    assert "Nothing is held out" in texts(app)
+    app.number_input(key="_holdout_seed_choice").set_value(3).run()
+    app.select_slider(key="_holdout_choice").set_value("0.2").run()
+    assert metrics(app)["Held-out fidelity"] == held_out_fidelity()
+    assert app.query_params["holdout"] == "0.2"
+    assert "**6 episodes** held out" in app.sidebar.caption[0].value
+    app.select_slider(key="_holdout_choice").set_value("0").run()
+    assert "holdout" not in app.query_params
+    assert "held out" not in app.sidebar.caption[0].value
+
+
+def test_junk_in_a_link_holds_nothing_out() -> None:
+    app = open_page(
+        "evidence", data="cartpole", holdout="2", holdout_seed="-1", left_out="x,1", reach="9"
+    )
+    assert "Nothing is held out" in texts(app)
+    assert "out" not in app.sidebar.caption[0].value
+
+
+def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() -> None:
+    app = open_page("rules", **HELD)
+    rules = sorted(tried().rules, key=lambda rule: -rule.samples)
+    assert evidence_text(rules[0]) in texts(app)
+    table = app.dataframe[0].value
+    assert [f"held out {text}" for text in table["Held out"]] == [
+        evidence_text(rule).split(", ")[1] for rule in rules
+    ]
+    low = next(
+        rule for rule, word in zip(rules, table["Verdict"], strict=True) if "too low" in word
+    )
+    app.number_input(key="lower").set_value(0.9).run()
+    kept = [rule for rule in rules if lower_bound(rule) >= 0.9]
+    assert 0 < len(app.dataframe[0].value) == len(kept) < len(rules)
+    assert f":red[{evidence_text(low)}" in texts(open_page("rules", **HELD, rule=low.id))
+
+
+def test_the_maps_have_a_held_out_layer() -> None:
+    app = open_page("thresholds", **HELD, layer="Held out")
+    assert metrics(app)["Held-out fidelity"] == held_out_fidelity()
+    assert metrics(app)["Rules"] == str(len(tried()))
+    assert "Held-out fidelity: the same on episodes held out" in texts(app)
+    without = open_page("thresholds", data="cartpole", layer="Held out")
+    assert "Held-out fidelity" not in metrics(without)
+    assert without.button_group(key="layer").value == "Rules and length"
+
+
+def test_contradictions_are_counted_and_an_episode_is_left_out_everywhere() -> None:
+    app = open_page("evidence", data="cartpole", about="Contradictions")
+    whole = load_demonstrations(CART)
+    found = find_contradictions(whole)
+    assert f"**{found.found().sum():,} of 15,000 states** contradict another" in texts(app)
+    worst = by_episode(whole, found)
+    assert app.dataframe[0].value["Episode"].tolist() == [one.episode for one in worst]
+    app = open_page("evidence", data="cartpole", about="Leave episodes out")
+    app.multiselect(key="_left_out_choice").set_value([worst[0].episode, worst[1].episode]).run()
+    gone = sorted(one.episode for one in worst[:2])
+    assert app.query_params["left_out"] == ",".join(map(str, gone))
+    app.switch_page("thresholds.py").run()
+    rest = whole.select([one.episode for one in worst[2:]])
+    rules = mine_rules(rest, supp_min=0.005, conf_min=0.95)
+    assert metrics(app)["Rules"] == str(len(rules))
+    assert "**2 episodes** left out" in app.sidebar.caption[0].value
+    app.sidebar.selectbox(key="_data_choice").select("pendulum").run()
+    assert "left out" not in app.sidebar.caption[0].value
+
+
+def test_every_episode_cannot_be_left_out() -> None:
+    gone = ",".join(map(str, range(30)))
+    app = open_page("evidence", data="cartpole", about="Leave episodes out", left_out=gone)
+    assert any("so none is; leave out fewer" in one.value for one in app.warning)
+    assert metrics(app)["Rules"] == str(
+        len(mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95))
+    )
+
+
+def test_rules_are_looked_for_in_other_draws() -> None:
+    app = open_page("evidence", data="cartpole", about="Stability", rounds="5")
+    app.button(key="run_stability").click().run()
+    words = until(app, "came back in at least half of 5 rounds")
+    rules = mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95)
+    assert f"of {len(rules)} rules**" in words
+    table = app.dataframe[0].value
+    assert set(table["Rule"]) == {rule.id for rule in rules.rules}
+    assert table["Comes back"].between(0, 1).all()
+
+
+def test_where_there_is_no_rule_the_page_says_what_to_do() -> None:
+    app = open_page("evidence", data="cartpole", support="0.9", confidence="1")
+    assert "There is no rule at the present thresholds" in texts(app)
+    assert "Nothing has been uploaded" in texts(open_page("evidence", data="upload"))
