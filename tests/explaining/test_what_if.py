@@ -1,0 +1,158 @@
+"""What the page What if says and draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.colours import faded, label_colour
+from sarl_core.explaining.what_if import (
+    by_use,
+    change_text,
+    condition_views,
+    exact_text,
+    executed_text,
+    near_miss_text,
+    outside_texts,
+)
+from sarl_core.explaining.what_if_figures import lines_figure, stretches
+from sarl_core.mining.evidence import DataBox
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.tree import Source
+from sarl_core.shielding.near import Change, Neighbourhood
+from sarl_core.shielding.shield import Shield
+
+FEATURES = (Feature("pole angle", "rad"), Feature("left leg contact", ""), Feature("speed <b>", ""))
+PUSH = LabelledDimension("push", ("left", "right"))
+BOX = DataBox((-0.125, 0.0, -1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.25, 1.0, 1.0))
+
+
+def rule(name, conditions, action, **kwargs):
+    return Rule(
+        name, 0, tuple(Condition(*c) for c in conditions), action, 0.1, 1.0, 1.0, 5, **kwargs
+    )
+
+
+def rules(*found):
+    return RuleSet(found, (PUSH,), Source("", FEATURES, "none", 100, 1), Thresholds(0.0, 0.0))
+
+
+SIDES = rules(
+    rule("0.1", [(0, ">", 0.125), (0, "<=", 0.5)], 1, box=BOX),
+    rule("0.2", [(0, "<=", -0.25), (1, ">", 0.5)], 0),
+)
+
+
+def test_every_condition_stands_beside_the_state_and_its_room():
+    (view,) = condition_views(SIDES.rules[0], (0.2, 0.0, 0.0), SIDES)
+    assert view.condition == "0.125 < pole angle ≤ 0.5 rad"
+    assert view.value == "0.2 rad"
+    assert view.room == "0.075 rad"
+
+
+def test_where_a_state_leaves_the_data_is_said():
+    inside = outside_texts(SIDES.rules[0], (0.2, 0.0, 0.0), FEATURES)
+    assert inside == ()
+    beyond = outside_texts(SIDES.rules[0], (0.375, 0.0, -2.0), FEATURES)
+    assert beyond == (
+        "pole angle 0.375 rad is above 0.25 rad, the largest that was seen",
+        "speed <b> -2 is below -1, the smallest that was seen",
+    )
+    assert outside_texts(SIDES.rules[1], (9.0, 9.0, 9.0), FEATURES) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (Change(0, 0.155, 0.125), "pole angle were 0.03 rad less"),
+        (Change(0, 0.0, 0.5), "pole angle were 0.5 rad more"),
+        (Change(1, 0.0, 0.50000006), "there were left leg contact"),
+        (Change(1, 1.0, 0.5), "there were no left leg contact"),
+        (Change(2, 0.0, 2.0), "speed <b> were 2 more"),
+    ],
+)
+def test_a_change_in_words(change, text):
+    assert change_text(change, FEATURES[change.feature]) == text
+
+
+def test_a_near_miss_in_words():
+    changes = (Change(0, 0.0, -0.25), Change(1, 0.0, 0.50000006))
+    assert near_miss_text(changes, FEATURES) == (
+        "would apply if pole angle were 0.25 rad less and there were left leg contact"
+    )
+
+
+def test_an_exact_number_reads_back_as_the_same():
+    for value in np.float32([0.1, 1 / 3, 1e-30, -123456.78, 0.0]):
+        assert np.float32(exact_text(float(value))) == value
+
+
+def test_actions_in_words():
+    assert executed_text((1.0,), (PUSH,)) == "right"
+    torque = LabelledDimension.of_edges("torque", (-1.0, 0.0, 1.0))
+    assert executed_text((-0.5,), (torque,)) == "torque -0.5"
+    assert executed_text((0.0, 1.0), (PUSH, PUSH)) == "push: left, push: right"
+
+
+def test_features_that_many_states_are_asked_about_come_first():
+    often = replace(SIDES.rules[1], samples=500)
+    assert by_use(rules(SIDES.rules[0], often)) == (0, 1, 2)
+    assert by_use(rules(rule("0.3", [(2, ">", 0.0)], 1), often)) == (0, 1, 2)
+    assert by_use(rules(rule("0.3", [(2, ">", 0.0)], 1), replace(often, enabled=False))) == (
+        2,
+        0,
+        1,
+    )
+
+
+def test_a_bar_is_as_the_shield_does():
+    """The angle's bar: nothing of a rule, rule 0.1 from just above 0.125, nothing again."""
+    near = Neighbourhood(Shield(SIDES))
+    line = near.lines(np.zeros(3, dtype=np.float32), 0)[0]
+    above = float(np.nextafter(np.float32(0.125), np.float32(1)))
+    end = float(np.nextafter(np.float32(0.5), np.float32(1)))
+    assert stretches(line, (-1.0, 1.0), 0, SIDES) == [
+        (-1.0, above, 0, False),
+        (above, end, 1, True),
+        (end, 1.0, 0, False),
+    ]
+    assert stretches(line, (0.25, 0.375), 0, SIDES) == [(0.25, 0.375, 1, True)]
+
+
+def test_where_a_rule_abstains_the_bar_is_pale():
+    shield = Shield(SIDES, outside="abstain")
+    line = Neighbourhood(shield).lines(np.zeros(3, dtype=np.float32), 0)[0]
+    beyond = float(np.nextafter(np.float32(0.25), np.float32(1)))
+    found = stretches(line, (-1.0, 1.0), 0, SIDES)
+    assert [part[2:] for part in found] == [(0, False), (1, True), (0, False)]
+    assert found[1][1] == beyond
+    agreeing = Neighbourhood(shield).lines(np.zeros(3, dtype=np.float32), 1)[0]
+    assert [part[2:] for part in stretches(agreeing, (-1.0, 1.0), 0, SIDES)] == [
+        (1, False),
+        (1, True),
+        (1, False),
+    ]
+
+
+def test_the_picture_has_a_bar_and_a_mark_for_each_feature():
+    near = Neighbourhood(Shield(SIDES))
+    lines = near.lines(np.zeros(3, dtype=np.float32), 0)
+    figure = lines_figure(lines, [(-1.0, 1.0)] * 3, [0.0] * 3, FEATURES, 0, SIDES)
+    bars = [trace for trace in figure.data if trace.type == "bar"]
+    assert {trace.marker.color for trace in bars} == {faded(label_colour(0), 0.32), label_colour(1)}
+    for row in range(3):
+        wide = [
+            (base, base + length)
+            for trace in bars
+            for base, length, at in zip(trace.base, trace.x, trace.y, strict=True)
+            if at == row
+        ]
+        assert min(left for left, _ in wide) == 0.0
+        assert max(right for _, right in wide) == pytest.approx(1.0)
+    mark = figure.data[-1]
+    assert list(mark.x) == [0.5] * 3
+    assert "<b>" not in "".join(figure.layout.yaxis.ticktext)
