@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sarl_core.errors import InputError, WorkError
+from sarl_core.rollouts import seeds
 from sarl_core.rollouts.agents import PolicyAgent
 from sarl_core.rollouts.comparison import crashed
 from sarl_core.rollouts.episodes import rollout
@@ -27,7 +28,6 @@ from sarl_core.shielding.shield import Shield
 if TYPE_CHECKING:
     from sarl_core.mining.rules import RuleSet
 
-TRIAL_SEED = 9_000_000  # of the episodes after learning; no learner has seen them
 TRIAL_EPISODES = 50
 
 
@@ -92,7 +92,7 @@ def learn(
             few more.
         seed: Of the learner and its environments. The same arguments give the same result.
         projection: What becomes of a continuous action that breaks a rule.
-        episodes: After learning, without a shield and with it, on seeds from `TRIAL_SEED`.
+        episodes: After learning, without a shield and with it, on seeds from `seeds.TRIAL`.
         checkpoint: File to take up the learning from, if it exists, and to keep it in meanwhile
             and when it is cancelled. A resumed run begins new episodes and draws new random
             numbers: it is not bit for bit what an uninterrupted one would have been.
@@ -248,7 +248,7 @@ def _try(
         PolicyAgent("learner", policy, False, first),
         shield=shield,
         episodes=episodes,
-        seed=TRIAL_SEED,
+        seed=seeds.TRIAL,
         keep_steps=False,
         progress=still,
     )
