@@ -1,0 +1,120 @@
+"""What if: one state, and what the shield would do in it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules
+from sarl_core.explaining.language import sentence
+from tests.app.screens import ROUTER, open_page, texts
+
+DATA = ROUTER.parents[1] / "data"
+COVERED, UNCOVERED = "a random covered state", "a random uncovered state"
+
+
+def the_state(app: AppTest, features: int) -> np.ndarray:
+    sliders = {slider.key: slider.value for slider in app.slider}
+    return np.array([sliders[f"x{index}"] for index in range(features)], dtype=np.float32)
+
+
+def table(app: AppTest, column: str) -> list[object]:
+    found = next(frame.value for frame in app.dataframe if column in frame.value)
+    return list(found[column])
+
+
+def test_a_state_a_rule_and_what_would_change_the_decision() -> None:
+    demonstrations = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet")
+    rules = mine_rules(demonstrations, supp_min=0.0, conf_min=1.0)
+    app = open_page("what_if", data="lunar_lander", support="0", confidence="1", number="7")
+    middle = np.median(demonstrations.observations, axis=0).astype(np.float32)
+    assert the_state(app, 8).tolist() == middle.tolist()
+
+    app.selectbox(key="take").set_value(COVERED).run()
+    state = the_state(app, 8)
+    assert (state == demonstrations.observations).all(axis=1).any()
+    shield = Shield(rules)
+    for wanted, action in (("do nothing", 0), ("fire main engine", 2)):
+        app.selectbox(key="a0").set_value(wanted).run()
+        decision = shield.decide(state, action)
+        rule = rules.rules[decision.rules[0]]
+        assert f"Rule {rule.id}. {sentence(rule, rules)}" in texts(app).replace("**", "")
+        assert ("Changed by the rules" in texts(app)) == decision.intervened
+        assert len(table(app, "The state has")) == rule.merged_length
+
+    # The first row says the least change: beyond it another action is executed, before it not.
+    app.button(key="another").click().run()
+    assert app.number_input(key="number").value == 8
+    state = the_state(app, 8)
+    now = shield.decide(state, 2).executed
+    exact = np.float32(str(table(app, "From exactly")[0]).split()[0])
+    words = str(table(app, "If")[0])
+    names = [feature.name for feature in demonstrations.features]
+    feature = max((name for name in names if name in words), key=len)
+    moved = state.copy()
+    moved[names.index(feature)] = exact
+    assert shield.decide(moved, 2).executed != now
+    moved[names.index(feature)] = np.nextafter(exact, state[names.index(feature)])
+    assert shield.decide(moved, 2).executed == now
+
+    # What a link says is what is shown.
+    app.slider(key="x0").set_value(0.25).run()
+    assert the_state(app, 8)[0] == np.float32(0.25)
+
+
+def test_many_features_and_dimensions_stay_usable() -> None:
+    app = open_page("what_if", data="bipedal_walker", take=COVERED, number="1")
+    app.button(key="take_it").click().run()
+    assert len([slider for slider in app.slider if slider.key.startswith("x")]) == 24
+    assert [expander.label for expander in app.expander] == ["16 more features"]
+    assert len([slider for slider in app.slider if slider.key.startswith("a")]) == 4
+    app.selectbox(key="dimension").select_index(2).run()
+    assert not app.exception
+    picture = next(
+        json.loads(chart.proto.spec)
+        for chart in app.get("plotly_chart")
+        if "executed along" in chart.proto.alt
+    )
+    assert len(picture["layout"]["yaxis"]["ticktext"]) == 24
+
+
+@pytest.mark.parametrize("take", [UNCOVERED, "a step of the replay"])
+def test_a_state_that_cannot_be_had_is_said_and_nothing_is_lost(take: str) -> None:
+    app = open_page("what_if", data="cartpole", set="compact", x1="0.5")
+    before = the_state(app, 4).tolist()
+    assert before[1] == 0.5
+    app.selectbox(key="take").set_value(take).run()
+    said = {
+        UNCOVERED: "these rules cover every state",
+        "a step of the replay": "Run one on the Replay page",
+    }
+    assert said[take] in texts(app)
+    assert the_state(app, 4).tolist() == before
+    app.selectbox(key="outside").set_value("abstain").run()
+    keeps = any(rule.box for rule in RuleSet.load(DATA / "rules" / "cartpole_compact.json").rules)
+    assert ("keeps no data boxes" in texts(app)) == (not keeps)
+
+
+def test_without_rules_or_data_the_page_says_what_to_do() -> None:
+    assert "No rule is in force" in texts(
+        open_page("what_if", data="cartpole", support="0.9", confidence="1")
+    )
+    assert "Nothing has been uploaded" in texts(open_page("what_if", data="upload"))
+
+
+def test_a_step_of_the_replay_is_taken_and_outside_its_data_it_says_so() -> None:
+    app = open_page(
+        "replay", data="cartpole", agent="novice", rules="unfiltered", outside="abstain"
+    )
+    app.button(key="run").click().run()
+    assert "a rule was broken outside the data" in texts(app)
+    order = app.session_state["_replay"]
+    assert order.shield.outside == "abstain"
+    app.switch_page("what_if.py").run()
+    app.selectbox(key="take").set_value("a step of the replay").run()
+    app.number_input(key="number").set_value(3).run()
+    assert app.selectbox(key="outside").value == "abstain"
+    assert not app.info
