@@ -92,10 +92,10 @@ def say_rounding(prepared: Prepared, demonstrations: Demonstrations) -> None:
     rounding = prepared.rounding
     if rounding is None:
         return
-    with st.container(horizontal=True, gap="small"):
-        st.metric("Decisions changed", f"{prepared.changed:,}", border=True, width=190)
-        st.metric("Thresholds rounded", f"{rounding.rounded:,}", border=True, width=190)
-        st.metric("Left as they are", f"{len(rounding.kept):,}", border=True, width=190)
+    with st.grid(3, min_column_width=150, gap="small"):
+        st.metric("Decisions changed", f"{prepared.changed:,}", border=True)
+        st.metric("Thresholds rounded", f"{rounding.rounded:,}", border=True)
+        st.metric("Left as they are", f"{len(rounding.kept):,}", border=True)
     st.caption(
         f"Counted with the shield itself on {counted(len(demonstrations), 'demonstrated step')}: "
         "each is decided by the same rule, with the same action, before and after."
@@ -170,6 +170,8 @@ def show_matrix(prepared: Prepared, key: str, name: str, demonstrations: Demonst
     """Rules by features, a page at a time."""
     matrix = matrix_of((key, demonstrations.digest), prepared.rule_set, demonstrations)
     page = 1
+    if st.session_state.get("matrix_page", 1) > matrix.pages:
+        st.session_state["matrix_page"] = matrix.pages  # of other rules there were more
     with st.container(horizontal=True, vertical_alignment="bottom"):
         if matrix.pages > 1:
             page = st.number_input(
@@ -215,7 +217,7 @@ with st.container(border=True):
     with left:
         rules, digest = chosen_rules()
     with middle:
-        form = st.segmented_control(
+        form = st.pills(
             "Format",
             list(FORMATS),
             default="JSON",

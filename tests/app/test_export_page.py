@@ -62,6 +62,11 @@ def test_rules_by_features_are_drawn_a_page_at_a_time() -> None:
     assert labels(app) == ["HTML, all rules", "PNG, this page"]
     app.number_input(key="matrix_page").set_value(31).run()
     assert 0 < html(app).count('<td class="a"') < 50
+    # Other rules have fewer pages.
+    app.session_state["support"], app.session_state["confidence"] = 0.0005, 0.97
+    app.run()
+    assert not app.exception
+    assert 0 < html(app).count('<td class="a"') <= 50
 
 
 def test_an_empty_set_is_refused_in_one_sentence() -> None:
