@@ -32,6 +32,7 @@ from _choices import (
 from _compact import THRESHOLDS
 from _comparisons import row_key
 from _edits import offered as edits_offered
+from _outside import no_boxes_notice, outside_choice
 from _words import in_full
 
 from sarl_core.demonstrations.environments import describe_environment
@@ -57,8 +58,7 @@ def rule_sets() -> list[str]:
 def settings() -> Callable[[], tuple[Wanted, str]]:
     """The widgets; what they ask for is put together when it is needed, and may be refused."""
     with st.container(border=True):
-        in_a_row = 4 if continuous(st.session_state.get("env")) else 3
-        with st.grid(in_a_row, min_column_width=150, gap="small"):
+        with st.grid(4, min_column_width=150, gap="small"):
             env = st.selectbox(
                 "Environment",
                 state.with_own(ENVIRONMENTS, "env"),
@@ -125,6 +125,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
                     "middle of the rule's interval. Clip: the nearest value in it. Expert: "
                     "what the expert typically did there.",
                 )
+            outside = outside_choice()
         policy_file = rule_file = None
         if agent == OWN_FILE:
             policy_file = st.file_uploader(
@@ -143,7 +144,8 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
                 "there is no rule that could be taken out; lower the thresholds in the sidebar, or "
                 "choose other rules"
             )
-        key = row_key(env_id, agent_digest, rules_digest, projection, first)
+        no_boxes_notice([rule_set], outside)
+        key = row_key(env_id, agent_digest, f"{rules_digest} {outside}", projection, first)
         return (
             Wanted(
                 key,
@@ -152,7 +154,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
                 int(episodes or LEAST_EPISODES),
                 int(most or 1),
                 make,
-                lambda: Shield(rule_set, projection=projection),
+                lambda: Shield(rule_set, projection=projection, outside=outside),
             ),
             rules,
         )

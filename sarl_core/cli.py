@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from sarl_core.commandline import terminal
+from sarl_core.commandline.ablation_commands import ablate
 from sarl_core.commandline.demonstration_commands import check, record
 from sarl_core.commandline.difference_commands import diff
 from sarl_core.commandline.export_commands import export
@@ -38,6 +39,7 @@ for command in (
     diff,
     evaluate,
     render,
+    ablate,
     report,
     export,
     aggregate,

@@ -1,0 +1,136 @@
+"""The command that says what each rule of a shield is worth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.commandline import terminal
+from sarl_core.commandline.inputs import read_shield
+from sarl_core.commandline.options import (
+    AgentName,
+    Env,
+    Json,
+    OutsideName,
+    ProjectionName,
+    Seed,
+    Stochastic,
+)
+from sarl_core.files import whole_file
+
+if TYPE_CHECKING:
+    from sarl_core.rollouts.ablation import Ablation
+
+
+def ablate(
+    env: Env,
+    agent: AgentName,
+    rules: Annotated[
+        Path,
+        typer.Option(
+            "--rules", metavar="RULES.json", show_default=False, help="The rules of the shield."
+        ),
+    ],
+    episodes: Annotated[
+        int,
+        typer.Option("--episodes", help="With every rule taken out, and with none; at least 2."),
+    ] = 50,
+    most: Annotated[
+        int,
+        typer.Option(
+            "--most", help="Rules to take out at most: those that change the most actions."
+        ),
+    ] = 200,
+    seed: Seed = 0,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE.csv", show_default=False, help="Write the table to this file."
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Take the rules out one by one, and say what becomes of the same episodes without each.
+
+    Each rule is load-bearing, harmful, or makes no difference that can be seen. Only episodes in
+    which a rule changed an action are run without it: the others are the same.
+
+    Example: `python -m sarl_core ablate --env LunarLander-v3 --agent novice --rules rules.json
+    --episodes 100 --seed 100000 --out ablation.csv`
+    """
+    if out is not None:
+        terminal.check_output(out, (".csv",))
+    with terminal.working("Taking rules out") as advance:
+        from sarl_core.rollouts.ablating import ablate as run
+
+        shield = read_shield(rules, projection, outside)
+        assert shield is not None
+        found = run(
+            env,
+            agent,
+            shield,
+            episodes=episodes,
+            seed=seed,
+            most=most,
+            stochastic=stochastic,
+            jobs=jobs,
+            progress=lambda done, total: advance(done, total),
+        )
+        if out is not None:
+            with whole_file(out) as unfinished:
+                found.to_frame().to_csv(unfinished, index=False)
+    if as_json:
+        terminal.print_json(_document(found))
+    else:
+        _print(found, out)
+
+
+def _document(found: Ablation) -> dict[str, Any]:
+    rules = found.shield.rule_set.rules
+    return {
+        "env_id": found.base.env_id,
+        "agent": found.base.agent,
+        "episodes": len(found.base),
+        "seed": int(found.base.seeds[0]),
+        "mean_return": float(found.base.returns.mean()),
+        "failures": found.base_failures if found.failures_known else None,
+        "rules": found.to_frame().to_dict("records"),
+        "without_difference": [rules[index].id for index in found.unused],
+        "left_out": [rules[index].id for index in found.left_out],
+        "episodes_run": found.played,
+    }
+
+
+def _print(found: Ablation, out: Path | None) -> None:
+    from sarl_core.explaining.ablation_figures import (
+        ablation_text,
+        interval_text,
+        left_out_text,
+        signed,
+    )
+
+    rules, known = found.shield.rule_set.rules, found.failures_known
+    if found.rules:
+        terminal.print_table(
+            ("rule", "verdict", "return without it", "95 % interval", "failures", "changed"),
+            [
+                (
+                    rules[effect.rule].id,
+                    effect.verdict,
+                    signed(effect.difference.mean),
+                    interval_text(effect),
+                    f"{effect.failures} (with it {found.base_failures})" if known else "–",
+                    f"{effect.changed:,}",
+                )
+                for effect in found.effects
+            ],
+        )
+    terminal.print_lines([*ablation_text(found), *filter(None, [left_out_text(found)])])
+    if out is not None:
+        terminal.print_lines([f"Wrote {out}."])
