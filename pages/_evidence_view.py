@@ -371,7 +371,7 @@ def _show_contradictions(evidence: Evidence, found: Contradictions) -> None:
             icon=":material/check_circle:",
         )
         return
-    left, right = st.columns([3, 2], gap="medium")
+    left, right = st.columns(2, gap="medium")
     with left:
         st.plotly_chart(
             figures.contradictions_figure(episodes),
@@ -388,9 +388,18 @@ def _show_contradictions(evidence: Evidence, found: Contradictions) -> None:
             on_select="rerun",
             selection_mode="multi-row",
             column_config={
-                "Share": st.column_config.ProgressColumn(
-                    min_value=0.0, max_value=1.0, format="percent", color="gray", width=110
+                "Episode": st.column_config.NumberColumn(width=68, format="%d"),
+                "Share": st.column_config.NumberColumn(
+                    width=62, format="percent", help="Of its steps, those that contradict another"
                 ),
+                "Contradicting": st.column_config.NumberColumn(width=100),
+                "Identical": st.column_config.NumberColumn(
+                    width=72, help="The very same state was also shown with another action"
+                ),
+                "Near": st.column_config.NumberColumn(
+                    width=56, help="The nearest state of another episode has another action"
+                ),
+                "Steps": st.column_config.NumberColumn(width=58),
             },
             alt="Episodes by how much they contradict others",
         )

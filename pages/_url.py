@@ -32,8 +32,8 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
     Returns:
         The default, or a valid text.
     """
-    value = st.query_params.get(name, "")
-    if not valid(value):
+    value = st.query_params.get(name)
+    if value is None or not valid(value):  # a change of page takes the parameters away
         value = str(st.session_state.get(f"_{name}", default))
     if not valid(value):
         value = default
