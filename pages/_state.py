@@ -257,7 +257,7 @@ def _key(grown: tuple[PolicyTree, ...]) -> tuple[str, int]:
     return grown[0].source.digest, grown[0].divider
 
 
-@st.cache_resource(max_entries=48, show_spinner=False)
+@st.cache_resource(max_entries=16, show_spinner=False)  # a large set's boxes take 25 MB
 def _rule_set(
     key: tuple[str, int],
     thresholds: Thresholds,
