@@ -126,6 +126,11 @@ def history(of: Base) -> History:
     return _histories().get(of.key, History())
 
 
+def waiting(of: Base) -> int:
+    """Of how many other rule sets there are edits in this session."""
+    return sum(bool(edits.edits) for key, edits in _histories().items() if key != of.key)
+
+
 def keep(of: Base, edits: History) -> None:
     """Put edits in force."""
     _histories()[of.key] = edits

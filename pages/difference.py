@@ -125,9 +125,11 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
             "What": column.TextColumn(width=75),
             "Rule": column.TextColumn(width=80),
             "Action": column.MultiselectColumn(
-                width=160, options=list(colours), color=list(colours.values())
+                width=min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250),
+                options=list(colours),
+                color=list(colours.values()),
             ),
-            "When": column.TextColumn(width=360 if "Change" in frame else 560),
+            "When": column.TextColumn(width=320 if "Change" in frame else 500),
             "Change": column.TextColumn(width=240),
             "States": column.NumberColumn(
                 format="localized",

@@ -11,6 +11,7 @@ from _edit_view import bar, chosen_rule, numbers, table
 from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
+from sarl_core.explaining.language import counted
 
 
 def take_file() -> None:
@@ -58,6 +59,12 @@ except SarlError as problem:
     st.stop()
 if of.name:
     st.caption(f"The rules of {escaped(of.name)}, {len(of.rule_set):,} of them.")
+others = _edits.waiting(of)
+if others:
+    st.caption(
+        f":material/schedule: The edits of {counted(others, 'other rule set')} wait until "
+        f"{'it is' if others == 1 else 'they are'} chosen again: other data, episodes or divider."
+    )
 try:
     before = _edits.verdicts_of(of, ())
     after = _edits.verdicts_of(of, _edits.history(of).edits)

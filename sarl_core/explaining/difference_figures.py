@@ -73,7 +73,13 @@ def confusion_figure(
         xgap=2,
         ygap=2,
         name="different",
-        text=[[f"{count:,}" if count else "" for count in row] for row in counts.tolist()],
+        text=[
+            [
+                f"{counts[row, column]:,}" if counts[row, column] and row != column else ""
+                for column in ticks
+            ]
+            for row in ticks
+        ],
         texttemplate="%{text}" if size - 1 <= _TEXT_UP_TO else "",
     )
     figure.add_scatter(
@@ -82,7 +88,9 @@ def confusion_figure(
         mode="text" if size - 1 <= _TEXT_UP_TO else "markers",
         marker={"size": 1, "opacity": 0},
         text=[
-            f"{counts[row, column]:,}" if row == column else "" for row in ticks for column in ticks
+            f"{counts[row, column]:,}" if row == column and counts[row, column] else ""
+            for row in ticks
+            for column in ticks
         ],
         hovertext=[text for row in hover for text in row],
         hovertemplate="%{hovertext}<extra></extra>",
@@ -116,7 +124,6 @@ def confusion_figure(
         "zeroline": False,
         "fixedrange": True,
         "automargin": True,
-        "ticklabelstandoff": 4,
     }
     figure.update_xaxes(
         title={"text": f"{plain(names[1])} says", "standoff": 6},
@@ -125,7 +132,7 @@ def confusion_figure(
         **common,
     )
     figure.update_yaxes(
-        title={"text": f"{plain(names[0])} says", "standoff": 6},
+        title={"text": f"{plain(names[0])} says", "standoff": 14},
         range=[size - 0.5, -0.5 - _MARK],
         **common,
     )

@@ -32,7 +32,7 @@ def rule_rows(found: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, 
     entries: list[tuple[str, Rule, RuleSet, str]] = []
     if "changed" in kinds:
         entries += [
-            ("changed", change.after, found.second, what_text(change, found))
+            ("changed", change.after, found.second, what_text(change, found, beside=True))
             for change in difference.changed
         ]
     for kind, rules, rule_set in (

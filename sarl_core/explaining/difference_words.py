@@ -35,15 +35,17 @@ def said_text(label: int, dimension: LabelledDimension) -> str:
     return label_text(label, dimension) if 0 <= label < dimension.n_labels else NO_RULE_TEXT
 
 
-def what_text(change: RuleChange, difference: Disagreement) -> str:
+def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = False) -> str:
     """What changed of a rule.
 
     Args:
         change: One of the difference.
         difference: Knows the names.
+        beside: Whether the rule as it is now stands beside this, so that what was is enough.
 
     Returns:
-        As "angle > 0.1 instead of angle > 0.2; switched off".
+        As "angle > 0.1 instead of angle > 0.2; switched off"; beside the rule "was angle > 0.2;
+        switched off".
     """
     before, after, what = change
     parts = []
@@ -52,14 +54,12 @@ def what_text(change: RuleChange, difference: Disagreement) -> str:
         now = conditions_text(after, difference.second)
         if was == now:  # they differ beyond what is shown
             was, now = exact_text(before, difference.first), exact_text(after, difference.second)
-        parts.append(f"{now} instead of {was}")
+        parts.append(f"was {was}" if beside else f"{now} instead of {was}")
     if "action" in what:
         dimension = difference.first.actions[before.dimension]
-        now_does = difference.second.actions[after.dimension]
-        parts.append(
-            f"{action_text(after.action, now_does)} instead of "
-            f"{action_text(before.action, dimension)}"
-        )
+        said = action_text(before.action, dimension)
+        says = action_text(after.action, difference.second.actions[after.dimension])
+        parts.append(f"said {said}" if beside else f"{says} instead of {said}")
     if "switched" in what:
         parts.append(f"switched {'on' if after.enabled else 'off'}")
     if "place" in what:

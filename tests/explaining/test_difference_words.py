@@ -17,6 +17,7 @@ from sarl_core.explaining.difference_words import (
     kinds_text,
     rows_text,
     said_text,
+    what_text,
 )
 from sarl_core.explaining.edit_words import change_text, conflict_text, edit_text, state_text
 from sarl_core.mining.editing import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
@@ -120,7 +121,13 @@ def test_a_difference_in_words():
 def test_what_looks_the_same_is_told_in_full():
     near = replace(LOW, conditions=(Condition(0, "<=", 0.50000001),))
     found = disagreement(RULES, replace(RULES, rules=(near,)), STATES)
-    assert rule_rows(found)["Change"] == ["angle <= 0.50000001 instead of angle <= 0.5"]
+    assert rule_rows(found)["Change"] == ["was angle <= 0.5"]
+    assert what_text(found.difference.changed[0], found) == (
+        "angle <= 0.50000001 instead of angle <= 0.5"
+    )
+    turned = disagreement(RULES, replace(RULES, rules=(replace(LOW, action=1),)), STATES)
+    assert rule_rows(turned)["Change"] == ["said left"]
+    assert what_text(turned.difference.changed[0], turned) == "right instead of left"
 
 
 def test_a_document_and_tables():
