@@ -20,6 +20,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.film import Palette
 from sarl_core.rollouts.filming import _no_display as no_display
 from sarl_core.rollouts.filming import _picture as draw
 from sarl_core.rollouts.filming import picture_speed
@@ -32,8 +33,6 @@ from sarl_core.shielding.shield import Shield
 FIRST_SEED = FRESH
 EPISODES = 12
 _LEAST_HEIGHT = 0.4  # of the width, below which nothing more is cut off
-_COLOURS = 64  # that all frames share: the scenes hold few
-_PALETTE_FRAMES = 48  # of them, spread evenly, that the colours are taken from
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,19 +319,15 @@ def _files(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, bytes]:
     """PNG files that share their colours."""
     from PIL import Image
 
-    if not pictures:
-        return {}
-    places = sorted(pictures)
-    every = max(1, len(places) // _PALETTE_FRAMES)
-    sample = np.concatenate([pictures[place] for place in places[::every]])
-    palette = Image.fromarray(sample).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+    palette = Palette()
+    indexes = {place: palette.indexes(pictures[place]) for place in sorted(pictures)}
+    colours = palette.colours.tobytes()
     found = {}
-    for place in places:
-        reduced = Image.fromarray(pictures[place]).quantize(
-            palette=palette, dither=Image.Dither.NONE
-        )
+    for place, picture in indexes.items():
+        image = Image.fromarray(picture)
+        image.putpalette(colours)
         file = io.BytesIO()
-        reduced.save(file, format="PNG", optimize=True)
+        image.save(file, format="PNG", optimize=True)
         found[place] = file.getvalue()
     return found
 

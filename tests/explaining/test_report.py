@@ -1,0 +1,294 @@
+from __future__ import annotations
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.report import Wishes, make_report
+from sarl_core.explaining.report_comparison import Result
+from sarl_core.explaining.report_counts import Share, tally
+from sarl_core.explaining.report_thresholds import read_card
+from sarl_core.mining.holding_out import hold_out, with_held_out
+
+DATA = Path(__file__).parents[2] / "data"
+PLAIN = Wishes(frames=0)
+HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>{{ 7*7 }}"
+VOID = {"meta", "img", "br", "rect", "line", "circle"}
+
+
+class Page(HTMLParser):
+    """What a browser would make of a report."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+@pytest.fixture(scope="module")
+def cart() -> Demonstrations:
+    return load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+
+
+@pytest.fixture(scope="module")
+def rules(cart: Demonstrations) -> RuleSet:
+    return mine_rules(cart, supp_min=0.005, conf_min=0.95)
+
+
+def named(demonstrations: Demonstrations, text: str) -> Demonstrations:
+    """The same, with a text in every place where a name may stand."""
+    d = demonstrations.observations.shape[1]
+    return dataclasses.replace(
+        demonstrations,
+        feature_names=tuple(f"{text} {index}" for index in range(d)),
+        feature_units=(text,) * d,
+        action_names=(text,),
+        label_names=(tuple(f"{text} {label}" for label in range(2)),),
+        agent=text,
+        env_id=text,
+        notes=(text,),
+    )
+
+
+def test_a_report_is_one_file_that_asks_for_nothing(cart: Demonstrations, rules: RuleSet) -> None:
+    wishes = Wishes(frames=1, in_full=3, episodes=2)
+    report = make_report(rules, cart, wishes)
+    page = Page(report.html)
+    assert not {"script", "link", "iframe", "object", "form"} & {tag for tag, _ in page.tags}
+    for tag, attributes in page.tags:
+        for name, value in attributes.items():
+            assert not name.startswith("on")
+            if name in ("src", "href"):
+                assert (value or "").startswith("data:image/png;base64," if tag == "img" else "#")
+    assert "url(" not in report.html
+    assert "@import" not in report.html
+    images = [attributes for tag, attributes in page.tags if tag == "img"]
+    assert len(images) == report.pictures >= 2
+    assert all(attributes["alt"] for attributes in images)
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(set(ids)) == len(ids)
+    targets = {(a["href"] or "")[1:] for tag, a in page.tags if tag == "a"}
+    assert targets <= set(ids)
+    assert make_report(rules, cart, wishes).html == report.html
+
+
+def test_headings_do_not_skip_a_level(cart: Demonstrations, two_torques: Demonstrations) -> None:
+    for data in (cart, two_torques):
+        found = mine_rules(data, supp_min=0.05, conf_min=0.9)
+        page = Page(make_report(found, data, PLAIN).html)
+        levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
+        assert levels[0] == 1
+        assert levels.count(1) == 1
+        assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_counts_are_those_of_the_data(cart: Demonstrations, rules: RuleSet) -> None:
+    text = Page(make_report(rules, cart, PLAIN).html).text
+    covered = np.zeros(len(cart), dtype=bool)
+    for rule in rules.rules:
+        inside = np.ones(len(cart), dtype=bool)
+        for feature, op, threshold in rule.conditions:
+            column = cart.observations[:, feature].astype(np.float64)
+            inside &= column <= threshold if op == "<=" else column > threshold
+        right = int((cart.actions[inside].reshape(-1) == rule.action).sum())
+        assert f"{right:,} of {int(inside.sum()):,} states" in text
+        exact = binomtest(right, int(inside.sum())).proportion_ci(method="wilson")
+        assert f"{100 * exact.low:.1f} % and {100 * exact.high:.1f} %" in text
+        covered |= inside
+    assert f"{int(covered.sum()):,} of 15,000 demonstrated states" in text
+
+
+def test_the_plane_holds_what_mining_gives(cart: Demonstrations, rules: RuleSet) -> None:
+    html = make_report(rules, cart, PLAIN).html
+    plane = html.split('<table class="plane">')[1].split("</table>")[0]
+    supports = [float(value) for value in re.findall(r'<th scope="col">([\d.]+)</th>', plane)]
+    rows = re.findall(r'<tr><th scope="row">([\d.]+)</th>(.*?)</tr>', plane, flags=re.S)
+    assert supports == [0, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20]
+    assert [float(confidence) for confidence, _ in rows] == [100, 99, 95, 90, 80, 70, 60, 50]
+    for confidence, cells in rows[1:4]:
+        counts = [int(count.replace(",", "")) for count in re.findall(r">([\d,]+)</td>", cells)]
+        for support, count in list(zip(supports, counts, strict=True))[2:5]:
+            mined = mine_rules(cart, supp_min=support / 100, conf_min=float(confidence) / 100)
+            assert len(mined) == count
+    (chosen,) = re.findall(r'class="chosen" aria-label="(.*?)"', plane)
+    assert chosen == f"{len(rules)}, in force"
+
+
+def test_names_from_files_are_only_ever_text(cart: Demonstrations) -> None:
+    data = named(cart, HOSTILE)
+    found = mine_rules(data, supp_min=0.005, conf_min=0.95)
+    result = Result(HOSTILE, HOSTILE, 1, 2, 3, 1.0, 1.0, 1.0, 0.0, 2.0, 0.5, 0.5, None)
+    report = make_report(
+        found,
+        data,
+        Wishes(rules_name=HOSTILE, demonstrations_name=HOSTILE, commands=(HOSTILE,)),
+        card={"chosen_by": HOSTILE, "reported_on": HOSTILE, "command": HOSTILE},
+        comparison=(result,),
+    )
+    page = Page(report.html)
+    assert not {"script", "img"} & {tag for tag, _ in page.tags}
+    assert not any(name.startswith("on") for _, attrs in page.tags for name in attrs)
+    assert "<script>" in page.text
+    assert "{{ 7*7 }}" in page.text
+    assert page.text.count("alert(1)") > 20
+    assert "There are no pictures of states" in page.text
+
+
+def test_of_a_large_set_some_stand_in_full_and_the_rest_in_a_table(cart: Demonstrations) -> None:
+    found = mine_rules(cart, supp_min=0.0, conf_min=1.0)
+    report = make_report(found, cart, dataclasses.replace(PLAIN, in_full=20))
+    page = Page(report.html)
+    assert report.in_full == 20
+    assert sum(a.get("class") == "rule" for tag, a in page.tags if tag == "article") == 20
+    assert f"There are {len(found):,} rules" in page.text
+    ids = {a["id"] for _, a in page.tags if (a.get("id") or "").startswith("rule-")}
+    assert ids == {f"rule-{number}" for number in range(1, len(found) + 1)}
+    assert len(report.html) < 3_000_000
+    shown = [int(n.replace(",", "")) for n in re.findall(r"\(([\d,]+) states?\)", page.text)][:20]
+    assert shown == sorted((rule.samples for rule in found.rules), reverse=True)[:20]
+
+
+def test_continuous_actions_in_several_dimensions(two_torques: Demonstrations) -> None:
+    found = mine_rules(two_torques, supp_min=0.05, conf_min=0.8, divider=12)
+    page = Page(make_report(found, two_torques, dataclasses.replace(PLAIN, in_full=4)).html)
+    assert "divided into 12 equal intervals" in page.text
+    assert {"hip", "knee"} <= {word.strip() for word in page.words}
+    for dimension in range(2):
+        count = int((tally(found, two_torques).rules[:, dimension] >= 0).sum())
+        assert f"{count:,} of 600 demonstrated states" in page.text
+
+
+def test_without_a_rule_the_report_says_so(cart: Demonstrations) -> None:
+    empty = mine_rules(cart, supp_min=0.9, conf_min=1.0)
+    assert len(empty) == 0
+    assert "There is no rule" in Page(make_report(empty, cart).html).text
+
+
+def test_compact_rules_are_told_by_their_budget_and_their_card() -> None:
+    path = DATA / "rules" / "lunar_lander_compact.json"
+    data = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet")
+    card = read_card(path)
+    assert card is not None
+    rule_set = RuleSet.load(path)
+    page = Page(make_report(rule_set, data, PLAIN, card=card).html)
+    assert f"The budget was {card['budget']:,} rules" in page.text
+    assert f"{card['reported']['mean']:.0f}" in page.text
+    assert "made from other data than the demonstrations" in page.text
+    assert "plane" not in {a.get("class") for tag, a in page.tags if tag == "table"}
+
+
+def test_an_environment_that_cannot_be_had_leaves_a_report_without_pictures(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    for env_id, reason in (
+        ("Nowhere-v9", "Nowhere-v9"),
+        ("antigravity:CartPole-v1", "names a module to import"),
+        ("", "do not say which environment"),
+        ("Acrobot-v1", "4 features"),
+    ):
+        data = dataclasses.replace(cart, env_id=env_id)
+        source = dataclasses.replace(rules.source, env_id=env_id, digest=data.digest)
+        found = dataclasses.replace(rules, source=source)
+        report = make_report(found, data, Wishes(episodes=1))
+        assert reason in report.without
+        assert report.pictures == 0
+        assert report.without in Page(report.html).text
+    with pytest.raises(InputError, match="Nowhere-v9"):
+        make_report(rules, cart, Wishes(env_id="Nowhere-v9"))
+
+
+def test_held_out_episodes_stand_beside_what_was_mined(cart: Demonstrations) -> None:
+    split = hold_out(cart, 0.3, seed=1)
+    found = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
+    assert tally(found, cart).split
+    text = Page(make_report(found, cart, PLAIN).html).text
+    assert f"mined from {split.mined.n_episodes} episodes of these" in text
+    for rule in found.rules:
+        held = rule.held_out
+        assert held is not None
+        assert f"{held.correct:,} of {held.samples:,} state" in text
+    assert "of this report's demonstrations" not in text
+    assert not tally(found, split.held_out).split
+
+
+def test_other_features_and_actions_are_refused_in_one_sentence(
+    cart: Demonstrations, rules: RuleSet, two_torques: Demonstrations
+) -> None:
+    other = dataclasses.replace(cart, feature_names=("a", "b", "c", "d"))
+    three = dataclasses.replace(cart, label_names=(("x", "y", "z"),))
+    continuous = dataclasses.replace(
+        cart,
+        actions=cart.actions.astype(np.float32).reshape(-1, 1),
+        label_names=None,
+        label_first=None,
+    )
+    for data, words in (
+        (two_torques, "4 features and the demonstrations have 3"),
+        (other, "'cart position' in the rules and 'a'"),
+        (three, "2 values in the rules and 3"),
+        (continuous, "continuous"),
+    ):
+        with pytest.raises(InputError, match=words) as caught:
+            make_report(rules, data, PLAIN)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("wrong", [{"frames": 13}, {"in_full": -1}, {"episodes": 0}, {"seed": -1}])
+def test_what_no_report_can_hold_is_refused(wrong: dict[str, int]) -> None:
+    with pytest.raises(InputError, match="give one from"):
+        Wishes(**wrong)
+
+
+@pytest.mark.parametrize(("part", "whole"), [(0, 1), (1, 1), (0, 40), (40, 40), (153, 158)])
+def test_the_interval_is_wilson_s(part: int, whole: int) -> None:
+    exact = binomtest(part, whole).proportion_ci(method="wilson")
+    assert Share(part, whole).interval == pytest.approx((exact.low, exact.high), abs=1e-12)
+
+
+def test_of_nothing_everything_may_be() -> None:
+    assert Share(0, 0).interval == (0.0, 1.0)
+    assert np.isnan(Share(0, 0).value)
+
+
+@pytest.mark.parametrize("content", ["[]", "{", "\x00", "[" * 100_000])
+def test_a_card_that_is_none_is_refused(content: str, tmp_path: Path) -> None:
+    (tmp_path / "rules.card.json").write_text(content)
+    with pytest.raises(InputError, match="card"):
+        read_card(tmp_path / "rules.json")
+
+
+def test_a_card_with_odd_values_is_told_as_far_as_it_goes(cart: Demonstrations) -> None:
+    path = DATA / "rules" / "cartpole_compact.json"
+    odd = {"budget": "many", "rounds": 3, "reported": {"mean": float("nan")}, "refined": "yes"}
+    page = Page(make_report(RuleSet.load(path), cart, PLAIN, card=odd).html)
+    assert "The budget" not in page.text
