@@ -50,16 +50,16 @@ PAGES = [
         help="Every rule in plain language, with the evidence behind it.",
     ),
     st.Page(
-        "what_if.py",
-        title="What if",
-        icon=":material/help_center:",
-        help="One state: what the shield would do in it, why, and what would change that.",
-    ),
-    st.Page(
         "evidence.py",
         title="Evidence",
         icon=":material/verified:",
         help="How sure each rule is, and whether the demonstrations are enough and agree.",
+    ),
+    st.Page(
+        "what_if.py",
+        title="What if",
+        icon=":material/help_center:",
+        help="One state: what the shield would do in it, why, and what would change that.",
     ),
     st.Page(
         "edit.py",
@@ -80,6 +80,12 @@ PAGES = [
         help="Carry the rules away: as code, as a table, on paper.",
     ),
     st.Page(
+        "report.py",
+        title="Report",
+        icon=":material/summarize:",
+        help="The rules in one file, for people who know only the task.",
+    ),
+    st.Page(
         "replay.py",
         title="Replay",
         icon=":material/play_circle:",
@@ -90,12 +96,6 @@ PAGES = [
         title="Shield",
         icon=":material/shield:",
         help="What a shield is worth: agents with the rules and without, over many episodes.",
-    ),
-    st.Page(
-        "report.py",
-        title="Report",
-        icon=":material/summarize:",
-        help="The rules in one file, for people who know only the task.",
     ),
     st.Page(
         "ablation.py",
@@ -126,7 +126,7 @@ PAGES = [
 GUESSED = st.Page(
     lambda: None, title="Demonstrations", url_path="demonstrations", visibility="hidden"
 )
-page = st.navigation([*PAGES, GUESSED])
+page = st.navigation([*PAGES, GUESSED], expanded=True)
 if page == GUESSED:
     st.switch_page(PAGES[0], query_params=st.query_params.to_dict())
 sidebar(thresholds_shown=page.title != "Thresholds")

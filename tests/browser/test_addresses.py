@@ -17,5 +17,5 @@ def test_demonstrations_are_found_at_both_addresses(screen: Page, path: str) -> 
     assert parameters(screen)["data"] == "cartpole"
     assert urlsplit(screen.url).path == "/"
     expect(screen.get_by_role("dialog")).to_have_count(0)
-    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(8)
+    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(16)
     no_trace(screen)
