@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast, get_args
+from typing import Literal, cast, get_args
 
 import streamlit as st
 
@@ -12,8 +12,12 @@ from sarl_core.shielding.shield import Outside
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
 
 
-def outside_choice() -> Outside:
-    """The choice, kept in the URL (outside)."""
+def outside_choice(width: Literal["stretch"] | int = "stretch") -> Outside:
+    """The choice, kept in the URL (outside).
+
+    Args:
+        width: Of the widget, in pixels.
+    """
     return cast(
         "Outside",
         st.selectbox(
@@ -21,6 +25,7 @@ def outside_choice() -> Outside:
             OUTSIDE,
             key="outside",
             bind="query-params",
+            width=width,
             help="What a rule does in a state beyond the least and largest values seen where it "
             "applies. Act: it changes the action all the same, and the step is marked. Abstain: "
             "it leaves the action to the agent.",

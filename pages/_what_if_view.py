@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining import rule_figures as figures
-from sarl_core.explaining.language import action_text, conditions_text, counted, sentence
+from sarl_core.explaining.language import action_text, counted, sentence
 from sarl_core.explaining.path_table import label_key
 from sarl_core.explaining.what_if import (
     change_text,
@@ -297,7 +297,7 @@ def show_misses(
                 help="Whether it would then decide; else a rule that was given its place before "
                 "it does"
             ),
-            "Then": st.column_config.TextColumn(width="large"),
+            "Would apply if": st.column_config.TextColumn(width=520),
         },
         alt="Rules that would apply if one or two features were different",
     )
@@ -314,13 +314,12 @@ def miss_row(miss: NearMiss, rule_set: RuleSet) -> dict[str, object]:
     return {
         "Rule": rule.id,
         "Says": action_text(rule.action, rule_set.actions[rule.dimension]),
-        "What is missing": near_miss_text(miss.changes, features),
+        "Would apply if": near_miss_text(miss.changes, features),
         "In spreads": miss.distance,
         "In force": miss.in_force,
         "From exactly": ", ".join(
             with_unit(exact_text(change.after), features[change.feature]) for change in miss.changes
         ),
-        "Then": conditions_text(rule, rule_set),
     }
 
 

@@ -291,7 +291,7 @@ if not rule_set.rules:
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
     st.stop()
 with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
-    beyond = outside_choice()
+    beyond = outside_choice(220)
     projection = cast(
         "Projection",
         st.selectbox(
@@ -299,6 +299,7 @@ with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
             PROJECTIONS,
             key="projection",
             bind="query-params",
+            width=220,
             help="What a continuous action that breaks a rule becomes.",
         )
         if rule_set.actions[0].is_interval

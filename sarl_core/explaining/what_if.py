@@ -113,10 +113,9 @@ def near_miss_text(changes: tuple[Change, ...], features: tuple[Feature, ...]) -
         features: The d features.
 
     Returns:
-        As "would apply if pole angle were 0.03 rad less".
+        As "pole angle were 0.03 rad less and there were left leg contact", after "would apply if".
     """
-    parts = [change_text(change, features[change.feature]) for change in changes]
-    return f"would apply if {' and '.join(parts)}"
+    return " and ".join(change_text(change, features[change.feature]) for change in changes)
 
 
 def exact_text(value: float) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -19,6 +18,7 @@ from sarl_core.shielding.near import Line
 
 _ROW = 34  # pixels
 _PALE = 0.32
+_QUIET = "#7d8a95"
 _HAIR = 0.004  # of a row: what is narrower is drawn so wide
 
 
@@ -84,7 +84,7 @@ def lines_figure(
         mode="markers",
         marker={
             "symbol": "line-ns-open",
-            "size": 24,
+            "size": 17,
             "color": "#f1f5f7" if dark else "#1d2730",
             "line": {"width": 3, "color": "#f1f5f7" if dark else "#1d2730"},
         },
@@ -164,15 +164,20 @@ def _does(label: int, labels: LabelledDimension) -> str:
 def _add_ends(
     figure: go.Figure, ranges: Sequence[tuple[float, float]], features: Sequence[Feature]
 ) -> None:
-    """The ends of each bar, written under it in small."""
-    for row, ((low, high), feature) in enumerate(zip(ranges, features, strict=True)):
-        for place, value, anchor in ((0.0, low, "left"), (1.0, high, "right")):
-            note: dict[str, Any] = {
-                "x": place,
-                "y": row + 0.42,
-                "text": plain(with_unit(number_text(value), feature)),
-                "showarrow": False,
-                "xanchor": anchor,
-                "font": {"size": 10, "color": "#7d8a95"},
-            }
-            figure.add_annotation(note)
+    """The ends of each bar, written under it in small.
+
+    As points with text: annotations take Plotly a hundred times as long.
+    """
+    for side, place, anchor in ((0, 0.0, "middle right"), (1, 1.0, "middle left")):
+        figure.add_scatter(
+            x=[place] * len(ranges),
+            y=[row + 0.4 for row in range(len(ranges))],
+            mode="text",
+            text=[
+                plain(with_unit(number_text(ends[side]), feature))
+                for ends, feature in zip(ranges, features, strict=True)
+            ],
+            textposition=anchor,
+            textfont={"size": 10, "color": _QUIET},
+            hoverinfo="skip",
+        )

@@ -160,3 +160,43 @@ def test_train_expert_writes_a_policy_that_evaluate_takes(run, tmp_path):
     assert MlpPolicy.load(path).env_id == "CartPole-v1"
     assert json.loads(path.with_suffix(".json").read_text())["steps"] == 1024
     run("evaluate", "--env", "CartPole-v1", "--agent", path, "--episodes", 1)
+
+
+def test_outside_their_data_rules_act_or_abstain(run, tmp_path):
+    rules = tmp_path / "rules.json"
+    shown = ROOT / "data" / "demonstrations" / "cartpole.parquet"
+    run("mine", shown, "--support", 0, "--confidence", 1, "--out", rules)
+    arguments = ("--env", "CartPole-v1", "--agent", "novice", "--rules", rules, "--seed", 100_000)
+    summaries = {}
+    for outside in ("act", "abstain"):
+        evaluate = ("evaluate", *arguments, "--episodes", 3, "--outside", outside)
+        summaries[outside] = json.loads(run(*evaluate, "--json"))["summary"]
+        assert 0 < summaries[outside]["outside_rate"] < 1
+        text = run(*evaluate)
+        assert "interventions outside the data" in text
+        assert ("left as it is" in " ".join(text.split())) == (outside == "abstain")
+    assert summaries["act"] != summaries["abstain"]
+    assert (
+        json.loads(run("evaluate", *arguments, "--episodes", 3, "--json"))["summary"]
+        == (summaries["act"])
+    )
+    picture = ("render", *arguments, "--out", tmp_path / "r.gif", "--outside", "abstain", "--json")
+    one = json.loads(run(*picture))["episodes"][0]
+    alike = ("evaluate", *arguments, "--episodes", 1, "--outside", "abstain", "--json")
+    assert {name: one[name] for name in ("return", "interventions")} == {
+        name: json.loads(run(*alike))["episodes"][0][name] for name in ("return", "interventions")
+    }
+
+
+def test_a_rule_file_without_data_boxes_says_so(run, cart_rules, tmp_path, capsys):
+    from sarl_core.cli import main
+
+    document = json.loads(Path(cart_rules).read_text())
+    for rule in document["rules"]:
+        rule.pop("box", None)
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps(document))
+    arguments = ("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--rules", str(old))
+    assert "keeps no data boxes" in " ".join(run(*arguments, "--episodes", 1).split())
+    assert main([*arguments, "--outside", "abstain"]) == 2
+    assert "this rule file keeps no data boxes" in capsys.readouterr().err
