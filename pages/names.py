@@ -115,18 +115,16 @@ def editor(table: str, raw: Demonstrations) -> None:
     st.data_editor(
         frame,
         key=key_of(table, raw),
-        hide_index=True,
+        hide_index=table == LABELS,  # the others are counted in what is said about them
         disabled=fixed,
         num_rows="fixed",
         height="content" if len(frame) <= 24 else 620,
         column_config={
-            "Name": column.TextColumn(width="medium", max_chars=200, help="Click to change it"),
-            "Unit": column.TextColumn(
-                width="small", max_chars=40, help="As rad or m/s; may be empty"
-            ),
+            "Name": column.TextColumn(width=170, max_chars=200, help="Click to change it"),
+            "Unit": column.TextColumn(width=72, max_chars=40, help="As rad or m/s; may be empty"),
             "Came as": column.TextColumn(help="The name in the data as they were read"),
-            "Least": column.NumberColumn(format="%.4g", width="small"),
-            "Largest": column.NumberColumn(format="%.4g", width="small"),
+            "Least": column.NumberColumn(format="%.4g", width=78),
+            "Largest": column.NumberColumn(format="%.4g", width=82),
             "Action": column.NumberColumn(format="%d", width="small"),
         },
     )
@@ -178,7 +176,7 @@ if refused:
         f"{in_full(refused)} Until then the names before this change are used.",
         icon=":material/error:",
     )
-left, right = st.columns([3, 2], gap="medium")
+left, right = st.columns([5, 3], gap="medium")
 with left:
     st.subheader(FEATURES)
     editor(FEATURES, data)
