@@ -65,8 +65,9 @@ def facts(
         found.append(("Seed of the demonstrations", str(demonstrations.seed)))
     if seeds is not None:
         found.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
-    found.append(("Python", platform.python_version()))
-    return (*found, *((package, _version(package)) for package in _PACKAGES))
+    versions = [f"Python {platform.python_version()}"]
+    versions += [f"{package} {_version(package)}" for package in _PACKAGES]
+    return (*found, ("Versions", ", ".join(versions)))
 
 
 def _named(digest: str, name: str) -> str:

@@ -18,6 +18,8 @@ from sarl_core.rollouts.comparison import Comparison, comparison_row
 
 _MAX_BYTES = 16 * 2**20
 _MOST_ROWS = 200
+_HEADINGS = ("Failures", "Actions changed", "Steps with a rule", "Rules", "Episodes")
+_UNKNOWN = "–"
 _NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
 
 
@@ -63,13 +65,10 @@ class Row:
     Attributes:
         name: Of agent and shield.
         picture: SVG of the typical return and its interval.
-        typical: In numbers, with the interval.
+        typical: In numbers.
+        interval: Of the typical return.
         mean: Mean return and standard deviation.
-        rules: Their number.
-        changed: Share of steps.
-        covered: Share of steps.
-        crashes: Share of episodes.
-        episodes: How many.
+        more: One text a heading of the comparison.
     """
 
     name: str
@@ -77,11 +76,7 @@ class Row:
     typical: str
     interval: str
     mean: str
-    rules: str
-    changed: str
-    covered: str
-    crashes: str
-    episodes: str
+    more: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -90,11 +85,13 @@ class Compared:
 
     Attributes:
         sentences: In which environment, on which seeds.
+        headings: Of what else is known of at least one result.
         rows: One a result.
         ends: The numbers at the left and right end of the picture.
     """
 
     sentences: tuple[str, ...]
+    headings: tuple[str, ...]
     rows: tuple[Row, ...]
     ends: tuple[str, str]
 
@@ -174,6 +171,10 @@ def compared(results: Sequence[Result]) -> Compared | None:
     if not results:
         return None
     scale = Scale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
+    more = [_more(one) for one in results]
+    known = [
+        place for place in range(len(_HEADINGS)) if any(texts[place] != _UNKNOWN for texts in more)
+    ]
     environments = sorted({one.env_id for one in results if one.env_id})
     where = f" in {' and '.join(environments)}" if environments else ""
     seeds = {one.seed for one in results if one.seed is not None}
@@ -185,7 +186,11 @@ def compared(results: Sequence[Result]) -> Compared | None:
             "it probably lies (95 % interval). Where two lines do not overlap, the difference is "
             "hardly chance.",
         ),
-        rows=tuple(_row(one, scale) for one in results),
+        headings=tuple(_HEADINGS[place] for place in known),
+        rows=tuple(
+            _row(one, scale, tuple(texts[place] for place in known))
+            for one, texts in zip(results, more, strict=True)
+        ),
         ends=(number_text(scale.low), number_text(scale.high)),
     )
 
@@ -281,10 +286,22 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
 # --- showing -----------------------------------------------------------------------------------
 
 
-def _row(one: Result, scale: Scale) -> Row:
-    def told(value: float | None) -> str:
-        return "–" if value is None else share_text(value)
+def _more(one: Result) -> tuple[str, ...]:
+    """A text for each of `_HEADINGS`."""
 
+    def told(value: float | None) -> str:
+        return _UNKNOWN if value is None else share_text(value)
+
+    return (
+        told(one.crashes),
+        told(one.changed),
+        told(one.covered),
+        _UNKNOWN if one.rules is None else f"{one.rules:,}",
+        f"{one.episodes:,}",
+    )
+
+
+def _row(one: Result, scale: Scale, more: tuple[str, ...]) -> Row:
     colour = MUTED if one.changed is None else NEUTRAL
     return Row(
         name=one.name,
@@ -292,9 +309,5 @@ def _row(one: Result, scale: Scale) -> Row:
         typical=number_text(one.iqm),
         interval=f"{number_text(one.low)} to {number_text(one.high)}",
         mean=f"{number_text(one.mean)} ± {number_text(one.std)}",
-        rules="–" if one.rules is None else f"{one.rules:,}",
-        changed=told(one.changed),
-        covered=told(one.covered),
-        crashes=told(one.crashes),
-        episodes=f"{one.episodes:,}",
+        more=more,
     )
