@@ -96,7 +96,7 @@ def comparison(order: Order) -> None:
 
 def flips_title(episodes: Episodes) -> str:
     """What the column of the flips is called."""
-    return f"Flips a {pace_of(episodes.env_id).unit}"
+    return f"Flips {pace_of(episodes.env_id).each}"
 
 
 def flips_of(episodes: Episodes) -> str:

@@ -63,14 +63,17 @@ class Recorded:
         return int(np.searchsorted(self.steps.episode, self.shown)) + step
 
 
+@st.fragment
 def flight_recorder(replay: Replay, order: Order, current: int) -> None:
-    """The table of steps.
+    """The table of steps; a fragment of its own, since a filter moves nothing but the table.
 
     Args:
         replay: On screen.
         order: Asked for it.
         current: The step that is chosen.
     """
+    if st.session_state.pop("_picked", False):
+        st.rerun()  # as a whole: a row was chosen, and everything goes there
     st.subheader("Flight recorder")
     recorded = source(replay, order)
     steps = recorded.steps
@@ -213,6 +216,7 @@ def pick(recorded: Recorded, on_page: NDArray[np.int64]) -> None:
     if not places or places[0] >= len(on_page):
         return
     row = int(on_page[places[0]])
+    st.session_state["_picked"] = True
     episode, step = int(recorded.steps.episode[row]), int(recorded.steps.step[row])
     if episode == recorded.shown:
         st.session_state["step"] = step

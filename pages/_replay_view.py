@@ -19,7 +19,7 @@ from _replays import (
 from _words import escaped
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
-from sarl_core.explaining.language import counted, label_text, share_text
+from sarl_core.explaining.language import counted, label_text, number_text, share_text
 from sarl_core.explaining.lit_path import lit_paths_html
 from sarl_core.explaining.replay import StepView, margin_text, step_texts, step_view, tracks
 from sarl_core.explaining.replay_figures import (
@@ -232,13 +232,13 @@ def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
             key="return",
             alt="Return so far, step by step",
         )
-    with words:
-        describe(view, shielded=shielded, linked=linked)
         if replay.finder is not None:
             tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
             for action, table in zip(view.actions, tables, strict=True):
                 many = len(tables) > 1
                 st.html(f"<b>{html.escape(action.dimension)}</b>{table}" if many else table)
+    with words:
+        describe(view, shielded=shielded, linked=linked)
     if shielded:
         fork_section(replay, order, current)
     flight_recorder(replay, order, current)
@@ -250,7 +250,7 @@ def flips_text(episodes: Episodes) -> str:
     pace = pace_of(episodes.env_id)
     rate = pace.rate(flips, int(episodes.lengths.sum()))
     return (
-        f"The shield switched on or off {counted(flips, 'time')}: {rate:.2g} flips a {pace.unit}."
+        f"The shield switched on or off {counted(flips, 'time')}: {number_text(rate)} {pace.each}."
         if flips
         else "The shield never switched on or off."
     )

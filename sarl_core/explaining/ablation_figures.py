@@ -52,6 +52,7 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
     known = ablation.failures_known
     return {
         "Rule": [rule.id for rule in rules],
+        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "Verdict": [effect.verdict.capitalize() for effect in ablation.effects],
         "Return without it": [effect.difference.mean for effect in ablation.effects],
         "95 % interval": [interval_text(effect) for effect in ablation.effects],
@@ -61,7 +62,6 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
         "Changed": [effect.changed for effect in ablation.effects],
         "In force": [effect.matched for effect in ablation.effects],
         "Episodes": [effect.episodes for effect in ablation.effects],
-        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
     }
 

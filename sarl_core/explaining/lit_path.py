@@ -101,9 +101,10 @@ _STYLE = """<style>
 .sarl-lit td { padding: 0.16rem 0.5rem 0.16rem 0; border-top: 1px solid rgba(128,140,150,0.25); }
 .sarl-lit .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 .sarl-lit td:first-child { box-shadow: inset 3px 0 0 MARKER; padding-left: 0.6rem; }
-.sarl-lit tr.end td { font-weight: 600; }
 .sarl-lit tr.near td { font-weight: 600; }
-.sarl-lit i { display: inline-block; width: 0.75em; height: 0.75em; border-radius: 2px;
+.sarl-lit-end { font-size: 0.84rem; font-weight: 600; padding: 0.3rem 0 0.3rem 0.6rem;
+  box-shadow: inset 3px 0 0 MARKER; border-top: 1px solid rgba(128,140,150,0.25); }
+.sarl-lit-end i { display: inline-block; width: 0.75em; height: 0.75em; border-radius: 2px;
   margin-right: 0.4em; }
 </style>""".replace("MARKER", MARKER_COLOUR)
 
@@ -132,21 +133,23 @@ def lit_path_table(path: LitPath, rule_set: RuleSet, dimension: int) -> str:
             f'<td class="n">{escape(value)}</td>'
             f'<td class="n">{number_text(query.distance)}</td></tr>'
         )
-    return (
-        f'{_STYLE}<div style="overflow:auto;max-height:22rem"><table class="sarl-lit">'
+    table = (
+        '<div style="overflow:auto;max-height:22rem"><table class="sarl-lit">'
         '<thead><tr><th>Asked on the way</th><th class="n">Here</th><th class="n">Distance</th>'
-        f"</tr></thead><tbody>{''.join(rows)}{_end(path, rule_set, dimension)}</tbody></table>"
-        "</div>"
+        f"</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
     )
+    return f"{_STYLE}{table if rows else ''}{_end(path, rule_set, dimension)}"
 
 
 def _end(path: LitPath, rule_set: RuleSet, dimension: int) -> str:
-    if path.rule is None:
-        return '<tr class="end"><td colspan="3">No rule ends here</td></tr>'
-    rule = rule_set.rules[path.rule]
-    action = escape(action_text(rule.action, rule_set.actions[dimension]))
-    square = f'<i style="background:{label_colour(rule.action)}"></i>'
-    return f'<tr class="end"><td colspan="3">Rule {escape(rule.id)}: {square}{action}</td></tr>'
+    """Where the path ends; outside the table, so that it is seen however long the way is."""
+    text = "No rule ends here"
+    if path.rule is not None:
+        rule = rule_set.rules[path.rule]
+        action = escape(action_text(rule.action, rule_set.actions[dimension]))
+        square = f'<i style="background:{label_colour(rule.action)}"></i>'
+        text = f"Rule {escape(rule.id)}: {square}{action}"
+    return f'<div class="sarl-lit-end">{text}</div>'
 
 
 def lit_paths_html(

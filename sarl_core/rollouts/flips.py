@@ -25,6 +25,11 @@ class Pace(NamedTuple):
     steps: float
     unit: str
 
+    @property
+    def each(self) -> str:
+        """The unit after a number: "a second" or "in 100 steps"."""
+        return f"{'a' if self.unit == 'second' else 'in'} {self.unit}"
+
     def rate(self, flips: float, steps: float) -> float:
         """Flips a unit.
 

@@ -216,6 +216,6 @@ def test_names_in_a_path_are_escaped(rules: RuleSet, played: Episodes) -> None:
     assert "<b>" not in text
     assert "&lt;b&gt;angle" in text
     path = PathFinder(sly).path(0, steps.observation[row], int(steps.rules[row, 0]))
-    assert text.count("<tr") == len(path.queries) + 2
+    assert text.count("<tr") == len(path.queries) + 1
     assert 'class="near"' in text
     assert "No rule ends here" in lit_path_table(path._replace(rule=None), sly, 0)
