@@ -1,7 +1,7 @@
 """A rule set in the form that code is written from: what is asked in which order, and what follows.
 
-It does what a `Shield` does, with float32 states and, where actions are continuous, float32
-actions: those that environments give and take.
+It does what a `Shield` does that acts everywhere (``outside="act"``), with float32 states and,
+where actions are continuous, float32 actions: those that environments give and take.
 """
 
 from __future__ import annotations
