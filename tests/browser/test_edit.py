@@ -1,0 +1,60 @@
+"""The pages Edit and Difference in a browser: edit, take it back, save, compare."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.walking import metric, no_trace, parameters, settle, visit
+
+
+def press(screen: Page, name: str) -> None:
+    screen.get_by_role("button", name=name, exact=True).click()
+    settle(screen)
+
+
+def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> None:
+    visit(screen, "/edit?data=cartpole", "Edit")
+    press(screen, "Switch off")
+    expect(screen.get_by_role("button", name="Undo: switch off")).to_be_visible()
+    changed = metric(screen, "Decided differently")
+    assert changed != "0"
+    press(screen, "Pin")
+    screen.get_by_label("Number").fill("0.05")
+    screen.get_by_label("Number").press("Enter")
+    expect(screen.get_by_text("The rule has no action; choose what it says")).to_be_visible()
+    settle(screen)
+    says = screen.get_by_role("combobox", name="Then")
+    says.evaluate("box => box.scrollIntoView({block: 'center'})")  # a scrolled list closes
+    says.click()
+    screen.get_by_role("option", name="push left").click()
+    expect(screen.get_by_text("It would decide")).to_be_visible()
+    press(screen, "Add the rule")
+    expect(screen.get_by_role("button", name="Undo: add manual.1")).to_be_visible()
+    assert parameters(screen)["rule"] == "manual.1"
+    press(screen, "Move up")
+    screen.get_by_role("button", name="Undo: move manual.1 up").click()
+    expect(screen.get_by_role("button", name="Redo: move manual.1 up")).to_be_visible()
+    settle(screen)
+    with screen.expect_download() as started:
+        screen.get_by_role("button", name="Rule file").click()
+    path = tmp_path / "edited.json"
+    started.value.save_as(path)
+    rules = json.loads(path.read_text())["rules"]
+    assert [rule["id"] for rule in rules if rule["origin"] == "manual"] == ["manual.1"]
+    (off,) = (rule for rule in rules if not rule["enabled"])
+    assert off["pinned"]
+    # The edits are still there on another page, and go into a comparison.
+    screen.get_by_role("link", name="Compare with the unedited set").click()
+    expect(screen.get_by_role("heading", name="Difference", level=1)).to_be_visible()
+    expect(screen.locator(".js-plotly-plot")).to_be_visible()
+    settle(screen)
+    assert parameters(screen)["second"] == "edited"
+    expect(screen.get_by_text("1 rule added, none removed, 1 rule changed")).to_be_visible()
+    screen.get_by_role("link", name="Rules", exact=True).click()
+    expect(screen.get_by_text("You have made 3 edits of these rules")).to_be_visible()
+    screen.get_by_role("link", name="See the edited set").click()
+    expect(screen.get_by_role("button", name="Undo: add manual.1")).to_be_visible()
+    no_trace(screen)
