@@ -5,6 +5,7 @@ PORT ?= 8501
 VENV := .venv
 PYTHON := $(VENV)/bin/python
 BROWSER := /usr/bin/chromium
+COMPILER := /usr/bin/cc
 
 # The first interpreter that Box2D has wheels for.
 FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
@@ -18,7 +19,7 @@ app: $(VENV)/runtime.stamp  ## start the dashboard
 	@echo "The dashboard is at http://localhost:$(PORT) (Ctrl-C ends it)."
 	$(PYTHON) -m streamlit run app.py --server.port $(PORT)
 
-test: $(VENV)/development.stamp $(BROWSER)  ## run every test
+test: $(VENV)/development.stamp $(BROWSER) $(COMPILER)  ## run every test
 	$(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 
 lint: $(VENV)/development.stamp  ## style, types, and who may import whom
@@ -56,5 +57,11 @@ $(BROWSER):
 	  { echo "error: the browser tests need $(BROWSER); have an administrator install the package chromium and run make again" >&2; exit 2; }
 	$(AS_ROOT) apt-get update
 	$(AS_ROOT) apt-get install --yes --no-install-recommends chromium
+
+$(COMPILER):
+	@command -v apt-get >/dev/null && { test "$$(id -u)" = 0 || command -v sudo >/dev/null; } || \
+	  { echo "error: the tests of exported C code need $(COMPILER); have an administrator install the packages gcc and libc6-dev and run make again" >&2; exit 2; }
+	$(AS_ROOT) apt-get update
+	$(AS_ROOT) apt-get install --yes --no-install-recommends gcc libc6-dev
 
 AS_ROOT = $(shell test "$$(id -u)" = 0 || echo sudo)
