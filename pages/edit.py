@@ -63,7 +63,7 @@ others = _edits.waiting(of)
 if others:
     st.caption(
         f":material/schedule: The edits of {counted(others, 'other rule set')} wait until "
-        f"{'it is' if others == 1 else 'they are'} chosen again: other data, episodes or divider."
+        f"{'it is' if others == 1 else 'they are'} chosen again."
     )
 try:
     before = _edits.verdicts_of(of, ())
