@@ -159,7 +159,7 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
         "action applies; where none does, the agent acts as it likes.",
     ]
     if rest:
-        each = " of each action" if len(rule_set.actions) > 1 else ""
+        each = ", as many of each action," if len(rule_set.actions) > 1 else ""
         found.append(
             f"There are {len(rule_set.rules):,} rules. The {full:,} that apply most often{each} "
             f"are shown in full, the other {rest:,} in a table after them."
