@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.rules import RuleSet, mine_rules
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts import seeds
@@ -365,16 +366,17 @@ class _Run:
         if choice is None:  # stopped early: the episodes of the rounds are all there is
             best = int(np.argmax([found.mean_return for found in self.rounds]))
             choice = _Choice(best, self.trees[best])
+        pairs = self.answers.pairs(choice.index)
         return Aggregation(
             env_id=self.env_id,
             plan=self.plan,
-            rule_set=self.rules(choice.trees),
+            rule_set=with_boxes(self.rules(choice.trees), pairs),
             trees=choice.trees,
             rounds=tuple(self.rounds),
             chosen=choice.index + 1,
             validation_mean=choice.mean,
             refined=choice.refined,
             reported=self.reported,
-            demonstrations=self.answers.pairs(choice.index),
+            demonstrations=pairs,
             seeds=self.seeds,
         )
