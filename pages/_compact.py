@@ -6,7 +6,7 @@ shown of the demonstrations that were chosen, so the rules are made a tree again
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import _state as state
@@ -87,4 +87,8 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
 @st.cache_resource(max_entries=12, show_spinner="Counting the compact rules …")
 def _counted(digest: str, _shipped: RuleSet, _demonstrations: Demonstrations) -> Compact:
     trees = recount(_shipped, _demonstrations)
-    return Compact(digest, _shipped, trees, leaf_rules(trees))
+    found = leaf_rules(trees)
+    compact = Compact(digest, _shipped, trees, found)
+    # The box is of the pairs that the rules were built from, whatever they are counted on.
+    boxed = tuple(replace(rule, box=compact.as_shipped(rule).box) for rule in found.rules)
+    return replace(compact, counted=replace(found, rules=boxed))

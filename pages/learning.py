@@ -152,6 +152,7 @@ def settings() -> learning.Order | None:
                 ],
                 key="learn_rules",
                 bind="query-params",
+                persist_state="session",
                 help="In force while learning. Unfiltered: support 0, confidence 1. Filtered: "
                 "support 0.005, confidence 0.95. At the thresholds: those in the sidebar. "
                 "Compact: a small set that is shipped. Own file: rules you saved.",
@@ -164,6 +165,7 @@ def settings() -> learning.Order | None:
                 1_000,
                 key="learn_steps",
                 bind="query-params",
+                persist_state="session",
                 help="Of each learner. Lunar Lander needs 100,000 and more to show what a way to "
                 "learn is worth, Cart Pole 30,000.",
             )
@@ -174,6 +176,7 @@ def settings() -> learning.Order | None:
                 1,
                 key="learn_seeds",
                 bind="query-params",
+                persist_state="session",
                 help="One may have been lucky; three say more.",
             )
             projection = PROJECTIONS[0]
@@ -195,6 +198,7 @@ def settings() -> learning.Order | None:
             format_func=lambda name: ARMS[name].title,
             key="learn_arms",
             bind="query-params",
+            persist_state="session",
         )
         with st.popover("What they do", icon=":material/help:", type="tertiary"):
             for arm in ARMS.values():
@@ -396,6 +400,7 @@ view = st.segmented_control(
     default=SHIPPED,
     key="learn_view",
     bind="query-params",
+    persist_state="session",
     required=True,
     label_visibility="collapsed",
 )

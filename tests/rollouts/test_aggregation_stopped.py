@@ -11,6 +11,7 @@ import pytest
 
 from sarl_core import RuleSet, WorkError, load_demonstrations
 from sarl_core.mining.budget import leaf_rules
+from sarl_core.mining.envelope import with_boxes
 from sarl_core.rollouts import aggregation, refinement
 from sarl_core.rollouts.agents import EXPERT_FOLDER
 from sarl_core.rollouts.aggregation import aggregate
@@ -192,7 +193,8 @@ def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     stopped = aggregate(cart, replace(REFINED, generations=8))
     assert len(points) == 1  # the third generation was better than the first, no other
     assert stopped.refined
-    assert stopped.rule_set == leaf_rules(points[0])
+    assert stopped.rule_set == with_boxes(leaf_rules(points[0]), stopped.demonstrations)
+    assert all(rule.box for rule in stopped.rule_set.rules if rule.samples)
     assert stopped.validation_mean is None
     card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
     assert card["refined"]
