@@ -24,6 +24,17 @@ ROWS = {
     "episodes": "rollouts.episodes",
     "gif": "rollouts.gif",
     "browser": "browser.slider",
+    "what-if": "pages.what_if",
+    "edit": "pages.edit",
+    "difference": "pages.difference",
+    "export": "pages.export",
+    "evidence": "pages.evidence",
+    "rules": "pages.rules",
+    "names": "pages.names",
+    "report": "pages.report",
+    "replay": "pages.replay",
+    "recorder": "pages.recorder",
+    "ablation": "rollouts.ablation",
     "import": "startup.imports",
 }
 

@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import socket
 import statistics
-import subprocess
-import sys
-import tempfile
-import time
-import urllib.error
-import urllib.request
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
+from benchmarks.chromium import opened
 from benchmarks.data import demonstrations
 from benchmarks.measure import Row, duration
 from sarl_core import Demonstrations, save_demonstrations
 
-ROOT = Path(__file__).resolve().parents[1]
-CHROMIUM = "/usr/bin/chromium"
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 MANY = 1_000_000
-PATIENCE = 600_000  # milliseconds: a tree over a million states grows for a while
 
 # From the key to the frame in which the four numbers and the ring in both maps are new.
 WATCH = """
@@ -65,22 +45,17 @@ WATCH = """
 def slider(quick: bool) -> Iterable[Row]:
     """Moves of the slider of support, at the shipped size and at a million steps."""
     moves = 20 if quick else 40
-    with tempfile.TemporaryDirectory() as folder, _dashboard(Path(folder)) as address:
-        file = Path(folder) / "million.parquet"
+    with opened() as (page, address, folder):
+        file = folder / "million.parquet"
         save_demonstrations(_many(demonstrations(), MANY), file)
-        with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-            page = browser.new_page(viewport={"width": 1440, "height": 900})
-            page.set_default_timeout(PATIENCE)
-            page.goto(f"{address}/thresholds")
-            yield _row(page, f"{len(demonstrations()):,} steps", moves, 0.15)
-            page.goto(address)
-            page.get_by_text("Use your own demonstrations").first.click()
-            page.locator("input[type=file]").set_input_files(file)
-            page.get_by_text(f"{MANY:,} steps").first.wait_for()
-            page.get_by_role("link", name="Thresholds").first.click()
-            yield _row(page, f"{MANY:,} steps", moves, 0.3)
-            browser.close()
+        page.goto(f"{address}/thresholds")
+        yield _row(page, f"{len(demonstrations()):,} steps", moves, 0.15)
+        page.goto(address)
+        page.get_by_text("Use your own demonstrations").first.click()
+        page.locator("input[type=file]").set_input_files(file)
+        page.get_by_text(f"{MANY:,} steps").first.wait_for()
+        page.get_by_role("link", name="Thresholds").first.click()
+        yield _row(page, f"{MANY:,} steps", moves, 0.3)
 
 
 def _row(page: Page, size: str, moves: int, reach: float) -> Row:
@@ -137,30 +112,3 @@ def _many(few: Demonstrations, steps: int) -> Demonstrations:
         terminated=None,
         truncated=None,
     )
-
-
-@contextlib.contextmanager
-def _dashboard(folder: Path) -> Iterator[str]:
-    """A dashboard started as a user would start it."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with (folder / "log.txt").open("wb") as log:
-        server = subprocess.Popen(
-            [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],
-            cwd=ROOT,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            env=os.environ | {"HOME": str(folder)},
-        )
-        try:
-            address = f"http://127.0.0.1:{port}"
-            for _ in range(300):
-                with contextlib.suppress(urllib.error.URLError, ConnectionError):
-                    urllib.request.urlopen(f"{address}/_stcore/health").close()
-                    break
-                time.sleep(0.1)
-            yield address
-        finally:
-            server.terminate()
-            server.wait(30)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import tempfile
 from collections.abc import Iterable
@@ -12,7 +13,9 @@ import numpy as np
 
 from benchmarks import data
 from benchmarks.measure import Row, duration, side_by_side
-from sarl_core import rollout
+from sarl_core import Shield, rollout
+from sarl_core.rollouts.ablating import ablate
+from sarl_core.rollouts.ablation import Ablation
 
 
 def episodes(quick: bool) -> Iterable[Row]:
@@ -72,6 +75,30 @@ def gif(quick: bool) -> Iterable[Row]:
         f"{duration(ours)} against {duration(theirs)}; {sizes[0] / 1e6:.2f} MB against "
         f"{sizes[1] / 1e6:.2f} MB",
         holds=sizes[0] <= sizes[1],
+    )
+
+
+def ablation(quick: bool) -> Iterable[Row]:
+    """Rules taken out one by one, on all cores against one."""
+    cores = os.cpu_count() or 1
+    shield = Shield(data.rules())
+    count, most = (10, 8) if quick else (30, 24)
+    found: dict[int, Ablation] = {}
+
+    def with_jobs(jobs: int) -> None:
+        found[jobs] = ablate(data.ENV_ID, "novice", shield, episodes=count, most=most, jobs=jobs)
+
+    ours, theirs = side_by_side(
+        lambda: with_jobs(cores), lambda: with_jobs(1), repeats=1 if quick else 3
+    )
+    yield Row(
+        f"ablation of {most} rules, {count} LunarLander episodes, {cores} cores",
+        "the same on one core",
+        "times faster",
+        theirs / ours,
+        1.5,
+        f"{duration(ours)} against {duration(theirs)}; {found[cores].played:,} episodes played",
+        holds=np.array_equal(found[cores].returns, found[1].returns),
     )
 
 
