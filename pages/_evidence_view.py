@@ -90,7 +90,7 @@ class Evidence:
 
 
 def show_overview(evidence: Evidence) -> None:
-    """All rules with their intervals, and how many of them are certain."""
+    """All rules with their intervals, and how many of them reach the minimum confidence."""
     found, held_out = evidence.found, evidence.parts.held_out
     counts = verdict_counts(found.rules, found.threshold)
     with st.container(horizontal=True, key="verdicts"):
@@ -124,6 +124,10 @@ def show_overview(evidence: Evidence) -> None:
         + f"dotted: minimum confidence {found.threshold:g}"
     )
     st.html(f"<div style='font-size:0.85rem;opacity:0.9'>{words}</div>")
+    st.caption(
+        "The intervals count every state for itself. Steps of one episode are alike, so what is "
+        "known is a little less than they say."
+    )
     if len(found.rules) > MOST_DRAWN:
         st.caption(f"The {MOST_DRAWN} rules with the most support, of {len(found.rules):,}.")
 
@@ -143,7 +147,7 @@ def show_enough(evidence: Evidence) -> None:
             figures.enough_figure(found.missing),
             config=PLAIN,
             key="enough",
-            alt="How many rules would be certain after so many more episodes",
+            alt="How many rules would reach the minimum confidence after so many more episodes",
         )
     with right:
         column = st.column_config

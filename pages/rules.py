@@ -158,7 +158,7 @@ def lower_bound_choice() -> float:
         key="lower",
         bind="query-params",
         width=150,
-        help="Only rules whose confidence is at least this with 95 % certainty, on the held-out "
+        help="Only rules whose 95 % interval of confidence lies at or above this, on the held-out "
         "episodes where there are some. The downloads hold these rules. 0: all.",
     )
     return float(least or 0.0)

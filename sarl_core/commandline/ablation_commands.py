@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,7 +48,16 @@ def ablate(
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            min=1,
+            show_default=False,
+            help="Processes; as many as there are processors where not given. The result is the "
+            "same.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -79,7 +89,7 @@ def ablate(
             seed=seed,
             most=most,
             stochastic=stochastic,
-            jobs=jobs,
+            jobs=jobs or os.cpu_count() or 1,
             progress=lambda done, total: advance(done, total),
         )
         if out is not None:

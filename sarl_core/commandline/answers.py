@@ -227,13 +227,16 @@ def describe_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) ->
     }
 
 
-def print_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) -> None:
+def print_rules(
+    rule_set: RuleSet, path: Path, tried: Tried | None = None, *, lower_bound: float | None = None
+) -> None:
     """Print what was mined, and the rules that apply most often, in words.
 
     Args:
         rule_set: The rules.
         path: Their file.
         tried: Which episodes were held out, if any were.
+        lower_bound: That rules had to reach, if they had to.
     """
     from sarl_core.commandline.evidence_answers import rule_line, tried_facts
     from sarl_core.explaining.language import share_text
@@ -252,7 +255,8 @@ def print_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) -> No
     terminal.print_lines([f"Wrote {path}"])
     terminal.print_facts(facts)
     if not len(rule_set):
-        terminal.print_lines(["No rule reaches these thresholds; lower one of them."])
+        what = "these thresholds" if lower_bound is None else "these thresholds and lower bound"
+        terminal.print_lines([f"No rule reaches {what}; lower one of them."])
         return
     often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
     terminal.print_lines(["", "The rules that apply most often:"])

@@ -91,8 +91,8 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
     facts.append(
         (
             "by rule",
-            f"{counts['reached']:,} certain of the minimum confidence, {counts['open']:,} open, "
-            f"{counts['below']:,} below it",
+            f"{counts['reached']:,} reach the minimum confidence with their whole interval, "
+            f"{counts['open']:,} open, {counts['below']:,} below it",
         )
     )
     return facts

@@ -85,8 +85,8 @@ def mine(
             min=0.0,
             max=1.0,
             show_default=False,
-            help="Keep only rules whose confidence is at least this with 95 % certainty, on what "
-            "was held out if anything was.",
+            help="Keep only rules whose 95 % interval of confidence lies at or above this, on "
+            "what was held out if anything was.",
         ),
     ] = None,
     as_json: Json = False,
@@ -132,7 +132,7 @@ def mine(
     if as_json:
         terminal.print_json(describe_rules(rule_set, out, tried))
     else:
-        print_rules(rule_set, out, tried)
+        print_rules(rule_set, out, tried, lower_bound=lower_bound)
 
 
 def landscape(

@@ -133,7 +133,7 @@ def _hover(rule: Rule, rule_set: RuleSet) -> str:
 
 
 def enough_figure(missing: Sequence[float]) -> go.Figure:
-    """How many rules would be certain after so many more episodes.
+    """How many rules would reach the minimum confidence after so many more episodes.
 
     Args:
         missing: What `more_episodes` gives of each rule.
@@ -153,12 +153,12 @@ def enough_figure(missing: Sequence[float]) -> go.Figure:
         y=[*upwards, upwards[-1]],
         mode="lines",
         line={"color": _LINE, "width": 2.5, "shape": "hv"},
-        hovertemplate="%{y:,} rules are certain after %{x:,.0f} more episodes<extra></extra>",
+        hovertemplate="%{y:,} rules reach it after %{x:,.0f} more episodes<extra></extra>",
     )
     _plain(figure, 260)
     figure.update_xaxes(title={"text": "More episodes"}, range=[0, far], tickformat=",d")
     figure.update_yaxes(
-        title={"text": "Rules that are certain"},
+        title={"text": "Rules that reach it"},
         range=[0, max(len(missing), 1) * 1.04],
         tickformat=",d",
     )

@@ -63,9 +63,15 @@ class AblationRecord:
             seed: Of the first episode; episode i has seed + i.
 
         Raises:
-            InputError: If the environment cannot be used, or the shield is not for it.
+            InputError: If the environment cannot be used, the shield is not for it, or there is
+                no rule to take out.
         """
         check_environment(env_id, shield)
+        if not any(rule.enabled for rule in shield.rule_set.rules):
+            raise InputError(
+                "the rule set has no rule in force that could be taken out; mine with lower "
+                "thresholds, or switch a rule on"
+            )
         self.env_id, self.agent, self.shield, self.seed = env_id, agent, shield, seed
         self._lock = Lock()
         self._base: Episodes | None = None

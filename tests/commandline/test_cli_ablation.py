@@ -63,3 +63,14 @@ def test_what_cannot_be_run_is_one_line(capsys, few_rules, more, words):
     assert error.startswith("error: ")
     assert words in error
     assert error.count("\n") == 1
+
+
+def test_where_no_rule_is_in_force_nothing_is_run(capsys, few_rules, tmp_path):
+    from dataclasses import replace
+
+    rules = RuleSet.load(few_rules)
+    off = replace(rules, rules=tuple(replace(rule, enabled=False) for rule in rules.rules))
+    for name, kept in (("off", off), ("empty", replace(rules, rules=()))):
+        kept.save(tmp_path / f"{name}.json")
+        assert main(list(arguments(tmp_path / f"{name}.json"))) == 2
+        assert "no rule in force" in capsys.readouterr().err

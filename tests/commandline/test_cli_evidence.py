@@ -48,6 +48,8 @@ def test_the_lower_bound_keeps_the_rules_that_are_certain(run, tmp_path):
     some = json.loads(run(*MINE, "--lower-bound", "0.9", "--json", "--out", path))
     assert 0 < some["rules"] < everything["rules"]
     assert some["rules"] == len(RuleSet.load(path))
+    none = run(*MINE, "--lower-bound", "1", "--out", path)
+    assert "No rule reaches these thresholds and lower bound" in none
 
 
 @pytest.mark.parametrize("share", ["0", "1", "0.99", "-1"])
