@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.language import action_text, counted, sentence
+from sarl_core.explaining.lit_path import PathFinder, lit_path_table
 from sarl_core.explaining.path_table import label_key
 from sarl_core.explaining.what_if import (
     change_text,
@@ -21,11 +22,12 @@ from sarl_core.explaining.what_if import (
     exact_text,
     executed_text,
     near_miss_text,
+    node_of_way,
     outside_texts,
     with_unit,
 )
 from sarl_core.explaining.what_if_figures import lines_figure
-from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
+from sarl_core.mining.rules import Rule, RuleSet, cut_nodes
 from sarl_core.mining.tree import LEAF, PolicyTree
 from sarl_core.shielding.near import (
     DecisionChange,
@@ -40,6 +42,7 @@ PLAIN = {"displayModeBar": False}
 MISSES, PAIRS = 8, 4  # near misses that lack one feature, and two
 ROWS = 8
 WHOLE_TREE, AROUND = "Whole tree", "Around it"
+PLACED = "A person gave this rule its place: it is asked before the tree is."
 
 
 def show(
@@ -53,6 +56,7 @@ def show(
     *,
     trees: tuple[PolicyTree, ...],
     leaves: bool,
+    finder: Callable[[], PathFinder],
     dark: bool,
 ) -> None:
     """What the shield does in a state, and what lies near it.
@@ -65,8 +69,9 @@ def show(
         spans: Of each feature.
         spreads: What a change of each feature is measured in.
         order: The features, from top to bottom.
-        trees: Of each action dimension.
-        leaves: Whether every leaf is a rule.
+        trees: Of each action dimension, grown from the chosen data.
+        leaves: Whether every leaf of them is a rule.
+        finder: Follows a state through the rules, which may be of other trees.
         dark: Whether the theme is.
     """
     rule_set = neighbourhood.shield.rule_set
@@ -81,7 +86,13 @@ def show(
         show_lines(lines, spans, state, order, dimension, rule_set, dark=dark)
     show_changes(lines, state, spreads, spans, rule_set)
     show_misses(neighbourhood, state, spreads, rule_set)
-    show_tree(rule, state, trees[dimension], rule_set, leaves=leaves, dark=dark)
+    node = None
+    if dimension < len(trees):
+        node = node_of_way(rule, state, rule_set, trees[dimension], leaves=leaves)
+    if node is None:
+        show_way(finder(), dimension, state, -1 if found is None else found)
+    else:
+        show_tree(rule, node, trees[dimension], rule_set, leaves=leaves, dark=dark)
 
 
 def chosen_dimension(rule_set: RuleSet) -> int:
@@ -323,9 +334,21 @@ def miss_row(miss: NearMiss, rule_set: RuleSet) -> dict[str, object]:
     }
 
 
+def show_way(finder: PathFinder, dimension: int, state: NDArray[np.float32], rule: int) -> None:
+    """The way of the state through rules that are not of the tree on screen, in a table."""
+    st.subheader("Its way through the rules")
+    rules = finder.rule_set.rules
+    if rule >= 0 and rules[rule].placed:
+        st.caption(PLACED)
+    st.html(lit_path_table(finder.path(dimension, state, rule), finder.rule_set, dimension))
+    st.caption(
+        "These rules were not cut from the tree of the chosen demonstrations, so it is not drawn."
+    )
+
+
 def show_tree(
     rule: Rule | None,
-    state: NDArray[np.float32],
+    node: int,
     tree: PolicyTree,
     rule_set: RuleSet,
     *,
@@ -334,8 +357,8 @@ def show_tree(
 ) -> None:
     """The way of the state through the tree."""
     st.subheader("Its way through the tree")
-    if rule is not None and (rule.origin == "manual" or rule.pinned):
-        st.caption("A person gave this rule its place: it is asked before the tree is.")
+    if rule is not None and rule.placed:
+        st.caption(PLACED)
     view = st.segmented_control(
         "Tree",
         [AROUND, WHOLE_TREE],
@@ -346,7 +369,6 @@ def show_tree(
         label_visibility="collapsed",
     )
     mined = rule is not None and rule.origin == "mined"
-    node = node_of(rule) if rule is not None and mined else int(tree.apply(state[None])[0])
     thresholds = rule_set.thresholds
     cut = (
         np.flatnonzero(tree.feature == LEAF)

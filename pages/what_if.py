@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import label_text
+from sarl_core.explaining.lit_path import PathFinder
 from sarl_core.explaining.what_if import by_use
 from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.effects import fits
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
 from sarl_core.shielding.shield import Outside, Projection, Shield
@@ -57,6 +59,12 @@ def spans_of(
 def order_of(key: str, _rule_set: RuleSet) -> tuple[int, ...]:
     """The features that most rules ask about first."""
     return by_use(_rule_set)
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def finder_of(key: str, _rule_set: RuleSet) -> PathFinder:
+    """Follows a state through rules that are of no tree at hand."""
+    return PathFinder(_rule_set)
 
 
 def put(values: NDArray[np.float32], spans: tuple[Span, ...]) -> None:
@@ -243,8 +251,14 @@ def chosen_rules() -> tuple[RuleSet, str]:
         == EDITED
     ):
         edited, digest = _edits.edited_rules()
-        if len(edited.source.features) == len(demonstrations.features):
+        if fits(edited, demonstrations):
             return edited, f"edited {digest}"
+        st.info(
+            "The edited rules speak of other features or actions than the chosen demonstrations, "
+            "so the rules in force are shown instead; choose the demonstrations of their "
+            "environment in the sidebar.",
+            icon=":material/swap_horiz:",
+        )
     return found, key
 
 
@@ -267,6 +281,7 @@ def body() -> None:
         order_of(rules_key, rule_set),
         trees=compact.trees if compact is not None else grown,
         leaves=compact is not None,
+        finder=lambda: finder_of(rules_key, rule_set),
         dark=state.is_dark(),
     )
 

@@ -6,11 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.language import action_text, is_flag, number_text, short_condition
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.rules import Bounds, Rule, RuleSet, node_of, rules_at
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.near import Change
 
 
@@ -183,3 +185,43 @@ def _is_contact(change: Change, feature: Feature) -> bool:
     between = (change.before + change.after) / 2
     crosses = min(change.before, change.after) < 1 and max(change.before, change.after) > 0
     return crosses and is_flag(feature, Bounds(change.feature, between, math.inf))
+
+
+def node_of_way(
+    rule: Rule | None,
+    state: NDArray[np.float32],
+    rule_set: RuleSet,
+    tree: PolicyTree,
+    *,
+    leaves: bool,
+) -> int | None:
+    """The node at which the way of a state through a tree ends.
+
+    Args:
+        rule: In force there, or None.
+        state: Shape (d,).
+        rule_set: Of the rule; it may have come from a file, and from another tree.
+        tree: Of the rule's action dimension.
+        leaves: Whether the rules of the tree are its leaves.
+
+    Returns:
+        That of the rule where it was cut from this tree, else a leaf; None where the rule set was
+        not cut from this tree, so that no node of it says anything about the rules.
+    """
+    divided = tree.dimension.is_interval and rule_set.divider != tree.divider
+    if rule_set.source.digest != tree.source.digest or divided:
+        return None
+    if (rule_set.cut == "leaves") != leaves:
+        return None
+    if rule is None or rule.origin == "manual":
+        return int(tree.apply(state[None])[0])
+    # A file may have renamed or rounded it: it is the node's if it asks what the way there asks.
+    before, _, number = rule.id.rpartition(".")
+    if before != str(tree.index) or not (number.isascii() and number.isdigit()):
+        return None
+    # Longer numbers are no node's, and Python refuses to read the longest.
+    node = node_of(rule) if len(number) < 10 else tree.n_nodes
+    if node >= tree.n_nodes:
+        return None
+    (own,) = rules_at(tree, np.array([node]))
+    return node if set(own.bounds) == set(rule.bounds) else None

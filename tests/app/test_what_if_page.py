@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules
 from sarl_core.explaining.language import sentence
+from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import ROUTER, open_page, texts
 
 DATA = ROUTER.parents[1] / "data"
@@ -118,3 +120,57 @@ def test_a_step_of_the_replay_is_taken_and_outside_its_data_it_says_so() -> None
     app.number_input(key="number").set_value(3).run()
     assert app.selectbox(key="outside").value == "abstain"
     assert not app.info
+
+
+def test_edited_rules_of_a_file_are_followed_in_a_table_and_light_no_foreign_path() -> None:
+    demonstrations = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+    mined = mine_rules(demonstrations, supp_min=0.005, conf_min=0.95)
+    named = [replace(rule, id=f"kept {at}") for at, rule in enumerate(mined.rules)]
+    content = rules_to_json(replace(mined, rules=tuple(named))).encode()
+    app = open_page("edit", data="cartpole", base="own file")
+    app.file_uploader(key="edit_rule_file").set_value(("mine.json", content, "application/json"))
+    app.run()
+    app.button(key="edit_pin").click().run()
+    app.switch_page("what_if.py").run()
+    app.selectbox(key="take").set_value(COVERED).run()
+    assert "Its way through the tree" in texts(app)
+    app.button_group(key="edits").set_value("edited").run()
+    assert not app.exception, app.exception
+    assert "Its way through the rules" in texts(app)
+    (table_shown,) = [part.proto.body for part in app.get("html") if "sarl-lit" in part.proto.body]
+    assert "Rule kept " in table_shown
+    # In another environment the edited rules say nothing; the mined ones are shown, and it is said.
+    app.query_params["data"] = "lunar_lander"
+    app.run()
+    assert not app.exception, app.exception
+    assert "speak of other features or actions" in texts(app)
+    assert "Its way through the tree" in texts(app)
+
+
+def test_compact_rules_abstain_where_the_shield_does() -> None:
+    shipped = RuleSet.load(DATA / "rules" / "cartpole_compact.json")
+    assert all(rule.box is not None for rule in shipped.rules)
+    app = open_page(
+        "what_if", data="cartpole", set="compact", outside="abstain", take=COVERED, number="1"
+    )
+    demonstrations = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+    low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
+    shield, acting = Shield(shipped, outside="abstain"), Shield(shipped)
+    rng = np.random.default_rng(0)
+    states = rng.uniform(low, high, (400, 4))
+    found = next(
+        row
+        for row in states.astype(np.float32)
+        if shield.decide(row, 0).outside and acting.decide(row, 0).intervened
+    )
+    for index, value in enumerate(found.tolist()):
+        app.slider(key=f"x{index}").set_value(value)
+    app.run()
+    state = the_state(app, 4)
+    decision = shield.decide(state, 0)
+    assert decision.outside
+    assert not decision.intervened
+    words = texts(app)
+    assert "keeps no data boxes" not in words
+    assert "Outside this rule's data" in words
+    assert "is executed, as the agent wants" in words

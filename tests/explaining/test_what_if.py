@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sarl_core import grow_policy_trees, mine_rules
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.what_if import (
@@ -16,6 +17,7 @@ from sarl_core.explaining.what_if import (
     exact_text,
     executed_text,
     near_miss_text,
+    node_of_way,
     outside_texts,
 )
 from sarl_core.explaining.what_if_figures import lines_figure, stretches
@@ -156,3 +158,47 @@ def test_the_picture_has_a_bar_and_a_mark_for_each_feature():
     mark = next(trace for trace in figure.data if trace.name == "the state")
     assert list(mark.x) == [0.5] * 3
     assert "<b>" not in "".join(figure.layout.yaxis.ticktext)
+
+
+# --- the way of a state -------------------------------------------------------------------------
+
+
+def test_the_way_ends_at_the_node_of_the_rule_and_else_at_a_leaf(lander_like, lander_trees):
+    (tree,) = lander_trees
+    mined = mine_rules(lander_trees, supp_min=0.02, conf_min=0.8)
+    states = lander_like.observations[:50]
+    for row, leaf in zip(states, tree.apply(states), strict=True):
+        applies = [one for one in mined.rules if one.applies(row[None])[0]]
+        wanted = int(applies[0].id.split(".")[1]) if applies else int(leaf)
+        found = applies[0] if applies else None
+        assert node_of_way(found, row, mined, tree, leaves=False) == wanted
+        manual = rule("manual.1", [(0, ">", -9.0)], 0, origin="manual")
+        assert node_of_way(manual, row, mined, tree, leaves=False) == int(leaf)
+
+
+@pytest.mark.parametrize(
+    "name", ["mine", "0.99999", "1.2", "0.-1", "0.²", "0." + "9" * 5000, "0.0", "0."]
+)
+def test_a_rule_of_another_tree_lights_no_path_of_this_one(lander_like, lander_trees, name):
+    mined = mine_rules(lander_trees, supp_min=0.02, conf_min=0.8)
+    foreign = replace(mined.rules[0], id=name)
+    state = lander_like.observations[0]
+    assert node_of_way(foreign, state, mined, lander_trees[0], leaves=False) is None
+
+
+def test_a_rule_set_of_other_data_or_another_cut_is_of_no_tree_here(lander_like, lander_trees):
+    mined = mine_rules(lander_trees, supp_min=0.02, conf_min=0.8)
+    state, first = lander_like.observations[0], mined.rules[0]
+    assert node_of_way(first, state, mined, lander_trees[0], leaves=False) is not None
+    others = replace(mined, source=replace(mined.source, digest="other"))
+    for one, leaves in ((others, False), (mined, True), (replace(mined, cut="leaves"), False)):
+        for found in (first, None):
+            assert node_of_way(found, state, one, lander_trees[0], leaves=leaves) is None
+
+
+def test_intervals_of_another_number_are_of_another_tree(two_torques):
+    here, there = (mine_rules(two_torques, supp_min=0.1, conf_min=0.5, divider=d) for d in (2, 3))
+    (tree, _) = grow_policy_trees(two_torques, divider=2)
+    state = two_torques.observations[0]
+    assert node_of_way(None, state, here, tree, leaves=False) is not None
+    assert node_of_way(None, state, there, tree, leaves=False) is None
