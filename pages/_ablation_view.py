@@ -18,6 +18,7 @@ from sarl_core.explaining.ablation_figures import (
     ablation_text,
     left_out_text,
 )
+from sarl_core.explaining.cells import safe_cells
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.language import action_text, sentence
 from sarl_core.rollouts.ablation import Ablation
@@ -194,4 +195,4 @@ def csv(found: Ablation) -> bytes:
     frame.insert(0, "seed", int(found.base.seeds[0]))
     frame.insert(0, "agent", found.base.agent)
     frame.insert(0, "environment", found.base.env_id)
-    return str(frame.to_csv(index=False)).encode()
+    return str(safe_cells(frame).to_csv(index=False)).encode()

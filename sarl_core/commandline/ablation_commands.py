@@ -77,6 +77,7 @@ def ablate(
     if out is not None:
         terminal.check_output(out, (".csv",))
     with terminal.working("Taking rules out") as advance:
+        from sarl_core.explaining.cells import safe_cells
         from sarl_core.rollouts.ablating import ablate as run
 
         shield = read_shield(rules, projection, outside)
@@ -94,7 +95,7 @@ def ablate(
         )
         if out is not None:
             with whole_file(out) as unfinished:
-                found.to_frame().to_csv(unfinished, index=False)
+                safe_cells(found.to_frame()).to_csv(unfinished, index=False)
     if as_json:
         terminal.print_json(_document(found))
     else:

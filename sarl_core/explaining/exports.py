@@ -14,6 +14,8 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.explaining.cells import safe_cell
+from sarl_core.explaining.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.explaining.export_program import require_rules
 from sarl_core.explaining.language import (
     counted,
@@ -24,7 +26,7 @@ from sarl_core.explaining.language import (
 )
 from sarl_core.files import whole_file
 from sarl_core.mining.rounding import Rounding, merged_rules, rounded_rules
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
@@ -45,8 +47,10 @@ CSV_COLUMNS = (
     "merged_length",
     "enabled",
     "origin",
+    "pinned",
+    "held_out_samples",
+    "held_out_correct",
 )
-_FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 
 
 class Prepared(NamedTuple):
@@ -234,14 +238,15 @@ def rules_to_csv(rule_set: RuleSet) -> str:
     features = rule_set.source.features
     for rule in rule_set.rules:
         dimension = rule_set.actions[rule.dimension]
+        held_out = rule.held_out
         conditions = " and ".join(exact_condition(c, features) for c in rule.conditions)
         writer.writerow(
             (
-                rule.id,
-                _cell(dimension.name),
-                _cell(label_text(rule.action, dimension)),
-                _cell(sentence(rule, rule_set, evidence=False)),
-                _cell(conditions or "always"),
+                safe_cell(rule.id),
+                safe_cell(dimension.name),
+                safe_cell(label_text(rule.action, dimension)),
+                safe_cell(sentence(rule, rule_set, evidence=False)),
+                safe_cell(conditions or "always"),
                 repr(rule.support),
                 repr(rule.confidence),
                 repr(rule.lift),
@@ -251,6 +256,9 @@ def rules_to_csv(rule_set: RuleSet) -> str:
                 rule.merged_length,
                 "yes" if rule.enabled else "no",
                 rule.origin,
+                "yes" if rule.pinned else "no",
+                "" if held_out is None else held_out.samples,
+                "" if held_out is None else held_out.correct,
             )
         )
     return text.getvalue()
@@ -264,25 +272,40 @@ def rules_to_text(rule_set: RuleSet) -> str:
 
     Returns:
         What it was mined from and how, then every rule as a numbered sentence, by action
-        dimension, the most general first.
+        dimension: those that a person placed in their order, then the most general first.
     """
     source = rule_set.source
+    summary = (
+        f"they cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"{share_text(rule_set.fidelity)} of those."
+        if is_plain(rule_set)
+        else f"{edits_counted(rule_set)}."
+    )
     lines = [
         f"Rules for {source.env_id or 'an unnamed environment'}",
         f"Mined from {counted(source.steps, 'step')} in "
         f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}.",
         f"{counted(rule_set.rule_count, 'rule')}, {rule_set.mean_length:.2f} conditions on "
-        f"average; they cover {share_text(rule_set.coverage)} of the states and are right in "
-        f"{share_text(rule_set.fidelity)} of those.",
+        f"average; {summary}",
         "They were learned from examples and guarantee nothing.",
     ]
     for index, dimension in enumerate(rule_set.actions):
-        rules = sorted(rule_set.of_dimension(index), key=lambda rule: -rule.support)
+        rules = reading_order(rule_set.of_dimension(index))
         lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
         lines += [
-            f"{number:>4}. {sentence(rule, rule_set)}" for number, rule in enumerate(rules, start=1)
+            f"{number:>4}. {sentence(rule, rule_set)}{_mark(rule)}"
+            for number, rule in enumerate(rules, start=1)
         ]
+    if any(rule.placed for rule in rule_set.rules):
+        lines += ["", "Rules written by hand or pinned come before the others, in their order."]
     return "\n".join(lines) + "\n"
+
+
+def _mark(rule: Rule) -> str:
+    """What a person made of a rule, as " (pinned, off)"."""
+    marks = ["by hand"] if rule.origin == "manual" else ["pinned"] if rule.pinned else []
+    marks += [] if rule.enabled else ["off"]
+    return f" ({', '.join(marks)})" if marks else ""
 
 
 def limits_text(rule_set: RuleSet) -> str:
@@ -308,9 +331,3 @@ def limits_text(rule_set: RuleSet) -> str:
     if any(dimension.is_interval for dimension in rule_set.actions):
         limits.append(f"divider {rule_set.divider}")
     return ", ".join(limits)
-
-
-def _cell(text: str) -> str:
-    """Text that no spreadsheet takes for a formula; numbers and ranges stay as they are."""
-    looks_numeric = text[:1] == "-" and text[1:2].isdigit()
-    return f"'{text}" if text.startswith(_FORMULA_SIGNS) and not looks_numeric else text

@@ -7,6 +7,7 @@ import re
 from html import escape
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.explaining.export_program import one_line
 from sarl_core.explaining.language import action_text, counted, share_text, threshold_text
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
@@ -22,19 +23,24 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         rule_set: Any number of rules.
 
     Returns:
-        What it was mined from and how, then a table for each action dimension, the rules that
-        apply most often first. Every name is escaped.
+        What it was mined from and how, then a table for each action dimension: rules that a
+        person placed in their order, then those that apply most often. Every name is escaped.
     """
     from sarl_core.explaining.exports import limits_text
 
     source = rule_set.source
+    # Rules that overlap or are off have counts that do not add up to a share of the states.
+    summary = (
+        f"They cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"{share_text(rule_set.fidelity)} of those."
+        if is_plain(rule_set)
+        else f"The set was {edits_counted(rule_set)}."
+    )
     lines = [
         f"# Rules for {markdown_text(source.env_id) or 'an unnamed environment'}",
         "",
         f"{counted(rule_set.rule_count, 'rule')}, mined from {counted(source.steps, 'step')} in "
-        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. They cover "
-        f"{share_text(rule_set.coverage)} of the states and are right in "
-        f"{share_text(rule_set.fidelity)} of those.",
+        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. {summary}",
         "",
         "They were learned from examples and guarantee nothing.",
     ]
@@ -42,9 +48,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
     headings = ["Rule", "If", "Then", "The expert did so in", "States"]
     headings += ["Held out"] if held_out else []
     for index, dimension in enumerate(rule_set.actions):
-        rules = sorted(
-            rule_set.of_dimension(index), key=lambda rule: (not rule.placed, -rule.samples)
-        )
+        rules = reading_order(rule_set.of_dimension(index))
         lines += [
             "",
             f"## {markdown_text(dimension.name)}: {counted(len(rules), 'rule')}",

@@ -28,8 +28,10 @@ from sarl_core.mining.rules import Bounds, Rule, RuleSet
 PAGE_ROWS = 50
 LEGEND = (
     "A bar is the interval that a rule asks for, on the scale of the feature; one that reaches the "
-    "side of its cell is open there. Right: how often the expert did what the rule says."
+    "side of its cell is open there. Expert agrees: how often it did what the rule says."
 )
+PLACED_LEGEND = "* written by hand or pinned: tried first, in this order."
+PLACED_MARK = "* "
 _MANY_COLUMNS = 8  # from here on their names stand upright
 _INSET = 8.0  # percent of a cell beyond the range of the data, where open intervals go on
 _OPEN = 1.5  # to here, so that bars of neighbours do not run into each other
@@ -72,7 +74,8 @@ class RuleMatrix:
     Attributes:
         rule_set: Knows the names.
         columns: Features that rules ask about.
-        rules: By action dimension and action, then the most support first.
+        rules: Those that a person placed, in their order; then by action dimension and action,
+            the most support first.
     """
 
     rule_set: RuleSet
@@ -127,14 +130,16 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     features = rule_set.source.features
     if demonstrations is not None and demonstrations.observations.shape[1] != len(features):
         demonstrations = None
-    rules = sorted(rule_set.rules, key=lambda rule: (rule.dimension, rule.action, -rule.samples))
+    placed = [rule for rule in rule_set.rules if rule.placed]
+    others = [rule for rule in rule_set.rules if not rule.placed]
+    others.sort(key=lambda rule: (rule.dimension, rule.action, -rule.samples))
     return RuleMatrix(
         rule_set,
         tuple(
             Column(feature, features[feature], *_range(feature, rule_set, demonstrations))
             for feature in asked
         ),
-        tuple(rules),
+        (*placed, *others),
     )
 
 
@@ -157,7 +162,7 @@ def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> str:
     body = "".join(_row(matrix, rule) for rule in rules)
     return (
         f'{_STYLE}{_key(matrix.rule_set)}<div class="sarl-matrix"><table><thead><tr>'
-        f'<th class="a">Action</th><th class="n">States</th><th class="n">Right</th>{head}'
+        f'<th class="a">Action</th><th class="n">States</th><th class="n">Expert agrees</th>{head}'
         f"</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
@@ -190,6 +195,8 @@ def _key(rule_set: RuleSet) -> str:
         f"{escape(_action(label, rule_set, dimension))}</span>"
         for dimension, label in sorted(shown)
     )
+    if any(rule.placed for rule in rule_set.rules):
+        entries += f"<span>{PLACED_LEGEND}</span>"
     return f'<div class="sarl-matrix-key">{entries}</div>'
 
 
@@ -214,10 +221,14 @@ def _row(matrix: RuleMatrix, rule: Rule) -> str:
             f'width:{bar.right - bar.left:.1f}%;background:{colour}"></i></td>'
         )
     action = escape(_action(rule.action, matrix.rule_set, rule.dimension))
+    name = f"rule {escape(rule.id)}"
+    if rule.placed:
+        action = f"{PLACED_MARK}{action}"
+        name += ", by hand" if rule.origin == "manual" else ", pinned"
     off = "" if rule.enabled else ' class="off"'
     share = share_text(rule.confidence) if rule.samples else "–"
     return (
-        f'<tr{off}><td class="a" title="rule {escape(rule.id)}"><i style="background:{colour}"></i>'
+        f'<tr{off}><td class="a" title="{name}"><i style="background:{colour}"></i>'
         f'{action}</td><td class="n">{rule.samples:,}</td><td class="n">{share}</td>'
         f"{''.join(cells)}</tr>"
     )

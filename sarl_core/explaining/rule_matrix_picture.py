@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.export_program import one_line
 from sarl_core.explaining.language import label_text, share_text
-from sarl_core.explaining.rule_matrix import RuleMatrix
+from sarl_core.explaining.rule_matrix import PLACED_MARK, RuleMatrix
 from sarl_core.mining.rules import Rule
 
 _SCALE = 2  # pixels a unit, for sharp print
 _ROW, _CELL, _TEXT = 20, 96, 11
-_ACTION, _STATES, _RIGHT, _HEAD, _MARGIN = 170, 62, 66, 50, 14
+_ACTION, _STATES, _AGREES, _HEAD, _MARGIN = 170, 62, 96, 50, 14
 _INK, _MUTED, _LINE, _GROUND = "#1d2730", "#5b6a76", "#d5dde3", "#ffffff"
 
 
@@ -29,7 +29,7 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
     """
     from PIL import Image, ImageDraw, ImageFont
 
-    first = _MARGIN + _ACTION + _STATES + _RIGHT
+    first = _MARGIN + _ACTION + _STATES + _AGREES
     width = first + _CELL * len(matrix.columns) + _MARGIN
     height = 2 * _MARGIN + _HEAD + _ROW * len(rules)
     picture = Image.new("RGB", (width * _SCALE, height * _SCALE), _GROUND)
@@ -52,7 +52,7 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
 
     write(_MARGIN, _MARGIN, "Action", _ACTION - 8)
     write(_MARGIN + _ACTION, _MARGIN, "States", _STATES - 8, right=True)
-    write(_MARGIN + _ACTION + _STATES, _MARGIN, "Right", _RIGHT - 8, right=True)
+    write(_MARGIN + _ACTION + _STATES, _MARGIN, "Expert agrees", _AGREES - 8, right=True)
     for place, column in enumerate(matrix.columns):
         left = first + place * _CELL
         for line, words in enumerate(_two_lines(column.name.name)):
@@ -68,10 +68,11 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         told = label_text(rule.action, dimension)
         if len(matrix.rule_set.actions) > 1 or dimension.is_interval:
             told = f"{dimension.name}: {told}"
+        told = f"{PLACED_MARK}{told}" if rule.placed else told
         write(_MARGIN + 14, top + 4, told, _ACTION - 22)
         write(_MARGIN + _ACTION, top + 4, f"{rule.samples:,}", _STATES - 8, right=True)
         share = share_text(rule.confidence) if rule.samples else "–"
-        write(_MARGIN + _ACTION + _STATES, top + 4, share, _RIGHT - 8, right=True)
+        write(_MARGIN + _ACTION + _STATES, top + 4, share, _AGREES - 8, right=True)
         bars = matrix.bars(rule)
         for place, column in enumerate(matrix.columns):
             left = first + place * _CELL

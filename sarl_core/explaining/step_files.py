@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.formats.metadata import KEY
 from sarl_core.errors import InputError
+from sarl_core.explaining.cells import safe_cells
 from sarl_core.files import whole_file
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.steps import StepTable
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT, VERSION = "sarl-steps", 1
-_FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +75,7 @@ def steps_to_csv(record: StepRecord) -> bytes:
     Returns:
         The file's content; nothing in it is taken for a formula.
     """
-    frame = record.to_frame()
-    for name in frame.columns:
-        if str(name).startswith("rule_id"):
-            frame[name] = [
-                f"'{text}" if isinstance(text, str) and text.startswith(_FORMULA_SIGNS) else text
-                for text in frame[name]
-            ]
-    return str(frame.to_csv(index=False)).encode()
+    return str(safe_cells(record.to_frame()).to_csv(index=False)).encode()
 
 
 def steps_to_parquet(record: StepRecord) -> bytes:

@@ -1,0 +1,48 @@
+"""Cells of tables that people open in a spreadsheet, none of which is taken for a formula."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r", "\n")
+_NUMBER = r"[+-]?[0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?"
+# An interval has words in it, so no spreadsheet reckons it out.
+_NUMERIC = re.compile(rf"{_NUMBER}(?: to {_NUMBER})?")
+
+
+def safe_cell(text: str) -> str:
+    """Text that no spreadsheet takes for a formula.
+
+    Args:
+        text: Perhaps from a file of somebody else.
+
+    Returns:
+        The same where it is a number or an interval, as "-1 to 0.5", or begins harmlessly;
+        otherwise with an apostrophe before it.
+    """
+    harmless = not text.startswith(_FORMULA_SIGNS) or _NUMERIC.fullmatch(text)
+    return text if harmless else f"'{text}"
+
+
+def safe_cells(frame: pd.DataFrame) -> pd.DataFrame:
+    """A table in which no text and no heading is taken for a formula.
+
+    Args:
+        frame: Any; what is no text stays as it is.
+
+    Returns:
+        Another one.
+    """
+    import pandas as pd
+
+    found = frame.rename(columns=lambda name: safe_cell(str(name)))
+    for name in found.columns:
+        if not pd.api.types.is_numeric_dtype(found[name]):
+            found[name] = [
+                safe_cell(one) if isinstance(one, str) else one for one in found[name].tolist()
+            ]
+    return found

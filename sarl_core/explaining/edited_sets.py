@@ -1,0 +1,59 @@
+"""What a person has made of a rule set, counted in words."""
+
+from __future__ import annotations
+
+from sarl_core.mining.rules import Rule, RuleSet
+
+
+def is_plain(rule_set: RuleSet) -> bool:
+    """Whether nobody edited a rule set: then its rules never overlap, and their counts add up.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        True if every rule is switched on and none was written or put in its place by hand.
+    """
+    return all(rule.enabled and not rule.placed for rule in rule_set.rules)
+
+
+def edits_counted(rule_set: RuleSet) -> str:
+    """How a rule set was edited.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "edited by hand: 1 off, 0 pinned, 2 added".
+    """
+    off, pinned, added = edit_counts(rule_set)
+    return f"edited by hand: {off:,} off, {pinned:,} pinned, {added:,} added"
+
+
+def edit_counts(rule_set: RuleSet) -> tuple[int, int, int]:
+    """How many rules were switched off, pinned, and written by hand.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        The three numbers; one that was written by hand does not count as pinned.
+    """
+    rules = rule_set.rules
+    return (
+        sum(not rule.enabled for rule in rules),
+        sum(rule.pinned and rule.origin != "manual" for rule in rules),
+        sum(rule.origin == "manual" for rule in rules),
+    )
+
+
+def reading_order(rules: tuple[Rule, ...]) -> list[Rule]:
+    """Rules as people read them.
+
+    Args:
+        rules: Of one action dimension.
+
+    Returns:
+        Those that a person placed, in their order, then the others, the most general first.
+    """
+    return sorted(rules, key=lambda rule: (not rule.placed, 0 if rule.placed else -rule.samples))
