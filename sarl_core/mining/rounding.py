@@ -24,6 +24,7 @@ _MOST_DIGITS = 17  # tell every double from every other
 
 ONE_SIDED = "no demonstrated state tells its two sides apart"
 SHORTEST = "no shorter number decides every state as it does"
+EMPTIED = "shorter, its rule would apply to no number at all"
 
 
 class KeptThreshold(NamedTuple):
@@ -34,7 +35,7 @@ class KeptThreshold(NamedTuple):
         feature: Index into the observation vector.
         threshold: At full precision.
         rules: Ids of the rules that ask it.
-        why: As the rest of a sentence: `ONE_SIDED` or `SHORTEST`.
+        why: As the rest of a sentence: `ONE_SIDED`, `SHORTEST` or `EMPTIED`.
     """
 
     dimension: int
@@ -75,7 +76,8 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
 
     Queries are taken from the root downwards. Each keeps the demonstrated states that reach it on
     the side they are on, so none changes its path, whichever rules are in force and in whatever
-    order. Rules with a common beginning keep it in common: those of one tree stay one tree.
+    order. Rules with a common beginning keep it in common: those of one tree stay one tree. A rule
+    that would come to apply to no float32 keeps its thresholds, for whoever shares them too.
 
     Args:
         rule_set: To round.
@@ -94,16 +96,34 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
             f"have {d}; choose demonstrations of the rules' environment"
         )
     columns = np.ascontiguousarray(demonstrations.observations.T)
+    able = [_can_apply(rule) for rule in rule_set.rules]
+    whole: frozenset[int] = frozenset()
+    while True:
+        rounding = _rounding(rule_set, columns, whole)
+        emptied = {
+            place
+            for place, rule in enumerate(rounding.rule_set.rules)
+            if able[place] and not _can_apply(rule)
+        }
+        if not emptied:
+            return rounding
+        whole |= emptied
+
+
+def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[int]) -> Rounding:
+    """Round every threshold that none of the rules asks which are to stay whole."""
     paths = [list(rule.conditions) for rule in rule_set.rules]
     rounded = 0
     kept: list[KeptThreshold] = []
     for dimension in range(len(rule_set.actions)):
         places = [i for i, rule in enumerate(rule_set.rules) if rule.dimension == dimension]
-        waiting = [(0, places, np.arange(len(demonstrations)))]
+        waiting = [(0, places, np.arange(columns.shape[1]))]
         while waiting:
             depth, group, rows = waiting.pop()
             for query in _queries(rule_set.rules, group, depth, rows):
                 threshold, why = _shortened(columns[query.feature][rows], query.threshold)
+                if threshold != query.threshold and not whole.isdisjoint(query.places):
+                    threshold, why = query.threshold, EMPTIED
                 for place in query.places:
                     paths[place][depth] = paths[place][depth]._replace(threshold=threshold)
                 if why:
@@ -116,6 +136,18 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
         for rule, path in zip(rule_set.rules, paths, strict=True)
     )
     return Rounding(replace(rule_set, rules=rules), rounded, tuple(kept))
+
+
+def _can_apply(rule: Rule) -> bool:
+    """Whether there is a float32 for each of its bounds; states are float32, thresholds not."""
+    largest = float(np.finfo(np.float32).max)
+    for _, low, high in rule.bounds:
+        top = np.float32(min(max(high, -largest), largest))
+        if float(top) > high:
+            top = np.nextafter(top, np.float32(-np.inf))
+        if not low < float(top) <= high:
+            return False
+    return True
 
 
 def merged_rules(rule_set: RuleSet) -> RuleSet:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
 from sarl_core.mining.rounding import (
+    EMPTIED,
     ONE_SIDED,
     SHORTEST,
     digits_of,
@@ -190,3 +191,27 @@ def test_other_features_are_refused(lander_like: Demonstrations) -> None:
     rules = mine_rules(lander_like, supp_min=0.01, conf_min=0.9)
     with pytest.raises(InputError, match="ask about 8 features and the demonstrations have 1"):
         rounded_rules(rules, pair(0, 1))
+
+
+def test_a_narrow_rule_by_hand_is_not_rounded_away() -> None:
+    data = Demonstrations(
+        np.float32([[0.1], [0.9]]), np.array([0, 1]), np.array([0, 0]), label_names=(("a", "b"),)
+    )
+    mined = mine_rules(data, supp_min=0.0, conf_min=1.0)
+    path = (Condition(0, ">", 0.4621), Condition(0, "<=", 0.4867))
+    hand = Rule("hand", 0, path, 1, 0.0, 0.0, 0.0, 0, origin="manual")
+    # Another rule begins with the same query: it goes on sharing it.
+    other = replace(hand, id="other", conditions=path[:1])
+    found = rounded_rules(replace(mined, rules=(hand, other, *mined.rules)), data)
+    assert found.rule_set.rules[0].conditions == path
+    assert found.rule_set.rules[1].conditions == path[:1]
+    assert hand.applies(np.float32([[0.47]])).all()
+    listed = {(one.threshold, one.why) for one in found.kept}
+    assert (0.4621, EMPTIED) in listed
+    assert {threshold for threshold, _ in listed} >= {0.4621, 0.4867}
+    for one in found.kept:
+        if one.why == EMPTIED:
+            assert set(one.rules) == {"hand", "other"}
+    # Without it the other rule is rounded as ever.
+    alone = rounded_rules(replace(mined, rules=(other,)), data).rule_set.rules[0]
+    assert alone.conditions[0].threshold == pytest.approx(0.5)
