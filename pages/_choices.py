@@ -23,6 +23,7 @@ from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
 from sarl_core.rollouts.agents import EXPERT_FOLDER, Agent, make_agent, shipped_experts
 from sarl_core.rollouts.seeds import FRESH
+from sarl_core.shielding.effects import fits
 from sarl_core.shielding.shield import Projection
 
 AS_DEMONSTRATED = "as demonstrated"
@@ -86,7 +87,7 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | Non
         if uploaded is None:
             raise InputError("no rule file has been uploaded; upload one, or choose other rules")
         content = uploaded.getvalue()
-        return rules_from_json(content, name=uploaded.name), digest_of(content)
+        return as_named(rules_from_json(content, name=uploaded.name), digest_of(content))
     if choice == COMPACT:
         return compact_rules()
     if choice == EDITED:
@@ -101,7 +102,26 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | Non
         )
     grown = state.trees(demonstrations, state.chosen_divider())
     rule_set = state.rule_set(grown, PAPERS.get(choice))
-    return rule_set, repr((rule_set.source.digest, rule_set.thresholds, rule_set.divider))
+    # What was held out is told apart too: the rules carry what it says of them.
+    told = (rule_set.source.digest, rule_set.thresholds, rule_set.divider, state.held_out_digest())
+    return rule_set, repr(told)
+
+
+def as_named(rule_set: RuleSet, digest: str) -> tuple[RuleSet, str]:
+    """Rules from a file, under the names given to the chosen demonstrations where they fit them.
+
+    Args:
+        rule_set: As it was read.
+        digest: Tells it from others.
+
+    Returns:
+        The rules, and what tells them from others and from themselves under other names.
+    """
+    raw = state.raw_demonstrations()
+    names = _names.given_names(raw)
+    if raw is None or names is None or not fits(rule_set, raw):
+        return rule_set, digest
+    return renamed_rules(rule_set, names), f"{digest} {_names.digest_of_names(names)}"
 
 
 def compact_file() -> Path:

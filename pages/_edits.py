@@ -6,20 +6,21 @@ compact ones, or those of a file. They stay in the session, and an error loses n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import _compact
 import _state as state
 import numpy as np
 import streamlit as st
-from _choices import CHOSEN, COMPACT, OWN_FILE, compact_rules, digest_of, rules_for
+from _choices import CHOSEN, COMPACT, OWN_FILE, as_named, compact_rules, digest_of, rules_for
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
 from sarl_core.mining.editing import Edit, History, apply, check_edit
+from sarl_core.mining.holding_out import with_untried_held_out
 from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import Ground, ground_of
@@ -105,7 +106,8 @@ def base() -> Base:
         kept = cast("Base | None", st.session_state.get("_edit_file"))
         if kept is None:
             raise InputError("no rule file has been uploaded; upload one, or edit other rules")
-        return kept
+        rule_set, digest = as_named(kept.rule_set, kept.digest)
+        return replace(kept, rule_set=rule_set, digest=digest)
     if kind == COMPACT:
         rule_set, digest = compact_rules()
         return Base(kind, f"compact {digest.split()[0]}", digest, rule_set)  # whatever the names
@@ -158,7 +160,16 @@ def redo(of: Base) -> None:
 
 def edited(of: Base) -> RuleSet:
     """The rules with the edits."""
-    return _edited(of.digest, _told(history(of).edits), history(of).edits, of.rule_set)
+    return _with(of, history(of).edits)
+
+
+def _with(of: Base, edits: tuple[Edit, ...]) -> RuleSet:
+    """The rules with some edits; those by hand are tried on what is held out, as mined ones are."""
+    found, held_out = state.chosen_demonstrations(), None
+    if found is not None and found.digest == of.rule_set.source.digest:
+        held_out = state.held_out()
+    tried = held_out.digest if held_out is not None else ""
+    return _edited(of.digest, _told(edits), tried, edits, of.rule_set, held_out)
 
 
 def _told(edits: tuple[Edit, ...]) -> str:
@@ -166,8 +177,16 @@ def _told(edits: tuple[Edit, ...]) -> str:
 
 
 @st.cache_resource(max_entries=32, show_spinner=False)
-def _edited(digest: str, told: str, _edits: tuple[Edit, ...], _rule_set: RuleSet) -> RuleSet:
-    return apply(_rule_set, _edits)
+def _edited(
+    digest: str,
+    told: str,
+    tried: str,
+    _edits: tuple[Edit, ...],
+    _rule_set: RuleSet,
+    _held_out: Demonstrations | None,
+) -> RuleSet:
+    found = apply(_rule_set, _edits)
+    return found if _held_out is None else with_untried_held_out(found, _held_out)
 
 
 # --- for other pages ---------------------------------------------------------------------------
@@ -246,11 +265,9 @@ def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
     told = f"{len(found.ground.states)} {found.noun} {_told(edits)}"
     if found.noun == "demonstrated state":
         told += cast(Demonstrations, state.chosen_demonstrations()).digest
-    return _verdicts(of.digest, told, edits, of.rule_set, found)
+    return _verdicts(of.digest, told + state.held_out_digest(), _with(of, edits), found)
 
 
 @st.cache_resource(max_entries=32, show_spinner=False)
-def _verdicts(
-    digest: str, told: str, _edits: tuple[Edit, ...], _rule_set: RuleSet, _basis: Basis
-) -> Verdicts:
-    return verdicts(_basis.ground, apply(_rule_set, _edits), _basis.expert)
+def _verdicts(digest: str, told: str, _edited_set: RuleSet, _basis: Basis) -> Verdicts:
+    return verdicts(_basis.ground, _edited_set, _basis.expert)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applying import Applications, applications, require_same_kind
 from sarl_core.mining.evidence import DataBox
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rules import Rule, RuleSet
 
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
 
@@ -39,6 +39,22 @@ def with_boxes(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
             replace(rule, box=box) for rule, box in zip(rule_set.rules, boxes, strict=True)
         ),
     )
+
+
+def box_of(rule: Rule, observations: NDArray[np.float32]) -> DataBox | None:
+    """The box of the states to which one rule applies, as `with_boxes` gives it.
+
+    Args:
+        rule: Any.
+        observations: Shape (N, d), float32.
+
+    Returns:
+        None where it applies to none of them.
+    """
+    rows = np.flatnonzero(rule.applies(observations))
+    found = Applications(rule=np.zeros(len(rows), dtype=np.int64), row=rows)
+    (box,) = _boxes(found, observations, 1)
+    return box
 
 
 def _boxes(

@@ -103,6 +103,29 @@ def with_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
     )
 
 
+def with_untried_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
+    """Try the rules on held-out pairs that were not tried yet, as those written by hand.
+
+    Args:
+        rule_set: Its rules.
+        held_out: Pairs of other episodes.
+
+    Returns:
+        The same rules, each with `Rule.held_out`; the set itself where none was missing.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    untried = tuple(rule for rule in rule_set.rules if rule.held_out is None)
+    if not untried:
+        return rule_set
+    tried = iter(with_held_out(replace(rule_set, rules=untried), held_out).rules)
+    return replace(
+        rule_set,
+        rules=tuple(next(tried) if rule.held_out is None else rule for rule in rule_set.rules),
+    )
+
+
 def count_held_out(trees: Sequence[PolicyTree], held_out: Demonstrations) -> tuple[NodeCounts, ...]:
     """Send other pairs down trees and count them at every node, for the landscape.
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.envelope import box_of
 from sarl_core.mining.rules import Bounds, Condition, Operator, Rule, RuleSet
 
 _MOST_NAMES = 8  # as many features as a sentence can name
@@ -52,7 +53,8 @@ def manual_rule(
             from others, because the shares of one set are of the same pairs.
 
     Returns:
-        A rule of origin "manual"; without demonstrations its numbers are 0.
+        A rule of origin "manual", with the box of the states to which it applies; without
+        demonstrations its numbers are 0 and it has none.
 
     Raises:
         InputError: If a condition is wrong, the conditions contradict each other, no action is
@@ -193,4 +195,5 @@ def _counted(rule_set: RuleSet, rule: Rule, demonstrations: Demonstrations) -> R
         lift=confidence / share if share else 0.0,
         samples=samples,
         demonstrated_value=float(np.median(values[holds])) if dimension.is_interval else None,
+        box=box_of(rule, demonstrations.observations),
     )

@@ -10,6 +10,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Shield, load_demonstrations, mine_rules
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.editing import Add, apply
+from sarl_core.mining.holding_out import hold_out
 from sarl_core.mining.manual_rules import Ask, manual_rule
 from sarl_core.mining.rule_files import rules_from_json, rules_to_json
 from sarl_core.mining.rules import RuleSet
@@ -230,3 +231,35 @@ def test_nothing_to_edit_leaves_room_for_a_rule_by_hand() -> None:
     click(app, draft(app, "save"))
     assert table(app)["Rule"].tolist() == ["manual.1"]
     assert rules_from_json(rules_to_json(FILTERED)) == FILTERED
+
+
+def edited_in(app: AppTest) -> RuleSet:
+    """Add a rule by hand, and take the edited set as other pages have it."""
+    app.switch_page("edit.py").run()
+    fill_in(app, "pole angle", "above", 0.0, 1)
+    click(app, draft(app, "save"))
+    app.switch_page("replay.py").run()
+    app.selectbox(key="rules").select("edited")
+    app.selectbox(key="agent").select("novice").run()
+    click(app, "run")
+    found = app.session_state["_replay"].rule_set
+    assert isinstance(found, RuleSet)
+    return found
+
+
+def test_a_rule_by_hand_is_tried_on_what_this_visitor_held_out() -> None:
+    split = hold_out(CARTPOLE, 0.2, seed=3)
+    # Another visitor mines from the same episodes, but leaves the others out altogether.
+    away = ",".join(map(str, sorted(set(split.held_out.episodes.tolist()))))
+    plain = edited_in(open_page("demonstrations", data="cartpole", left_out=away))
+    assert all(rule.held_out is None for rule in plain.rules)
+    tried = edited_in(open_page("demonstrations", data="cartpole", holdout="0.2", holdout_seed="3"))
+    assert plain.source.digest == tried.source.digest == split.mined.digest
+    assert [rule.id for rule in tried.rules if rule.held_out is None] == []
+    (by_hand,) = [rule for rule in tried.rules if rule.origin == "manual"]
+    leaning = split.held_out.observations[:, 2] > 0
+    right = split.held_out.actions[leaning] == 1
+    assert by_hand.held_out == (int(leaning.sum()), int(right.sum()))
+    own = split.mined.observations[split.mined.observations[:, 2] > 0]
+    assert by_hand.box is not None
+    assert by_hand.box.most == tuple(own.max(axis=0).tolist())

@@ -261,6 +261,18 @@ def test_a_manual_rule_is_counted_on_the_demonstrations():
     assert (rule.id, rule.origin, rule.enabled) == ("manual.1", "manual", True)
 
 
+def test_a_manual_rule_has_the_box_of_its_states_and_the_box_follows_a_change():
+    for threshold in (0.5, 0.7):
+        rule = manual(FINE, Ask("angle", ">", threshold), Ask("speed", "<=", 0.4))
+        states = DATA.observations
+        own = states[(states[:, 0] > threshold) & (states[:, 1] <= 0.4)].astype(np.float64)
+        wanted = [own.min(axis=0), *np.quantile(own, [0.01, 0.99], axis=0), own.max(axis=0)]
+        np.testing.assert_allclose(np.array(rule.box), wanted, rtol=1e-12)
+    nowhere = manual(FINE, Ask("angle", ">", 5.0))
+    assert nowhere.box is None
+    assert manual_rule(FINE, [ABOVE], rule_id="manual.1", action=0).box is None
+
+
 def test_it_is_not_counted_on_pairs_that_the_set_is_not_of():
     other = Demonstrations(DATA.observations[:50], DATA.actions[:50], DATA.episodes[:50])
     rule = manual_rule(FINE, [ABOVE], rule_id="manual.1", action=0, demonstrations=other)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from sarl_core.mining.holding_out import (
     verdict,
     with_held_out,
     with_lower_bound,
+    with_untried_held_out,
 )
 from sarl_core.mining.rule_files import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition, Rule
@@ -121,6 +123,21 @@ def test_placed_rules_that_overlap_are_counted_too(lander_like):
     mixed = replace(mined, rules=(manual, pinned, mined.rules[0], *mined.rules[2:]))
     for rule in with_held_out(mixed, split.held_out).rules:
         assert rule.held_out == counted_by_hand(rule, mined.actions[0], split.held_out)
+
+
+def test_only_rules_that_were_not_tried_are_tried(lander_like):
+    split = hold_out(lander_like, 0.4)
+    mined = mine_rules(split.mined, supp_min=0.01, conf_min=0.8)
+    tried = with_held_out(mined, split.held_out)
+    assert with_untried_held_out(tried, split.held_out) is tried
+    kept = HeldOut(7, 3)
+    mixed = [
+        replace(rule, held_out=kept if at % 2 else None) for at, rule in enumerate(mined.rules)
+    ]
+    found = with_untried_held_out(replace(mined, rules=tuple(mixed)), split.held_out)
+    assert [rule.held_out for rule in found.rules] == [
+        kept if at % 2 else rule.held_out for at, rule in enumerate(tried.rules)
+    ]
 
 
 def test_continuous_dimensions_are_compared_by_their_intervals():
