@@ -47,6 +47,25 @@ def edit_counts(rule_set: RuleSet) -> tuple[int, int, int]:
     )
 
 
+def edits_sentence(rule_set: RuleSet) -> str:
+    """What was done to the rules after they were mined or built.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "2 rules were then switched off, 1 written by hand."; "" for a plain set.
+    """
+    done = ("switched off", "pinned", "written by hand")
+    counts = edit_counts(rule_set)
+    parts = [f"{count:,} {what}" for count, what in zip(counts, done, strict=True) if count]
+    if not parts:
+        return ""
+    count, rest = parts[0].split(" ", maxsplit=1)
+    verb = "rule was" if count == "1" else "rules were"
+    return f"{', '.join([f'{count} {verb} then {rest}', *parts[1:]])}."
+
+
 def reading_order(rules: tuple[Rule, ...]) -> list[Rule]:
     """Rules as people read them.
 

@@ -265,9 +265,10 @@ def _capital(text: str) -> str:
 
 def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...]:
     followed = counts.followed
-    merged = sum(rule.merged_length for rule in rule_set.rules) / max(len(rule_set), 1)
+    rules = [rule for rule in rule_set.rules if rule.enabled]
+    merged = sum(rule.merged_length for rule in rules) / max(len(rules), 1)
     return (
-        (f"{len(rule_set):,}", "rule" if len(rule_set) == 1 else "rules"),
+        (f"{len(rules):,}", "rule" if len(rules) == 1 else "rules"),
         (f"{merged:.1f}", "conditions a rule, on average"),
         (share_text(counts.coverage), "of the demonstrated states have a rule"),
         (share_text(followed.value), "of these show what the rule says"),

@@ -138,6 +138,8 @@ def rule_card(
     dimension = rule_set.actions[rule.dimension]
     frames = examples.frames.get(index, ()) if examples is not None else ()
     rows = tally.rows(index, rule.dimension)
+    # Where several rules apply, or this one is off, it applies to more states than it decides.
+    applying, decided = int(rule.applies(demonstrations.observations).sum()), len(rows)
     return Card(
         number=number,
         id=rule.id,
@@ -145,8 +147,8 @@ def rule_card(
         colour=label_colour(rule.action),
         action=action_text(rule.action, dimension),
         tags=tags(rule),
-        support=_support(rule, tally.shares[index], tally),
-        evidence=_evidence(rule, rule_set, tally.shares[index], tally),
+        support=_support(rule, applying, decided, tally),
+        evidence=_evidence(rule, rule_set, tally.shares[index], tally, applying),
         conditions=tuple(
             _condition(
                 bounds,
@@ -184,20 +186,26 @@ def tags(rule: Rule) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _support(rule: Rule, here: Share, tally: Tally) -> str:
-    if tally.same and rule.origin == "mined":
+def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
+    told = f"{decided:,}" if decided else "none"
+    if tally.same and rule.origin == "mined" and rule.samples == applying:
         return (
             f"Applies in {share_text(rule.support)} of the demonstrated states "
-            f"({counted(rule.samples, 'state')})."
+            f"({counted(rule.samples, 'state')})"
+            + (f"; it decides {told} of them." if decided != applying else ".")
         )
-    text = f"Applies in {share_text(here.whole / len(tally.rules))} of this report's states "
-    text += f"({here.whole:,})"
+    text = f"Applies in {share_text(applying / len(tally.rules))} of this report's states "
+    text += f"({applying:,})"
     if rule.origin == "mined" and rule.samples:
         text += f", and in {share_text(rule.support)} of those it was made from"
+    if decided != applying:
+        text += f"; it decides {told} of this report's"
     return f"{text}."
 
 
-def _evidence(rule: Rule, rule_set: RuleSet, here: Share, tally: Tally) -> tuple[Evidence, ...]:
+def _evidence(
+    rule: Rule, rule_set: RuleSet, here: Share, tally: Tally, applying: int
+) -> tuple[Evidence, ...]:
     threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
     found = []
     if rule.origin == "mined":
@@ -206,7 +214,8 @@ def _evidence(rule: Rule, rule_set: RuleSet, here: Share, tally: Tally) -> tuple
         held = Share(rule.held_out.correct, rule.held_out.samples)
         found.append(("of episodes kept aside, which it was not made from", held))
     if not (tally.same or tally.split) or rule.origin != "mined":
-        found.append(("of this report's demonstrations", here))
+        decided = "that it decides " if here.whole != applying else ""
+        found.append((f"{decided}of this report's demonstrations", here))
     return tuple(_evidence_of(name, share, threshold) for name, share in found)
 
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.explaining.edited_sets import is_plain
 from sarl_core.mining.evidence import wilson
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.shield import Shield
 
 
@@ -163,10 +164,19 @@ def _is_split(rule_set: RuleSet, demonstrations: Demonstrations, shares: Sequenc
     """Whether what was mined from and what was held out add up to the demonstrations."""
     if not 0 < rule_set.source.episodes < demonstrations.n_episodes:
         return False
+    plain = is_plain(rule_set)
     tried = [
         (rule.samples + rule.held_out.samples, rule.correct + rule.held_out.correct)
-        == (share.whole, share.part)
+        == (share if plain else _wherever_it_applies(rule, rule_set, demonstrations))[::-1]
         for rule, share in zip(rule_set.rules, shares, strict=True)
         if rule.held_out is not None and rule.origin == "mined" and rule.enabled
     ]
     return bool(tried) and all(tried)
+
+
+def _wherever_it_applies(rule: Rule, rule_set: RuleSet, demonstrations: Demonstrations) -> Share:
+    """How a rule fares in all states to which it applies, also where another one decides."""
+    holds = rule.applies(demonstrations.observations)
+    values = demonstrations.action_columns[holds, rule.dimension]
+    right = rule_set.actions[rule.dimension].labels_of(values) == rule.action
+    return Share(int(right.sum()), int(holds.sum()))

@@ -99,7 +99,7 @@ def in_order(rule_set: RuleSet, most: int) -> tuple[list[int], list[int]]:
         shares[min(open_ones, key=lambda place: shares[place])] += 1
     full = [index for own, share in zip(queues, shares, strict=True) for index in own[:share]]
     rest = [index for own, share in zip(queues, shares, strict=True) for index in own[share:]]
-    rest.sort(key=lambda index: -rule_set.rules[index].support)
+    rest.sort(key=lambda index: _rank(rule_set.rules[index]))
     return full, rest
 
 
@@ -154,10 +154,17 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
             "There is no rule: no part of the tree reaches the thresholds. Such a shield leaves "
             "every action as it is.",
         )
-    found = [
-        "Of several conditions in a rule all must hold. In a state at most one rule for each "
-        "action applies; where none does, the agent acts as it likes.",
-    ]
+    only_one = not any(rule.placed for rule in rule_set.rules)
+    applying = (
+        "In a state at most one rule for each action applies; where none does, the agent acts as "
+        "it likes."
+        if only_one
+        else "Several may apply; the first, in this order, decides. Where none applies, the agent "
+        "acts as it likes."
+    )
+    if any(not rule.enabled for rule in rule_set.rules):
+        applying += " A rule that is switched off decides nothing."
+    found = [f"Of several conditions in a rule all must hold. {applying}"]
     if rest:
         each = ", as many of each action," if len(rule_set.actions) > 1 else ""
         found.append(

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from sarl_core.errors import InputError
+from sarl_core.explaining.edited_sets import edits_sentence
 from sarl_core.explaining.language import counted, number_text, share_text, threshold_text
 from sarl_core.explaining.report_counts import Tally
 from sarl_core.explaining.report_svg import layer_colour
@@ -143,8 +144,10 @@ def kept(
         The part of the report.
     """
     facts = _card_facts(card) if card is not None else ()
+    edits = edits_sentence(rule_set)
+    then = (edits,) if edits else ()
     if rule_set.cut == "leaves" or trees is None:
-        return Kept(_built(rule_set, card), None, "", (), facts)
+        return Kept((*_built(rule_set, card), *then), None, "", (), facts)
     limits = rule_set.thresholds
     landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
     same = (
@@ -157,7 +160,10 @@ def kept(
         "Each cell holds the number of rules that its pair of thresholds gives; darker is more. "
         f"The framed cell is the pair in force.{same}"
     )
-    return Kept(_cut(rule_set), _plane(landscape, limits), text, _neighbours(trees, limits), facts)
+    if edits:
+        text += " It counts the rules as they were mined, before the changes by hand."
+    sentences = (*_cut(rule_set), *then)
+    return Kept(sentences, _plane(landscape, limits), text, _neighbours(trees, limits), facts)
 
 
 # --- thresholds --------------------------------------------------------------------------------

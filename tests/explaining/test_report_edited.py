@@ -1,0 +1,104 @@
+"""Reports of rule sets that a person edited: what they say is true of these sets."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.report import Wishes, make_report
+from sarl_core.explaining.report_counts import tally
+from sarl_core.mining.holding_out import hold_out, with_held_out
+from sarl_core.mining.rules import Condition, Rule
+
+DATA = Path(__file__).parents[2] / "data"
+PLAIN = Wishes(frames=0)
+
+
+@pytest.fixture(scope="module")
+def cart() -> Demonstrations:
+    return load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+
+
+@pytest.fixture(scope="module")
+def rules(cart: Demonstrations) -> RuleSet:
+    return mine_rules(cart, supp_min=0.005, conf_min=0.95)
+
+
+def edited(rules: RuleSet) -> RuleSet:
+    """The most general rule off, one by hand that takes half of the states from the others."""
+    off = max(rules.rules, key=lambda rule: rule.samples)
+    hand = Rule("hand", 0, (Condition(3, ">", 0.0),), 1, 0.0, 0.0, 0.0, 0, origin="manual")
+    others = [dataclasses.replace(rule, enabled=rule is not off) for rule in rules.rules]
+    return dataclasses.replace(rules, rules=(hand, *others))
+
+
+def words_of(text: str) -> str:
+    return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]*>", " ", text)))
+
+
+def test_a_plain_set_is_told_as_ever(cart: Demonstrations, rules: RuleSet) -> None:
+    told = words_of(make_report(rules, cart, PLAIN).html)
+    assert "at most one rule for each action applies" in told
+    assert "were then" not in told
+    assert "it decides" not in told
+    assert f"{len(rules)} rules" in told
+
+
+def test_an_edited_set_is_told_as_it_is(cart: Demonstrations, rules: RuleSet) -> None:
+    changed = edited(rules)
+    told = words_of(make_report(changed, cart, PLAIN).html)
+    assert "at most one rule for each action" not in told
+    assert "Several may apply; the first, in this order, decides" in told
+    assert "1 rule was then switched off, 1 written by hand." in told
+    assert re.search(rf"\b{len(rules)} rules ", told)  # one off, one added
+    assert "before the changes by hand" in told
+
+
+def test_each_rule_says_how_many_states_it_decides(cart: Demonstrations, rules: RuleSet) -> None:
+    changed = edited(rules)
+    told = words_of(make_report(changed, cart, PLAIN).html)
+    column = cart.observations[:, 3]
+    taken = column > 0
+    assert f"({int(taken.sum()):,})" in told
+    for rule in changed.rules[1:]:
+        holds = np.ones(len(cart), dtype=bool)
+        for feature, op, threshold in rule.conditions:
+            below = cart.observations[:, feature].astype(np.float64) <= threshold
+            holds &= below if op == "<=" else ~below
+        left = int((holds & ~taken).sum()) if rule.enabled else 0
+        if left != rule.samples:
+            amount = f"{left:,}" if left else "none"
+            assert f"({rule.samples:,} states); it decides {amount} of them." in told
+    right = int((cart.actions.reshape(-1)[taken] == 1).sum())
+    assert f"{right:,} of {int(taken.sum()):,} states" in told
+
+
+def test_the_headline_counts_rules_that_are_on(cart: Demonstrations, rules: RuleSet) -> None:
+    only = tuple(
+        dataclasses.replace(rule, enabled=index == 0) for index, rule in enumerate(rules.rules)
+    )
+    off = dataclasses.replace(rules, rules=only)
+    told = words_of(make_report(off, cart, PLAIN).html)
+    merged = len({condition.feature for condition in only[0].conditions})
+    assert re.search(rf"\b1 rule {merged}\.0 conditions a rule", told)
+    assert "A rule that is switched off decides nothing." in told
+    assert f"{len(only) - 1} rules were then switched off." in told
+
+
+def test_rules_tried_on_episodes_kept_aside_stay_so_when_edited(cart: Demonstrations) -> None:
+    split = hold_out(cart, 0.3, seed=1)
+    found = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
+    assert tally(edited(found), cart).split
+    told = words_of(make_report(edited(found), cart, PLAIN).html)
+    assert "made from other data" not in told
+
+
+def test_the_interval_is_said_to_be_too_narrow(cart: Demonstrations, rules: RuleSet) -> None:
+    told = words_of(make_report(rules, cart, PLAIN).html)
+    assert "Steps of one episode are alike, so the true interval is wider." in told
