@@ -108,7 +108,7 @@ def report(
             "--episodes": None if episodes == _EPISODES else episodes,
             "--out": out,
         }
-        mined = mining_command(rule_set, rules, demonstrations, given)
+        mined = mining_command(rule_set, rules, demonstrations, given, env=env)
         wishes = Wishes(
             in_full=in_full,
             frames=frames,

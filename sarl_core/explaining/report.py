@@ -14,15 +14,17 @@ from pathlib import Path
 from typing import Any
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import names_of
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted, share_text
-from sarl_core.explaining.report_again import facts
+from sarl_core.explaining.report_again import commands_that_hold, facts
 from sarl_core.explaining.report_comparison import Result, compared
-from sarl_core.explaining.report_counts import Tally, check_fit, tally
+from sarl_core.explaining.report_counts import Tally, check_fit, same_environment, tally
 from sarl_core.explaining.report_demonstrations import shown
 from sarl_core.explaining.report_gaps import gaps
 from sarl_core.explaining.report_rules import in_order, rules_part
 from sarl_core.explaining.report_thresholds import kept
+from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.rollouts.agents import Agent, shipped_experts
@@ -134,6 +136,10 @@ def make_report(
     """
     wishes = wishes or Wishes()
     check_fit(rule_set, demonstrations)
+    as_given = rule_set
+    if same_environment(rule_set, demonstrations):
+        # A rule file keeps the names of its day; a report speaks as the demonstrations do.
+        rule_set = renamed_rules(rule_set, names_of(demonstrations))
     counts = tally(rule_set, demonstrations)
     if trees is None and rule_set.cut == "thresholds":
         trees = grow_policy_trees(demonstrations, divider=rule_set.divider)
@@ -152,14 +158,14 @@ def make_report(
         gaps=gaps(rule_set, demonstrations, counts, numbers, examples),
         compared=compared(comparison),
         again=facts(
-            rule_set,
+            as_given,
             demonstrations,
             counts,
             rules_name=wishes.rules_name,
             demonstrations_name=wishes.demonstrations_name,
             seeds=(wishes.seed, wishes.seed + wishes.episodes - 1) if examples else None,
         ),
-        commands=wishes.commands,
+        commands=commands_that_hold(wishes.commands, as_given, trees),
     )
     return Report(
         html=html,

@@ -13,7 +13,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import counted, threshold_text
 from sarl_core.explaining.report_counts import Tally
 from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
+from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet, mine_rules
+from sarl_core.mining.tree import PolicyTree
 
 _PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")
 _PROGRAM = "python -m sarl_core"
@@ -104,15 +105,21 @@ def command_line(
 
 
 def mining_command(
-    rule_set: RuleSet, rules: str | Path, demonstrations: str | Path, given: Demonstrations
+    rule_set: RuleSet,
+    rules: str | Path,
+    demonstrations: str | Path,
+    given: Demonstrations,
+    *,
+    env: str | None = None,
 ) -> str | None:
-    """How rules were mined, where that is known for sure.
+    """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
 
     Args:
         rule_set: The rules.
         rules: Their file.
         demonstrations: The file of the demonstrations.
         given: The demonstrations.
+        env: That was named when they were read, which gives names and bounds; None for none.
 
     Returns:
         One line; None for rules from other data, of a budget, tried on episodes kept aside, or
@@ -137,6 +144,51 @@ def mining_command(
             "--lift": threshold_text(limits.lift) if limits.lift else None,
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
+            "--env": env,
             "--out": rules,
         },
+    )
+
+
+def commands_that_hold(
+    commands: Sequence[str], rule_set: RuleSet, trees: Sequence[PolicyTree] | None
+) -> tuple[str, ...]:
+    """Commands without a mining command that would make other rules than these.
+
+    Rounding, merging, leaving rules out: what was done to rules after mining need not show. So
+    they are mined again.
+
+    Args:
+        commands: One line each.
+        rule_set: The rules, under the names they came with.
+        trees: Grown from the demonstrations; None for rules that no thresholds cut.
+
+    Returns:
+        Those that make what they say.
+    """
+    mining = f"{_PROGRAM} mine "
+    if not any(line.startswith(mining) for line in commands) or _mined_again(rule_set, trees):
+        return tuple(commands)
+    return tuple(line for line in commands if not line.startswith(mining))
+
+
+def _mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
+    """Whether trees give the same rules, under the same names."""
+    if not trees:
+        return False
+    limits = rule_set.thresholds
+    again = mine_rules(
+        trees,
+        supp_min=limits.support,
+        conf_min=limits.confidence,
+        lift_min=limits.lift,
+        max_depth=limits.max_depth,
+    )
+    one, other = (
+        [(rule.id, rule.dimension, rule.conditions, rule.action) for rule in rules.rules]
+        for rules in (again, rule_set)
+    )
+    return one == other and (again.actions, again.source.features) == (
+        rule_set.actions,
+        rule_set.source.features,
     )

@@ -81,6 +81,8 @@ class Tally:
 def check_fit(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
     """Refuse demonstrations of other features or actions than the rules'.
 
+    Of one environment features are what they are, whatever people call them.
+
     Args:
         rule_set: The rules.
         demonstrations: N pairs.
@@ -96,8 +98,9 @@ def check_fit(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
             f"the rules ask about {len(asked)} features and the demonstrations have {len(there)}; "
             f"{advice}"
         )
+    alike = same_environment(rule_set, demonstrations)
     for number, (one, other) in enumerate(zip(asked, there, strict=True), start=1):
-        if one != other:
+        if one != other and not alike:
             raise InputError(
                 f"feature {number} is {one!r} in the rules and {other!r} in the demonstrations; "
                 f"{advice}"
@@ -123,6 +126,19 @@ def check_fit(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
                 f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
                 f"{len(shown.labels)} in the demonstrations; {advice}"
             )
+
+
+def same_environment(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
+    """Whether rules and demonstrations are known to be of one environment.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Any.
+
+    Returns:
+        False also where one of them does not say.
+    """
+    return bool(demonstrations.env_id) and rule_set.source.env_id == demonstrations.env_id
 
 
 def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:

@@ -12,10 +12,12 @@ from scipy.stats import binomtest
 
 from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.report import Wishes, make_report
+from sarl_core.explaining.report_again import digest_of, mining_command
 from sarl_core.explaining.report_comparison import Result
 from sarl_core.explaining.report_counts import Share, tally
 from sarl_core.explaining.report_thresholds import read_card
 from sarl_core.mining.holding_out import hold_out, with_held_out
+from sarl_core.mining.rounding import merged_rules, rounded_rules
 
 DATA = Path(__file__).parents[2] / "data"
 PLAIN = Wishes(frames=0)
@@ -244,7 +246,7 @@ def test_held_out_episodes_stand_beside_what_was_mined(cart: Demonstrations) -> 
 def test_other_features_and_actions_are_refused_in_one_sentence(
     cart: Demonstrations, rules: RuleSet, two_torques: Demonstrations
 ) -> None:
-    other = dataclasses.replace(cart, feature_names=("a", "b", "c", "d"))
+    other = dataclasses.replace(cart, feature_names=("a", "b", "c", "d"), env_id="")
     three = dataclasses.replace(cart, label_names=(("x", "y", "z"),))
     continuous = dataclasses.replace(
         cart,
@@ -261,6 +263,44 @@ def test_other_features_and_actions_are_refused_in_one_sentence(
         with pytest.raises(InputError, match=words) as caught:
             make_report(rules, data, PLAIN)
         assert "\n" not in str(caught.value)
+
+
+def test_of_one_environment_the_report_speaks_as_the_demonstrations_do(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    data = dataclasses.replace(
+        cart, feature_names=("a", "b", "tilt", "d"), label_names=(("left!", "right!"),)
+    )
+    assert data.env_id == rules.source.env_id
+    html = make_report(rules, data, PLAIN).html
+    text = Page(html).text
+    assert "the tilt is" in text
+    assert "right!" in text
+    assert "pole angle" not in text
+    assert digest_of(rules) in text  # of the rules as they came
+
+
+def test_only_a_command_that_makes_these_rules_is_printed(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    mined = mining_command(rules, "rules.json", "cart.parquet", cart, env="CartPole-v1")
+    assert mined is not None
+    assert "--setting filtered --env CartPole-v1 --out rules.json" in mined
+    wishes = dataclasses.replace(PLAIN, commands=(mined, "python -m sarl_core report rules.json"))
+    text = Page(make_report(rules, cart, wishes).html).text
+    assert mined in text
+    assert "These commands make the rules and this file again" in text
+    changed = (
+        rounded_rules(rules, cart).rule_set,
+        merged_rules(mine_rules(cart, supp_min=0.001, conf_min=0.99)),
+        dataclasses.replace(rules, rules=rules.rules[1:]),
+        dataclasses.replace(rules, actions=(dataclasses.replace(rules.actions[0], name="x"),)),
+    )
+    for rule_set in changed:
+        assert rule_set.rules != rules.rules or rule_set.actions != rules.actions
+        text = Page(make_report(rule_set, cart, wishes).html).text
+        assert "sarl_core mine" not in text
+        assert "This command makes this file again" in text
 
 
 @pytest.mark.parametrize("wrong", [{"frames": 13}, {"in_full": -1}, {"episodes": 0}, {"seed": -1}])
