@@ -19,7 +19,7 @@ from _words import in_full
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.errors import SarlError
 from sarl_core.explaining.language import sentence
 from sarl_core.explaining.lit_path import PathFinder
@@ -52,6 +52,7 @@ class Request:
     projection: Projection
     seed: int
     outside: Outside = "act"
+    names: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +106,19 @@ def kept_forks() -> Kept:
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """A request, and what it takes to fulfil it."""
+    """A request, and what it takes to fulfil it.
+
+    Attributes:
+        request: What is asked for.
+        agent: Makes the agent.
+        rule_set: The rules in force, or None.
+        description: Of the environment, under the names in force.
+    """
 
     request: Request
     agent: Callable[[], Agent]
     rule_set: RuleSet | None
+    description: EnvironmentDescription
 
     @property
     def shield(self) -> Shield | None:
@@ -178,8 +187,9 @@ def run(order: Order, tell: Told) -> Replay:
     def encoding(done: int, total: int) -> None:
         tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
 
+    description = order.description
+    film = film.named(description)
     film.gif(progress=encoding)
-    description = describe_environment(request.env_id)
     return Replay(
         key=request,
         film=film,
@@ -262,6 +272,7 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
         describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         progress=playing,
     )
+    found = replace(found, replay=found.replay.named(order.description))
     found.gif(progress=encoding)
     return found
 

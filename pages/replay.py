@@ -21,6 +21,7 @@ from _choices import (
     compact_file,
     continuous,
     demonstrated,
+    digest_of,
     environment_of,
     rules_for,
 )
@@ -41,7 +42,9 @@ from _replays import (
 )
 from _words import escaped
 
+from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import SarlError
+from sarl_core.explaining.replay import named_description
 from sarl_core.mining.rules import UNFILTERED, RuleSet
 
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
@@ -124,12 +127,24 @@ def settings() -> Callable[[], Order]:
         env_id = environment_of(env)
         rule_set, rules_digest = rules_for(rules, rule_file)
         make, digest = agent_for(agent, policy_file, env_id, int(seed or 0))
+        described = named_description(
+            describe_environment(env_id), rule_set, state.chosen_demonstrations()
+        )
         return Order(
             Request(
-                env_id, agent, digest, rules, rules_digest, projection, int(seed or 0), outside
+                env_id,
+                agent,
+                digest,
+                rules,
+                rules_digest,
+                projection,
+                int(seed or 0),
+                outside,
+                digest_of(repr(described).encode()),
             ),
             make,
             rule_set,
+            described,
         )
 
     return order

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.errors import InputError
 
 
@@ -113,6 +114,32 @@ def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
         feature_units=names.units,
         action_names=names.actions,
         label_names=names.labels if demonstrations.is_discrete else demonstrations.label_names,
+    )
+
+
+def renamed_description(
+    description: EnvironmentDescription, names: Names
+) -> EnvironmentDescription | None:
+    """An environment under the names of demonstrations or rules.
+
+    Args:
+        description: Of the environment.
+        names: Perhaps of another one.
+
+    Returns:
+        None where the number of features, actions or labels differs.
+    """
+    counts = tuple(map(len, names.labels)) if description.is_discrete else ()
+    own = tuple(map(len, description.label_names)) if description.is_discrete else ()
+    widths = (len(description.feature_names), len(description.action_names), own)
+    if (len(names.features), len(names.actions), counts) != widths:
+        return None
+    return replace(
+        description,
+        feature_names=names.features,
+        feature_units=names.units,
+        action_names=names.actions,
+        label_names=names.labels if description.is_discrete else description.label_names,
     )
 
 

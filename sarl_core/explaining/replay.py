@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.demonstrations.names import Names, names_of, renamed_description
 from sarl_core.explaining.colours import OUTSIDE_COLOUR
 from sarl_core.explaining.language import action_text, number_text, sentence
 from sarl_core.explaining.markup import plain
@@ -69,6 +70,42 @@ class StepView:
     def intervened(self) -> bool:
         """Whether the shield changed anything."""
         return any(action.changed for action in self.actions)
+
+
+def named_description(
+    description: EnvironmentDescription,
+    rule_set: RuleSet | None,
+    demonstrations: Demonstrations | None,
+) -> EnvironmentDescription:
+    """An environment under the names that its rules have, or its demonstrations.
+
+    Args:
+        description: Of the environment.
+        rule_set: Of the shield, or None.
+        demonstrations: At hand, perhaps of another environment, or None.
+
+    Returns:
+        Names of the rules where they are of this environment and of as many features, actions
+        and labels; else those of the demonstrations; else its own.
+    """
+    candidates = []
+    if rule_set is not None and rule_set.source.env_id in ("", description.env_id):
+        features, actions = rule_set.source.features, rule_set.actions
+        candidates.append(
+            Names(
+                tuple(feature.name for feature in features),
+                tuple(feature.unit for feature in features),
+                tuple(action.name for action in actions),
+                tuple(() if action.is_interval else action.label_names for action in actions),
+            )
+        )
+    if demonstrations is not None and demonstrations.env_id == description.env_id:
+        candidates.append(names_of(demonstrations))
+    for names in candidates:
+        found = renamed_description(description, names)
+        if found is not None:
+            return found
+    return description
 
 
 def environment_dimensions(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
 from sarl_core.rollouts.agents import Agent, make_agent
@@ -45,6 +45,15 @@ class Replay:
     episodes: tuple[Episodes, ...]
     panels: tuple[Panel, ...]
     fps: float
+
+    def named(self, description: EnvironmentDescription) -> Replay:
+        """The same pictures under other names of the actions.
+
+        Args:
+            description: Of the same environment.
+        """
+        panels = tuple(replace(panel, description=description) for panel in self.panels)
+        return Replay(self.episodes, panels, self.fps)
 
     def __len__(self) -> int:
         """Number of pictures: one before each step, and the last state."""

@@ -5,7 +5,9 @@ from typing import Any
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
+from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.language import sentence
+from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import ROUTER, errors, open_page, texts
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
@@ -84,3 +86,50 @@ def test_intervals_need_no_names() -> None:
     app = open_page("names", data="pendulum")
     assert len(app.data_editor) == 2
     assert "named by their bounds" in texts(app)
+
+
+def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> None:
+    content = rules_to_json(mine_rules(load_demonstrations(CART), supp_min=0.0, conf_min=1.0))
+    app = open_page("names", data="cartpole")
+    type_into(app, 0, {2: {"Name": "lean", "Unit": "turns"}})
+    type_into(app, 2, {0: {"Name": "west"}, 1: {"Name": "east"}})
+    app.switch_page("replay.py").run()
+    app.selectbox(key="agent").select("novice")
+    app.selectbox(key="rules").select("own file").run()
+    app.file_uploader(key="rule_file").set_value(
+        ("mine.json", content.encode(), "application/json")
+    ).run()
+    for rules in ("own file", "unfiltered", "none"):
+        app.selectbox(key="rules").select(rules).run()
+        app.button(key="run").click().run()
+        assert not app.exception, app.exception
+        assert not errors(app)
+        replayed = kept(app)
+        assert replayed.features[2] == Feature("lean", "turns")
+        assert replayed.dimensions[0].label_names == ("west", "east")
+        assert replayed.film.panels[0].description.label_names == (("west", "east"),)
+        if rules != "none":
+            assert replayed.rule_set.source.features[2].name == "lean"
+            assert replayed.rule_set.actions[0].label_names == ("west", "east")
+        (state,) = [table.value for table in app.dataframe if "State" in table.value]
+        assert list(state["State"])[2] == "lean"
+        (recorder,) = [table.value for table in app.dataframe if "Step" in table.value]
+        assert "lean (turns)" in recorder
+        assert {action for (action,) in recorder["Done"]} <= {"west", "east"}
+        shown = " ".join(part.proto.body for part in app.get("html"))
+        assert "west" in shown
+        assert "push left" not in shown
+    # Without the names, the replay of before is not shown under them.
+    app.switch_page("names.py").run()
+    app.button(key="names_back").click().run()
+    app.switch_page("replay.py").run()
+    assert "The settings have changed since" in texts(app)
+    app.button(key="run").click().run()
+    assert kept(app).dimensions[0].label_names == ("push left", "push right")
+
+
+def kept(app: AppTest) -> Any:
+    """The replay on screen."""
+    from _replays import kept_replays  # found once a page was opened
+
+    return kept_replays().get(app.session_state["_replay"].request)

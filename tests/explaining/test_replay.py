@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.demonstrations.names import names_of, renamed
 from sarl_core.explaining.replay import (
     environment_dimensions,
     margin_text,
+    named_description,
     step_texts,
     step_view,
     tracks,
@@ -119,6 +122,33 @@ def test_labels_come_from_the_rules_where_actions_are_continuous() -> None:
     assert environment_dimensions(description, rules)[0].n_labels == 3
     (alone,) = environment_dimensions(description, None, divider=2)
     assert alone.edges == (-2.0, 0.0, 2.0)
+
+
+def test_an_environment_has_the_names_of_its_rules_and_else_of_its_demonstrations() -> None:
+    cart = load_demonstrations(DATA / "cartpole.parquet")
+    own = names_of(cart)
+    shown = renamed(cart, own._replace(features=("a", "b", "c", "d"), labels=(("w", "e"),)))
+    ruled = renamed(cart, own._replace(features=("k", "l", "m", "n"), actions=("shove",)))
+    rules = mine_rules(ruled, supp_min=0.0, conf_min=1.0)
+    plain = describe_environment("CartPole-v1")
+    alone = named_description(plain, None, shown)
+    assert (alone.feature_names, alone.label_names) == (("a", "b", "c", "d"), (("w", "e"),))
+    both = named_description(plain, rules, shown)
+    assert (both.feature_names, both.action_names) == (("k", "l", "m", "n"), ("shove",))
+    assert environment_dimensions(both, rules)[0].label_names == ("push left", "push right")
+    # Names of something else are of no use.
+    lander = describe_environment("LunarLander-v3")
+    assert named_description(lander, rules, shown) is lander
+    unnamed = replace(rules, source=replace(rules.source, env_id=""))
+    assert named_description(lander, unnamed, None) is lander
+    other = replace(rules, source=replace(rules.source, env_id="Other-v0"))
+    assert named_description(plain, other, None) is plain
+    three = replace(rules.actions[0], label_names=("w", "e", "n"))
+    assert named_description(plain, replace(rules, actions=(three,)), None) is plain
+    pendulum = load_demonstrations(DATA / "pendulum.parquet")
+    torque = renamed(pendulum, names_of(pendulum)._replace(actions=("twist",)))
+    described = named_description(describe_environment("Pendulum-v1"), None, torque)
+    assert environment_dimensions(described, None)[0].name == "twist"
 
 
 def test_a_margin_is_told_in_words() -> None:
