@@ -66,10 +66,12 @@ def begin(of: Base, rule: Rule | None = None, *, changing: bool = False) -> Draf
     draft = Draft(number)
     if rule is not None:
         asks = asks_of(rule, of.rule_set)
+        names = [feature.name for feature in of.rule_set.source.features]
         draft = Draft(number, list(range(len(asks))), len(asks), rule.id if changing else "")
         for row, ask in enumerate(asks):
             sign = next(word for word, op in SIGNS.items() if op == ask.op)
-            for name, value in (("feature", ask.feature), ("sign", sign), ("at", ask.threshold)):
+            place = names.index(ask.feature)
+            for name, value in (("feature", place), ("sign", sign), ("at", ask.threshold)):
                 st.session_state[draft.key(name, row)] = value
         st.session_state[draft.key("dimension")] = rule.dimension
         st.session_state[draft.key("action")] = rule.action
@@ -137,13 +139,16 @@ def _save(of: Base, edit: Add | Change) -> None:
 
 def _condition(of: Base, draft: Draft, row: int) -> Ask:
     features = of.rule_set.source.features
-    names = [feature.name for feature in features]
-    units = {feature.name: feature.unit for feature in features}
+
+    def named(at: int) -> str:
+        name, unit = features[at].name, features[at].unit
+        return f"{name} ({unit})" if unit else name
+
     with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
         feature = st.selectbox(
             "Feature",
-            names,
-            format_func=lambda name: f"{name} ({units[name]})" if units.get(name) else name,
+            range(len(features)),  # and not names, which a visitor may change meanwhile
+            format_func=named,
             key=draft.key("feature", row),
             persist_state="session",
             label_visibility="collapsed",
@@ -157,7 +162,7 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             label_visibility="collapsed",
             width=110,
         )
-        values = _edits.basis(of).ground.states[:, names.index(feature)]
+        values = _edits.basis(of).ground.states[:, feature]
         low, high = number_text(float(values.min())), number_text(float(values.max()))
         threshold = st.number_input(
             "Number",
@@ -178,7 +183,7 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             key=draft.key("fewer", row),
             type="tertiary",
         )
-    return Ask(feature, SIGNS[sign], threshold)
+    return Ask(features[feature].name, SIGNS[sign], threshold)
 
 
 def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:

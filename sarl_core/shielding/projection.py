@@ -69,10 +69,11 @@ def replacements(rule_set: RuleSet, projection: Projection) -> Replacements:
         projection: How continuous actions are replaced.
 
     Returns:
-        One entry a rule.
+        One entry a rule. A rule written by hand may have no demonstrated value, where the expert
+        never was: ``expert`` then takes the centre of its interval.
 
     Raises:
-        InputError: If ``expert`` is asked of rules that hold no demonstrated values.
+        InputError: If ``expert`` is asked of mined rules that hold no demonstrated values.
     """
     entries = [
         _of_rule(rule, rule_set.actions[rule.dimension], projection) for rule in rule_set.rules
@@ -91,7 +92,8 @@ def _of_rule(
     low, high = _float32_range(lower, upper, last=rule.action == dimension.n_labels - 1)
     if projection == "clip":
         return np.nan, low, high
-    if projection == "centre":
+    undemonstrated = rule.origin == "manual" and rule.demonstrated_value is None
+    if projection == "centre" or undemonstrated:
         return dimension.centre(rule.action), low, high
     if rule.demonstrated_value is None:
         raise InputError(

@@ -18,6 +18,7 @@ from tests.app.screens import ROUTER, errors, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
+FEATURES = [feature.name for feature in CARTPOLE.features]
 FILTERED = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
 
 
@@ -54,7 +55,7 @@ def differently(before: RuleSet, after: RuleSet) -> int:
 
 
 def fill_in(app: AppTest, feature: str, sign: str, number: float, action: int) -> None:
-    app.selectbox(key=draft(app, "feature_0")).select(feature)
+    app.selectbox(key=draft(app, "feature_0")).set_value(FEATURES.index(feature))
     app.selectbox(key=draft(app, "sign_0")).select(sign)
     app.number_input(key=draft(app, "at_0")).set_value(number)
     app.selectbox(key=draft(app, "action")).set_value(action).run()
@@ -132,7 +133,7 @@ def test_what_is_wrong_with_a_rule_is_said_and_nothing_is_lost() -> None:
     click(app, "edit_switch")
     fill_in(app, "pole angle", "above", 2.0, 0)
     click(app, draft(app, "more"))
-    app.selectbox(key=draft(app, "feature_1")).select("pole angle")
+    app.selectbox(key=draft(app, "feature_1")).set_value(FEATURES.index("pole angle"))
     app.selectbox(key=draft(app, "sign_1")).select("at most")
     app.number_input(key=draft(app, "at_1")).set_value(1.0).run()
     assert "'pole angle' cannot be above 2 and at most 1" in warnings(app)
@@ -147,6 +148,29 @@ def test_what_is_wrong_with_a_rule_is_said_and_nothing_is_lost() -> None:
     click(app, draft(app, "fewer_1"))
     assert "Without conditions the rule applies always" in warnings(app)
     assert not app.button(key=draft(app, "save")).disabled
+
+
+def test_new_names_leave_a_half_filled_rule_about_the_same_feature() -> None:
+    app = open_page("edit", data="cartpole")
+    app.selectbox(key=draft(app, "feature_0")).set_value(2)
+    app.number_input(key=draft(app, "at_0")).set_value(0.1).run()
+    app.switch_page("names.py").run()
+    key = app.data_editor[0].key
+    rows = {0: {"Name": "pole angle"}, 2: {"Name": "lean", "Unit": "turns"}}
+    app.session_state[key] = {"edited_rows": rows, "added_rows": [], "deleted_rows": []}
+    app.run()
+    assert not errors(app)
+    app.switch_page("edit.py").run()
+    box = app.selectbox(key=draft(app, "feature_0"))
+    assert box.options[box.index] == "lean (turns)"
+    assert app.number_input(key=draft(app, "at_0")).value == 0.1
+    app.selectbox(key=draft(app, "action")).set_value(1).run()
+    click(app, draft(app, "save"))
+    assert "lean is above 0.1" in texts(app).replace("**", "") or "lean > 0.1" in str(
+        table(app).iloc[0].tolist()
+    )
+    click(app, "change_rule")
+    assert app.selectbox(key=draft(app, "feature_0")).value == 2
 
 
 def test_a_rule_file_is_edited_and_one_that_is_none_loses_nothing(tmp_path: Path) -> None:

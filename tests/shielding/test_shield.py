@@ -275,3 +275,17 @@ def test_expert_needs_demonstrated_values(joints):
     bare = replace(rules, rules=tuple(replace(r, demonstrated_value=None) for r in rules.rules))
     with pytest.raises(InputError, match="'expert'"):
         Shield(bare, projection="expert")
+
+
+def test_a_rule_by_hand_where_the_expert_never_was_takes_the_centre(joints):
+    rules = mine_rules(joints, supp_min=0.01, conf_min=0.8)
+    by_hand = Rule("manual.1", 0, (), 0, 0.0, 0.0, 0.0, 0, origin="manual")
+    mixed = replace(rules, rules=(by_hand, *rules.rules))
+    shield, plain = Shield(mixed, projection="expert"), Shield(rules, projection="expert")
+    states = joints.observations[:200]
+    wanted = np.full((200, 2), 0.99, dtype=np.float32)
+    executed = shield.decide_batch(states, wanted).executed
+    assert (executed[:, 0] == -0.5).all()  # of [-1, 0)
+    assert np.array_equal(executed[:, 1], plain.decide_batch(states, wanted).executed[:, 1])
+    shown = replace(mixed, rules=(replace(by_hand, demonstrated_value=-0.25), *rules.rules))
+    assert Shield(shown, projection="expert").decide(states[0], wanted[0]).executed[0] == -0.25
