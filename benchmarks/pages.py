@@ -131,7 +131,7 @@ def rules(quick: bool) -> Iterable[Row]:
             "Rules, lower bound at least, unfiltered",
             f"rules?{UNFILTERED}&lower=0.5",
             partial(_step, label="Lower bound at least"),
-            (TABLES,),
+            ("[data-testid=stCaptionContainer]",),
         ),
     )
 

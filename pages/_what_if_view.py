@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import streamlit as st
 from _rule_table import table_height
+from _tree_picture import tree_picture
 from _words import escaped
 from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
-from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.language import action_text, counted, sentence
 from sarl_core.explaining.lit_path import PathFinder, lit_path_table
 from sarl_core.explaining.path_table import label_key
@@ -27,8 +27,8 @@ from sarl_core.explaining.what_if import (
     with_unit,
 )
 from sarl_core.explaining.what_if_figures import lines_figure
-from sarl_core.mining.rules import Rule, RuleSet, cut_nodes
-from sarl_core.mining.tree import LEAF, PolicyTree
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.near import (
     DecisionChange,
     Line,
@@ -58,6 +58,7 @@ def show(
     leaves: bool,
     finder: Callable[[], PathFinder],
     dark: bool,
+    key: str,
 ) -> None:
     """What the shield does in a state, and what lies near it.
 
@@ -73,6 +74,7 @@ def show(
         leaves: Whether every leaf of them is a rule.
         finder: Follows a state through the rules, which may be of other trees.
         dark: Whether the theme is.
+        key: Tells the rules from all others.
     """
     rule_set = neighbourhood.shield.rule_set
     decision = neighbourhood.shield.decide(state, action)
@@ -92,7 +94,7 @@ def show(
     if node is None:
         show_way(finder(), dimension, state, -1 if found is None else found)
     else:
-        show_tree(rule, node, trees[dimension], rule_set, leaves=leaves, dark=dark)
+        show_tree(rule, node, trees[dimension], rule_set, leaves=leaves, dark=dark, key=key)
 
 
 def chosen_dimension(rule_set: RuleSet) -> int:
@@ -354,6 +356,7 @@ def show_tree(
     *,
     leaves: bool,
     dark: bool,
+    key: str,
 ) -> None:
     """The way of the state through the tree."""
     st.subheader("Its way through the tree")
@@ -369,21 +372,9 @@ def show_tree(
         label_visibility="collapsed",
     )
     mined = rule is not None and rule.origin == "mined"
-    thresholds = rule_set.thresholds
-    cut = (
-        np.flatnonzero(tree.feature == LEAF)
-        if leaves
-        else cut_nodes(
-            tree,
-            supp_min=thresholds.support,
-            conf_min=thresholds.confidence,
-            lift_min=thresholds.lift,
-            max_depth=thresholds.max_depth,
-        )
-    )
     around = view == AROUND and int(tree.samples[node]) > 0
     st.plotly_chart(
-        figures.tree_figure(tree, cut, node, around=around, dark=dark),
+        tree_picture(key, tree, rule_set.thresholds, node, around=around, leaves=leaves, dark=dark),
         key="tree_figure",
         config={"displaylogo": False, "scrollZoom": True},
         alt="The decision tree with the way of the state",

@@ -8,9 +8,9 @@ from typing import Any
 import _compact
 import _edits
 import _state as state
-import numpy as np
 import streamlit as st
 from _rule_table import column_config, frame, table_height
+from _tree_picture import tree_picture
 from _words import escaped
 
 from sarl_core.explaining import rule_figures as figures
@@ -28,8 +28,7 @@ from sarl_core.explaining.language import (
 from sarl_core.explaining.path_table import path_table
 from sarl_core.mining.holding_out import lower_bound, verdict, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.mining.rules import Rule, RuleSet, cut_nodes, node_of
-from sarl_core.mining.tree import LEAF
+from sarl_core.mining.rules import Rule, RuleSet, node_of
 
 TABLE_ROWS = 8
 FEATURES_SHOWN = 12
@@ -285,19 +284,16 @@ def show_tree(rule: Rule) -> None:
             required=True,
             label_visibility="collapsed",
         )
-    cut = (
-        np.flatnonzero(tree.feature == LEAF)
-        if compact is not None
-        else cut_nodes(
-            tree,
-            supp_min=thresholds.support,
-            conf_min=thresholds.confidence,
-            lift_min=thresholds.lift,
-            max_depth=thresholds.max_depth,
-        )
-    )
     st.plotly_chart(
-        figures.tree_figure(tree, cut, node_of(rule), around=view == AROUND, dark=state.is_dark()),
+        tree_picture(
+            compact.digest if compact is not None else "",
+            tree,
+            thresholds,
+            node_of(rule),
+            around=view == AROUND,
+            leaves=compact is not None,
+            dark=state.is_dark(),
+        ),
         key="tree_figure",
         config={"displaylogo": False, "scrollZoom": True},
         alt="The decision tree with the path of the rule",

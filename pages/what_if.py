@@ -283,6 +283,7 @@ def body() -> None:
         leaves=compact is not None,
         finder=lambda: finder_of(rules_key, rule_set),
         dark=state.is_dark(),
+        key=rules_key,
     )
 
 

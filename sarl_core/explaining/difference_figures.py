@@ -97,17 +97,14 @@ def confusion_figure(
         showlegend=False,
         name="counts",
     )
+    shapes = []
     for label in range(size - 1):  # the actions in their colours, beside the axes
-        colour = label_colour(label)
-        figure.add_shape(
-            type="rect", x0=-0.5 - _MARK, x1=-0.5, y0=label - 0.46, y1=label + 0.46,
-            fillcolor=colour, line={"width": 0},
-        )  # fmt: skip
-        figure.add_shape(
-            type="rect", y0=-0.5 - _MARK, y1=-0.5, x0=label - 0.46, x1=label + 0.46,
-            fillcolor=colour, line={"width": 0},
-        )  # fmt: skip
+        box = {"type": "rect", "fillcolor": label_colour(label), "line": {"width": 0}}
+        edge, middle = (-0.5 - _MARK, -0.5), (label - 0.46, label + 0.46)
+        for (x0, x1), (y0, y1) in ((edge, middle), (middle, edge)):
+            shapes.append({**box, "x0": x0, "x1": x1, "y0": y0, "y1": y1})
     figure.update_layout(
+        shapes=shapes,  # at once: one by one, Plotly copies them all each time
         height=min(130 + 52 * size, 620),
         margin={"l": 8, "r": 8, "t": 8, "b": 8},
         hovermode="closest",

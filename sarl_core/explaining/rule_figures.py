@@ -22,8 +22,8 @@ from sarl_core.explaining.markup import plain
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
 
-MAX_BOXES = 9000
-_HOVERS = 700
+MAX_BOXES = 2000  # more take a browser the better part of a second
+_HOVERS = 400
 _NEIGHBOURHOOD = 30  # "around" a rule is what is at most so many times as wide
 
 
@@ -146,14 +146,20 @@ def feature_figure(
         )
     low = bounds.low if np.isfinite(bounds.low) else float(edges[0])
     high = bounds.high if np.isfinite(bounds.high) else float(edges[-1])
-    figure.add_vrect(
-        x0=low, x1=high, fillcolor=MARKER_COLOUR, opacity=0.13, line_width=0, layer="below"
-    )
-    for edge in (bounds.low, bounds.high):
-        if np.isfinite(edge):
-            figure.add_vline(x=edge, line={"color": MARKER_COLOUR, "width": 2})
+    whole = {"xref": "x", "yref": "y domain", "y0": 0, "y1": 1}
+    shapes: list[dict[str, Any]] = [
+        {**whole, "type": "rect", "x0": low, "x1": high, "fillcolor": MARKER_COLOUR}
+        | {"opacity": 0.13, "line": {"width": 0}, "layer": "below"}
+    ]
+    shapes += [
+        {**whole, "type": "line", "x0": edge, "x1": edge}
+        | {"line": {"color": MARKER_COLOUR, "width": 2}}
+        for edge in (bounds.low, bounds.high)
+        if np.isfinite(edge)
+    ]
     figure.update_layout(
         height=height,
+        shapes=shapes,  # at once: one by one, Plotly copies them all each time
         margin={"l": 44, "r": 10, "t": 6, "b": 40},
         barmode="overlay",
         bargap=0,
@@ -322,6 +328,7 @@ def _add_conditions(
     total = float(tree.samples[0])
     left, right, top, bottom = window
     ink = "#f1f5f7" if dark else "#1d2730"
+    notes: list[dict[str, Any]] = []
     for above, here in zip(path[:-1].tolist(), path[1:].tolist(), strict=True):
         if not top <= tree.depth[here] < bottom:
             continue
@@ -342,4 +349,5 @@ def _add_conditions(
             "font": {"size": 11, "color": ink},
             "bgcolor": "rgba(18,24,29,0.6)" if dark else "rgba(255,255,255,0.7)",
         }
-        figure.add_annotation(note)
+        notes.append(note)
+    figure.layout.annotations = notes  # at once: one by one, Plotly copies them all each time
