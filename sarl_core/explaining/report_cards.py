@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.distributions import FeatureRow
@@ -137,9 +139,9 @@ def rule_card(
     rule = rule_set.rules[index]
     dimension = rule_set.actions[rule.dimension]
     frames = examples.frames.get(index, ()) if examples is not None else ()
-    rows = tally.rows(index, rule.dimension)
     # Where several rules apply, or this one is off, it applies to more states than it decides.
-    applying, decided = int(rule.applies(demonstrations.observations).sum()), len(rows)
+    rows = np.flatnonzero(rule.applies(demonstrations.observations))
+    applying, decided = len(rows), len(tally.rows(index, rule.dimension))
     return Card(
         number=number,
         id=rule.id,

@@ -69,9 +69,10 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         if len(matrix.rule_set.actions) > 1 or dimension.is_interval:
             told = f"{dimension.name}: {told}"
         told = f"{PLACED_MARK}{told}" if rule.placed else told
+        told += "" if rule.enabled else ", off"
         write(_MARGIN + 14, top + 4, told, _ACTION - 22)
         write(_MARGIN + _ACTION, top + 4, f"{rule.samples:,}", _STATES - 8, right=True)
-        share = share_text(rule.confidence) if rule.samples else "–"
+        share = share_text(rule.confidence) if rule.samples else "-"  # its font has no dash
         write(_MARGIN + _ACTION + _STATES, top + 4, share, _AGREES - 8, right=True)
         bars = matrix.bars(rule)
         for place, column in enumerate(matrix.columns):

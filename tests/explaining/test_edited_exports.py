@@ -70,6 +70,8 @@ def test_the_matrix_shows_placed_rules_first_with_a_mark(mined: RuleSet, edited:
     assert ">Right<" not in html
     assert "* written by hand or pinned" in matrix_document(matrix)
     assert "* written" not in matrix_document(rule_matrix(mined))
+    off = replace(edited.rules[0], enabled=False)
+    assert matrix_png(matrix, edited.rules[:1]) != matrix_png(matrix, (off,))
     # The mark is drawn: the same rules without it make another picture.
     bare = replace(edited.rules[0], pinned=False)
     assert matrix_png(matrix, edited.rules[:1]) != matrix_png(matrix, (bare,))

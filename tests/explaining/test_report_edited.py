@@ -79,6 +79,19 @@ def test_each_rule_says_how_many_states_it_decides(cart: Demonstrations, rules: 
     assert f"{right:,} of {int(taken.sum()):,} states" in told
 
 
+def test_the_states_of_a_rule_that_decides_none_are_shown(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    def bars(rule_set: RuleSet) -> list[list[str]]:
+        cards = re.findall(
+            r"<article.*?</article>", make_report(rule_set, cart, PLAIN).html, flags=re.S
+        )
+        return [re.findall(r'<td class="wide">.*?</td>', card) for card in cards]
+
+    off = tuple(dataclasses.replace(rule, enabled=False) for rule in rules.rules)
+    assert bars(dataclasses.replace(rules, rules=off)) == bars(rules) != []
+
+
 def test_the_headline_counts_rules_that_are_on(cart: Demonstrations, rules: RuleSet) -> None:
     only = tuple(
         dataclasses.replace(rule, enabled=index == 0) for index, rule in enumerate(rules.rules)
