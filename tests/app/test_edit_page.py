@@ -196,6 +196,24 @@ def test_a_rule_file_is_edited_and_one_that_is_none_loses_nothing(tmp_path: Path
     assert table(app)["Rule"].tolist()[0] == "manual.1"
 
 
+def test_an_edited_file_speaks_by_the_names_given_to_the_data() -> None:
+    app = open_page("names", data="cartpole", base="own file")
+    rows = {2: {"Name": "lean"}}
+    app.session_state[app.data_editor[0].key] = {
+        "edited_rows": rows,
+        "added_rows": [],
+        "deleted_rows": [],
+    }
+    app.run()
+    app.switch_page("edit.py").run()
+    content = rules_to_json(FILTERED).encode()
+    app.file_uploader(key="edit_rule_file").set_value(("mine.json", content, "application/json"))
+    app.run()
+    when = " ".join(table(app)["When"])
+    assert "lean" in when
+    assert "pole angle " not in when
+
+
 def test_rules_of_something_else_are_counted_on_random_states() -> None:
     app = open_page("edit", data="pendulum", base="own file")
     content = rules_to_json(FILTERED).encode()
