@@ -184,9 +184,9 @@ def recorder(quick: bool) -> Iterable[Row]:
     yield from _rows(
         quick,
         Control(
-            "Replay, a filter of the flight recorder, 100,000 steps",
-            "replay?data=cartpole&agent=expert&rules=unfiltered&over=200&recorded=all+episodes",
-            partial(_button, selector=".st-key-only button:first-of-type"),
+            "Replay, a filter of the flight recorder, 200 episodes",
+            "replay?data=cartpole&agent=novice&rules=unfiltered&over=200&recorded=all+episodes",
+            partial(_button, selector=".st-key-only >> text=changed by the rules"),
             ("[data-testid=stCaptionContainer]", TABLES),
             _run_many,
             FILTER_REACH,
