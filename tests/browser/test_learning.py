@@ -40,7 +40,8 @@ def test_curves_grow_while_agents_learn_and_nothing_is_left_when_the_visitor_goe
 ) -> None:
     visit(screen, f"/learning?data=cartpole&learn_view=Your+own&learn_steps={STEPS}", "Learning")
     screen.get_by_role("button", name="Start").click()
-    stop = screen.get_by_role("button", name="Stop")
+    # Not the Stop that Streamlit shows in its header while a page runs.
+    stop = screen.get_by_test_id("stMain").get_by_role("button", name="Stop", exact=True)
     expect(stop).to_be_visible()
     wait_until(1)
     expect(screen.locator(".js-plotly-plot").first).to_be_visible(timeout=2 * PATIENCE)
