@@ -259,8 +259,7 @@ def _table_row(page: Page, move: int, *, selector: str) -> Release:
     table = page.locator(f"{selector} [data-testid=stDataFrameResizable]").first
     table.scroll_into_view_if_needed()
     _point(page, table, 15, 1 + move % 5)
-    page.mouse.down()
-    return page.mouse.up
+    return lambda: _press(page)
 
 
 def _point(page: Page, table: Locator, across: int, row: int) -> None:
@@ -270,11 +269,15 @@ def _point(page: Page, table: Locator, across: int, row: int) -> None:
     page.mouse.move(box["x"] + across, box["y"] + HEAD + ROW * (row + 0.5))
 
 
+def _press(page: Page) -> None:
+    page.mouse.down()
+    page.mouse.up()
+
+
 def _typed_name(page: Page, move: int) -> Release:
     """A name typed into the first column, before Enter."""
     _point(page, page.get_by_test_id("stDataFrame").first, 120, 4)
-    page.mouse.down()
-    page.mouse.up()
+    _press(page)
     page.keyboard.type(f"lean {move}")
     return lambda: page.keyboard.press("Enter")
 
