@@ -72,8 +72,6 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
         order: Asked for it.
         current: The step that is chosen.
     """
-    if st.session_state.pop("_picked", False):
-        st.rerun()  # as a whole: a row was chosen, and everything goes there
     st.subheader("Flight recorder")
     recorded = source(replay, order)
     steps = recorded.steps
@@ -211,17 +209,32 @@ def page_of(rows: NDArray[np.int64], place: int | None, about: object) -> int:
 
 
 def pick(recorded: Recorded, on_page: NDArray[np.int64]) -> None:
-    """Go to the step whose row was selected, and to its episode."""
+    """Go to the step whose row was selected, and to its episode; the last thing a callback does."""
     places = st.session_state["recorder_table"]["selection"]["rows"]
     if not places or places[0] >= len(on_page):
         return
     row = int(on_page[places[0]])
-    st.session_state["_picked"] = True
     episode, step = int(recorded.steps.episode[row]), int(recorded.steps.step[row])
     if episode == recorded.shown:
-        st.session_state["step"] = step
-    else:
-        st.session_state["_elsewhere"] = (int(recorded.episodes.seeds[episode]), step)
+        go_to_step(step)
+    st.session_state["_elsewhere"] = (int(recorded.episodes.seeds[episode]), step)
+    st.rerun()  # as a whole: it is another replay
+
+
+def go_to_step(step: int) -> None:
+    """Go to a step of the episode on screen; for callbacks, and the last thing they do.
+
+    `take_step` writes it where the slider finds it: what a callback writes to a slider does not
+    reach the browser when it asks for another run.
+    """
+    st.session_state["_step"] = step
+    st.rerun("at_step")
+
+
+def take_step() -> None:
+    """Hand the step that was gone to over to the slider, before that is drawn."""
+    if "_step" in st.session_state:
+        st.session_state["step"] = st.session_state.pop("_step")
 
 
 def coloured(recorded: Recorded) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import streamlit as st
 from _fork_view import fork_section
-from _recorder import flight_recorder
+from _recorder import flight_recorder, go_to_step, take_step
 from _replays import (
     ALONE,
     WITH,
@@ -18,7 +18,7 @@ from _replays import (
 )
 from _words import escaped
 
-from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, label_colour
 from sarl_core.explaining.language import counted, label_text, number_text, share_text
 from sarl_core.explaining.lit_path import lit_paths_html
 from sarl_core.explaining.replay import StepView, margin_text, step_texts, step_view, tracks
@@ -26,6 +26,7 @@ from sarl_core.explaining.replay_figures import (
     SHIELDED_COLOUR,
     UNSHIELDED_COLOUR,
     ReturnLine,
+    Timeline,
     intervention_strip,
     return_figure,
 )
@@ -132,37 +133,94 @@ def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
 
 
 def pick_step() -> None:
-    """Go to the step that was clicked in the strip."""
+    """Go to the step that was clicked in the strip; for a callback, and the last thing it does."""
     points = st.session_state["strip"].selection.points
     if points:
         step = points[0]["customdata"]
-        st.session_state["step"] = int(step["0"] if isinstance(step, dict) else step[0])
+        go_to_step(int(step["0"] if isinstance(step, dict) else step[0]))
 
 
-def go_to(step: int) -> None:
-    """Go to a step; for buttons."""
+def step_to(step: int) -> None:
+    """Go to a step; for buttons beside the slider."""
     st.session_state["step"] = step
 
 
-@st.fragment
 def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
-    """The strip, the slider, and everything about the step it stands at.
+    """The strip and the return so far, and everything about the step that is looked at.
+
+    The figures hold all steps already, so that only the mark over them moves with the slider.
 
     Args:
         replay: To show.
         order: Asked for it.
         linked: The set under which its rules are found on the Rules page; None if they are not.
     """
-    if "_elsewhere" in st.session_state:
-        st.rerun()  # as a whole: another episode was chosen in the table
+    steps, shielded = replay.shown.steps, replay.shielded is not None
     st.subheader("Step by step")
+    legend(replay.dimensions, marks=shielded)
+    rows = tracks(steps, replay.dimensions, shielded=shielded)
+    lines = [
+        ReturnLine(
+            WITHOUT if shielded else ALONE,
+            np.cumsum(replay.plain.steps.reward),
+            UNSHIELDED_COLOUR,
+        )
+    ]
+    if shielded:
+        lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
+    timeline = Timeline.of(rows, max(len(line.returns) for line in lines))
+    st.html(mark_style(timeline))
+    with st.container(key="timeline", gap="xxsmall"):
+        st.plotly_chart(
+            intervention_strip(
+                rows, step_texts(steps, replay.dimensions, replay.rule_set), timeline
+            ),
+            key="strip",
+            on_select=pick_step,
+            selection_mode="points",
+            config=PLAIN,
+            alt="What the agent wanted, what was done, and where the two differ, step by step",
+        )
+        st.plotly_chart(
+            return_figure(lines, timeline),
+            config=PLAIN,
+            key="return",
+            alt="Return so far, step by step",
+        )
+    at_step(replay, order, timeline, linked)
+
+
+def mark_style(timeline: Timeline) -> str:
+    """The mark over the figures, where `at_step` puts it."""
+    return (
+        "<style>"
+        ".st-key-timeline { position: relative; }"
+        ".st-key-timeline::after { content: ''; position: absolute; z-index: 2; top: 0;"
+        f" bottom: {timeline.bottom}px; width: 2px; pointer-events: none;"
+        f" left: calc({timeline.left - 1}px"
+        f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
+        f" will-change: transform; background: {MARKER_COLOUR}; }}"
+        "</style>"
+    )
+
+
+@st.fragment(key="at_step")
+def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None) -> None:
+    """The slider, and the step it stands at.
+
+    Args:
+        replay: To show.
+        order: Asked for it.
+        timeline: Of the figures above.
+        linked: The set under which its rules are found on the Rules page; None if they are not.
+    """
     steps, shielded = replay.shown.steps, replay.shielded is not None
     last = len(steps) - 1
+    take_step()
     kept = st.session_state.get("step")
     if kept is not None and not 0 <= kept <= last:
         st.session_state["step"] = min(max(kept, 0), last)
-    legend(replay.dimensions, marks=shielded)
-    strip = st.container()
+    current = 0
     if last > 0:
         current = int(
             st.slider(
@@ -174,16 +232,15 @@ def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
                 help="Move it, or click a step in the strip above.",
             )
         )
-    else:
-        current = 0
-    changes = np.flatnonzero(steps.intervened)
+    st.html(f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>")
     if shielded:
+        changes = np.flatnonzero(steps.intervened)
         before, after = changes[changes < current], changes[changes > current]
         with st.container(horizontal=True, vertical_alignment="center"):
             st.button(
                 "Previous change",
                 icon=":material/skip_previous:",
-                on_click=go_to,
+                on_click=step_to,
                 args=(int(before[-1]) if len(before) else current,),
                 disabled=not len(before),
                 key="previous",
@@ -191,7 +248,7 @@ def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
             st.button(
                 "Next change",
                 icon=":material/skip_next:",
-                on_click=go_to,
+                on_click=step_to,
                 args=(int(after[0]) if len(after) else current,),
                 disabled=not len(after),
                 key="next",
@@ -199,38 +256,11 @@ def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
             st.caption(
                 f"{len(changes):,} of {len(steps):,} steps were changed. {flips_text(replay.shown)}"
             )
-    strip.plotly_chart(
-        intervention_strip(
-            tracks(steps, replay.dimensions, shielded=shielded),
-            step_texts(steps, replay.dimensions, replay.rule_set),
-            current=current,
-        ),
-        key="strip",
-        on_select=pick_step,
-        selection_mode="points",
-        config=PLAIN,
-        alt="What the agent wanted, what was done, and where the two differ, step by step",
-    )
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
         st.image(
             replay.film.frame(current), width="stretch", alt=f"The environment at step {current}"
-        )
-        lines = [
-            ReturnLine(
-                WITHOUT if shielded else ALONE,
-                np.cumsum(replay.plain.steps.reward),
-                UNSHIELDED_COLOUR,
-            )
-        ]
-        if shielded:
-            lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
-        st.plotly_chart(
-            return_figure(lines, current=current),
-            config=PLAIN,
-            key="return",
-            alt="Return so far, step by step",
         )
         if replay.finder is not None:
             tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])

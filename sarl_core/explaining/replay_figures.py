@@ -16,8 +16,8 @@ from sarl_core.mining.labels import LabelledDimension
 
 SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it
 UNSHIELDED_COLOUR = MUTED_COLOUR
-_CURRENT = MUTED_COLOUR
 _ROW_HEIGHT = 30
+_LEAST_ROOM = 64  # pixels: what the numbers and the title of the returns take
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,53 @@ class ReturnRow:
     colour: str
 
 
-def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current: int) -> go.Figure:
+@dataclass(frozen=True)
+class Timeline:
+    """The steps from left to right, the same for all figures that stand above each other.
+
+    A mark at the present step is laid over them: moving it costs nothing, while a figure that
+    changes is drawn anew.
+
+    Attributes:
+        n_steps: Of the longest run.
+        left: Room for names, in pixels.
+        right: Room at the other side, in pixels.
+        bottom: Room below the last figure, in pixels.
+    """
+
+    n_steps: int
+    left: int
+    right: int = 12
+    bottom: int = 40
+
+    @classmethod
+    def of(cls, tracks: Sequence[Track], n_steps: int) -> Timeline:
+        """With room for the names of all tracks.
+
+        Args:
+            tracks: Named at the left.
+            n_steps: Of the longest run, at least 1.
+
+        Returns:
+            Where everything stands.
+        """
+        longest = max(len(track.name) for track in tracks)
+        return cls(n_steps, max(_LEAST_ROOM, 14 + 7 * longest))
+
+    @property
+    def range(self) -> list[float]:
+        """Of the axis of steps; each step is one wide, with itself in the middle."""
+        return [-0.5, max(self.n_steps, 2) - 0.5]
+
+    def place(self, step: int) -> float:
+        """Where a step stands between the two rooms, 0 to 1."""
+        low, high = self.range
+        return (step - low) / (high - low)
+
+
+def intervention_strip(
+    tracks: Sequence[Track], texts: Sequence[str], timeline: Timeline
+) -> go.Figure:
     """What the agent wanted, what was executed and where the two differ, step by step.
 
     Plotly reports no click on a heatmap, so points too small to see lie over it; each carries
@@ -82,7 +128,7 @@ def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current
     Args:
         tracks: From top to bottom.
         texts: What to say about each step, T entries.
-        current: The step to mark.
+        timeline: Where the steps stand; they are numbered by the figure below.
 
     Returns:
         A heatmap with T columns.
@@ -112,15 +158,14 @@ def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current
         text=list(texts) * len(tracks),
         hovertemplate="%{text}<extra></extra>",
     )
-    figure.add_vline(x=current, line={"color": _CURRENT, "width": 2})
-    figure.update_layout(**_layout(max(_ROW_HEIGHT * len(tracks) + 60, 128)), hoverdistance=-1)
+    figure.update_layout(**_layout(_ROW_HEIGHT * len(tracks) + 12), hoverdistance=-1)
+    figure.update_layout(margin=_margin(timeline, top=4, bottom=8))
     figure.update_xaxes(
-        title={"text": "step", "standoff": 2},
-        range=[-0.5, max(n_steps, 2) - 0.5],
+        range=timeline.range,
         fixedrange=True,
         showgrid=False,
         zeroline=False,
-        nticks=8,
+        showticklabels=False,
     )
     figure.update_yaxes(
         tickvals=list(range(len(tracks))),
@@ -130,16 +175,17 @@ def intervention_strip(tracks: Sequence[Track], texts: Sequence[str], *, current
         showgrid=False,
         zeroline=False,
         ticklabelstandoff=6,
+        automargin=False,
     )
     return figure
 
 
-def return_figure(lines: Sequence[ReturnLine], *, current: int) -> go.Figure:
+def return_figure(lines: Sequence[ReturnLine], timeline: Timeline) -> go.Figure:
     """The return of each run as it grew.
 
     Args:
         lines: One a run.
-        current: The step to mark.
+        timeline: Where the steps stand.
 
     Returns:
         Lines, named at the top.
@@ -162,21 +208,25 @@ def return_figure(lines: Sequence[ReturnLine], *, current: int) -> go.Figure:
             marker={"color": line.colour, "size": 8},
             hovertemplate=f"{plain(line.name)} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
         )
-    figure.add_vline(x=current, line={"color": _CURRENT, "width": 1, "dash": "dot"})
-    figure.update_layout(**_layout(210))
+    figure.update_layout(**_layout(170))
     figure.update_layout(
         showlegend=len(lines) > 1,
-        margin={"t": 30 if len(lines) > 1 else 8},
+        margin=_margin(timeline, top=26 if len(lines) > 1 else 8, bottom=timeline.bottom),
         legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
     )
-    longest = max(len(line.returns) for line in lines)
     figure.update_xaxes(
         title={"text": "step", "standoff": 2},
         fixedrange=True,
         nticks=8,
-        range=[-0.5, max(longest, 2) - 0.5],
+        range=timeline.range,
+        automargin=False,
     )
-    figure.update_yaxes(title={"text": "return so far", "standoff": 4}, fixedrange=True, nticks=5)
+    figure.update_yaxes(
+        title={"text": "return so far", "standoff": 4},
+        fixedrange=True,
+        nticks=5,
+        automargin=False,
+    )
     return figure
 
 
@@ -252,6 +302,11 @@ def _steps_of_colour(track: Track, n_labels: int) -> list[list[Any]]:
         colour = track.colour if track.dimension is None else label_colour(label)
         scale += [[label / n_labels, colour], [(label + 1) / n_labels, colour]]
     return scale
+
+
+def _margin(timeline: Timeline, *, top: int, bottom: int) -> dict[str, Any]:
+    """Fixed, so that a mark laid over the figure stands where it should."""
+    return {"l": timeline.left, "r": timeline.right, "t": top, "b": bottom, "autoexpand": False}
 
 
 def _layout(height: int) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from sarl_core.explaining import demonstration_figures, rule_figures
 from sarl_core.explaining.distributions import histogram_by_label
 from sarl_core.explaining.evidence import feature_evidence
 from sarl_core.explaining.markup import plain
-from sarl_core.explaining.replay_figures import Track, intervention_strip
+from sarl_core.explaining.replay_figures import Timeline, Track, intervention_strip
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import cut_nodes, node_of
 
@@ -49,9 +49,8 @@ def test_names_from_files_are_no_markup_in_other_figures() -> None:
     assert bars.data[0].y[0] == "&lt;b&gt;0&lt;/b&gt;"
     spread = demonstration_figures.feature_figure(Feature("x", "<b>"), histogram, dimension)
     assert "<b>" not in "".join([*spread.data[0].customdata, spread.data[0].hovertemplate])
-    strip = intervention_strip(
-        [Track("<u>d</u>: done", labels.astype(float), dimension)], ["", "", ""], current=0
-    )
+    rows = [Track("<u>d</u>: done", labels.astype(float), dimension)]
+    strip = intervention_strip(rows, ["", "", ""], Timeline.of(rows, 3))
     assert strip.layout.yaxis.ticktext[0] == "&lt;u&gt;d&lt;/u&gt;: done"
 
 

@@ -20,6 +20,7 @@ from sarl_core.explaining.replay import (
 from sarl_core.explaining.replay_figures import (
     ReturnLine,
     ReturnRow,
+    Timeline,
     comparison_figure,
     intervention_strip,
     return_figure,
@@ -81,7 +82,8 @@ def test_the_strip_marks_exactly_the_interventions(replayed: tuple[RuleSet, Step
         assert (~np.isnan(rows[3].labels) == steps.outside).all()
         assert rows[3].colour != rows[2].colour
     assert ((rows[0].labels != rows[1].labels) == steps.intervened).all()
-    figure = intervention_strip(rows, step_texts(steps, rules.actions, rules), current=0)
+    timeline = Timeline.of(rows, len(steps))
+    figure = intervention_strip(rows, step_texts(steps, rules.actions, rules), timeline)
     points = figure.data[-1]
     assert points.customdata[:, 0].tolist() == list(range(len(steps))) * len(rows)
     assert figure.layout.hoverdistance == -1
@@ -163,10 +165,30 @@ def test_returns_are_drawn_for_each_run() -> None:
         ReturnLine("with", np.array([1.0, 2.0, 3.0]), "#000000"),
         ReturnLine("without", np.array([1.0]), "#111111"),
     ]
-    figure = return_figure(lines, current=1)
+    figure = return_figure(lines, Timeline(3, 64))
     assert figure.data[0].y.tolist() == [1.0, 2.0, 3.0]
     assert figure.layout.showlegend
-    assert not return_figure(lines[:1], current=0).layout.showlegend
+    assert not return_figure(lines[:1], Timeline(3, 64)).layout.showlegend
+
+
+def test_a_mark_over_the_figures_of_a_replay_stands_at_its_step(
+    replayed: tuple[RuleSet, StepTable],
+) -> None:
+    rules, steps = replayed
+    rows = tracks(steps, rules.actions, shielded=True)
+    timeline = Timeline.of(rows, len(steps) + 7)  # the other run was longer
+    strip = intervention_strip(rows, step_texts(steps, rules.actions, rules), timeline)
+    line = return_figure([ReturnLine("with", np.zeros(len(steps)), "#000000")], timeline)
+    for figure in (strip, line):
+        axis, margin = figure.layout.xaxis, figure.layout.margin
+        assert (margin.l, margin.r, margin.autoexpand) == (timeline.left, timeline.right, False)
+        assert figure.layout.yaxis.automargin is False
+        low, high = axis.range
+        for step in (0, 3, len(steps) + 6):
+            assert low + timeline.place(step) * (high - low) == pytest.approx(step)
+    assert line.layout.margin.b == timeline.bottom
+    assert 0 < timeline.place(0) < timeline.place(len(steps) + 6) < 1
+    assert 0 < Timeline.of(rows, 1).place(0) < 1
 
 
 def test_episodes_are_drawn_with_their_interval() -> None:
