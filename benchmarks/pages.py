@@ -165,7 +165,7 @@ def report(quick: bool) -> Iterable[Row]:
 def replay(quick: bool) -> Iterable[Row]:
     """The step of an episode: its slider, and its row in the flight recorder."""
     path = "replay?agent=novice&rules=unfiltered"
-    watched = (".st-key-return", "[data-testid=stImageContainer]", TABLES)
+    watched = (".st-key-timeline", ".sarl-picture", ".sarl-step", ".sarl-lit", TABLES)
     yield from _rows(
         quick,
         Control("Replay, the step", path, partial(_arrow, name="Step"), watched, _run),

@@ -63,9 +63,8 @@ class Recorded:
         return int(np.searchsorted(self.steps.episode, self.shown)) + step
 
 
-@st.fragment
 def flight_recorder(replay: Replay, order: Order, current: int) -> None:
-    """The table of steps; a fragment of its own, since a filter moves nothing but the table.
+    """The table of steps, in the fragment of the slider: a chosen row is a moved slider.
 
     Args:
         replay: On screen.
@@ -216,25 +215,10 @@ def pick(recorded: Recorded, on_page: NDArray[np.int64]) -> None:
     row = int(on_page[places[0]])
     episode, step = int(recorded.steps.episode[row]), int(recorded.steps.step[row])
     if episode == recorded.shown:
-        go_to_step(step)
+        st.session_state["step"] = step
+        return
     st.session_state["_elsewhere"] = (int(recorded.episodes.seeds[episode]), step)
     st.rerun()  # as a whole: it is another replay
-
-
-def go_to_step(step: int) -> None:
-    """Go to a step of the episode on screen; for callbacks, and the last thing they do.
-
-    `take_step` writes it where the slider finds it: what a callback writes to a slider does not
-    reach the browser when it asks for another run.
-    """
-    st.session_state["_step"] = step
-    st.rerun("at_step")
-
-
-def take_step() -> None:
-    """Hand the step that was gone to over to the slider, before that is drawn."""
-    if "_step" in st.session_state:
-        st.session_state["step"] = st.session_state.pop("_step")
 
 
 def coloured(recorded: Recorded) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import streamlit as st
 from _fork_view import fork_section
-from _recorder import flight_recorder, go_to_step, take_step
+from _recorder import flight_recorder
 from _replays import (
     ALONE,
     WITH,
@@ -21,7 +21,7 @@ from _words import escaped
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, label_colour
 from sarl_core.explaining.language import counted, label_text, number_text, share_text
 from sarl_core.explaining.lit_path import lit_paths_html
-from sarl_core.explaining.replay import StepView, margin_text, step_texts, step_view, tracks
+from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
 from sarl_core.explaining.replay_figures import (
     SHIELDED_COLOUR,
     UNSHIELDED_COLOUR,
@@ -30,6 +30,7 @@ from sarl_core.explaining.replay_figures import (
     intervention_strip,
     return_figure,
 )
+from sarl_core.explaining.step_card import picture, step_card, swatch
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
@@ -104,43 +105,35 @@ def numbers(replay: Replay, unfiltered: Callable[[], None] | None) -> None:
         )
 
 
-def swatch(name: str, label: int) -> str:
-    """A coloured square and a name, as HTML."""
-    return (
-        f'<span style="white-space:nowrap"><span style="display:inline-block;width:.75em;'
-        f'height:.75em;border-radius:2px;margin-right:.4em;background:{label_colour(label)}">'
-        f"</span>{html.escape(name)}</span>"
-    )
-
-
 def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
     """The colours of the strip."""
     many = len(dimensions) > 1
     entries = [
-        swatch(f"{dimension.name} {text}" if many else text, label)
+        swatch(f"{dimension.name} {text}" if many else text, label_colour(label))
         for dimension in dimensions
         for label in range(min(dimension.n_labels, 24))
         for text in [label_text(label, dimension)]
     ]
     if marks:
-        entries.append(
-            f'<span style="white-space:nowrap"><span style="display:inline-block;width:.75em;'
-            f'height:.75em;border-radius:2px;margin-right:.4em;background:{INTERVENTION_COLOUR}">'
-            "</span>changed by the rules</span>"
-        )
+        entries.append(swatch("changed by the rules", INTERVENTION_COLOUR))
     gap = "display:flex;flex-wrap:wrap;column-gap:1.2em;font-size:.9rem"
     st.html(f'<div style="{gap}">{"".join(entries)}</div>')
 
 
 def pick_step() -> None:
-    """Go to the step that was clicked in the strip; for a callback, and the last thing it does."""
+    """Go to the step that was clicked in the strip; for a callback, and the last thing it does.
+
+    The slider is drawn by another fragment, which finds the step as it begins: what a callback
+    writes to a slider does not reach the browser when it asks for another run.
+    """
     points = st.session_state["strip"].selection.points
     if points:
         step = points[0]["customdata"]
-        go_to_step(int(step["0"] if isinstance(step, dict) else step[0]))
+        st.session_state["_step"] = int(step["0"] if isinstance(step, dict) else step[0])
+        st.rerun("at_step")
 
 
-def step_to(step: int) -> None:
+def go_to(step: int) -> None:
     """Go to a step; for buttons beside the slider."""
     st.session_state["step"] = step
 
@@ -216,7 +209,8 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
     """
     steps, shielded = replay.shown.steps, replay.shielded is not None
     last = len(steps) - 1
-    take_step()
+    if "_step" in st.session_state:
+        st.session_state["step"] = st.session_state.pop("_step")
     kept = st.session_state.get("step")
     if kept is not None and not 0 <= kept <= last:
         st.session_state["step"] = min(max(kept, 0), last)
@@ -240,7 +234,7 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
             st.button(
                 "Previous change",
                 icon=":material/skip_previous:",
-                on_click=step_to,
+                on_click=go_to,
                 args=(int(before[-1]) if len(before) else current,),
                 disabled=not len(before),
                 key="previous",
@@ -248,7 +242,7 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
             st.button(
                 "Next change",
                 icon=":material/skip_next:",
-                on_click=step_to,
+                on_click=go_to,
                 args=(int(after[0]) if len(after) else current,),
                 disabled=not len(after),
                 key="next",
@@ -259,16 +253,19 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
-        st.image(
-            replay.film.frame(current), width="stretch", alt=f"The environment at step {current}"
-        )
+        seen = picture(replay.film.png(current), f"The environment at step {current}")
         if replay.finder is not None:
             tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
-            for action, table in zip(view.actions, tables, strict=True):
-                many = len(tables) > 1
-                st.html(f"<b>{html.escape(action.dimension)}</b>{table}" if many else table)
+            many = len(tables) > 1
+            seen += "".join(
+                f"<b>{html.escape(action.dimension)}</b>{table}" if many else table
+                for action, table in zip(view.actions, tables, strict=True)
+            )
+        st.html(seen)
     with words:
-        describe(view, shielded=shielded, linked=linked)
+        st.html(step_card(view, shielded=shielded))
+        if linked is not None:
+            link_rules(view, linked)
     if shielded:
         fork_section(replay, order, current)
     flight_recorder(replay, order, current)
@@ -286,55 +283,13 @@ def flips_text(episodes: Episodes) -> str:
     )
 
 
-def describe(view: StepView, *, shielded: bool, linked: str | None) -> None:
-    """One step in words."""
-    for action in view.actions:
-        if len(view.actions) > 1:
-            st.markdown(f"**{escaped(action.dimension)}**")
-        done = swatch(action.executed, action.executed_label)
-        if action.changed:
-            st.badge("Changed by the rules", icon=":material/edit:", color="orange")
-            st.html(
-                f"The agent wanted {swatch(action.proposed, action.proposed_label)}, "
-                f"and {done} was done."
-            )
-        elif action.abstains:
-            st.badge("Rule abstains", icon=":material/do_not_disturb_on:", color="gray")
-            st.html(f"The agent wanted {done}. The rule left it as it is, outside its data.")
-        elif action.rule:
-            st.badge("Allowed by the rules", icon=":material/check:", color="green")
-            st.html(f"The agent wanted {done}, as the rule says.")
-        elif shielded:
-            st.badge("No rule applies", color="gray")
-            st.html(f"The agent chose {done}.")
-        else:
-            st.html(f"The agent chose {done}.")
-        if action.rule:
-            st.markdown(f"**Rule {escaped(action.rule_id)}.** {escaped(action.rule)}")
-            if linked is not None:
-                st.page_link(
-                    "rules.py",
-                    label="Open this rule",
-                    icon=":material/rule:",
-                    query_params={
-                        **st.query_params.to_dict(),
-                        "set": linked,
-                        "rule": action.rule_id,
-                    },
-                )
-    if view.outside:
-        st.markdown(
-            ":material/frame_inspect: **Outside the data:** this state lies beyond the values seen "
-            "where the rule applies."
+def link_rules(view: StepView, linked: str) -> None:
+    """A way to each rule in force, on the Rules page under the set that is shown there."""
+    ids = dict.fromkeys(action.rule_id for action in view.actions if action.rule)
+    for rule_id in ids:
+        st.page_link(
+            "rules.py",
+            label="Open this rule" if len(ids) == 1 else f"Open rule {escaped(rule_id)}",
+            icon=":material/rule:",
+            query_params={**st.query_params.to_dict(), "set": linked, "rule": rule_id},
         )
-    if shielded:
-        st.caption(f"{margin_text(view.margin).capitalize()}.")
-    st.dataframe(
-        {
-            "State": [name for name, _, _ in view.state],
-            "Value": [value for _, value, _ in view.state],
-            "Unit": [unit or "–" for _, _, unit in view.state],
-        },
-        hide_index=True,
-        height="content" if len(view.state) <= 12 else 400,
-    )

@@ -27,6 +27,11 @@ def texts(app: AppTest) -> str:
     return "\n".join(str(part.value).replace("\\", "") for part in parts)
 
 
+def html(app: AppTest) -> str:
+    """What is written in HTML."""
+    return "\n".join(part.proto.body for part in app.get("html"))
+
+
 def errors(app: AppTest) -> list[str]:
     """The sentences of errors, Markdown's escapes undone."""
     return [str(error.value).replace("\\", "") for error in app.error]

@@ -12,7 +12,7 @@ from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.language import sentence, share_text
 from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.rule_tree import recount
-from tests.app.screens import ROUTER, errors, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -56,10 +56,6 @@ def numbers(rules: RuleSet) -> dict[str, str]:
         "Coverage": share_text(rules.coverage, decimals=1),
         "Fidelity": share_text(rules.fidelity, decimals=1),
     }
-
-
-def html(app: AppTest) -> str:
-    return "\n".join(part.proto.body for part in app.get("html"))
 
 
 def in_force(app: AppTest) -> bool:

@@ -8,7 +8,7 @@ from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.code_c import rules_to_c
 from sarl_core.mining.rounding import merged_rules, rounded_rules
 from sarl_core.mining.rule_files import rules_to_json
-from tests.app.screens import ROUTER, errors, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 
@@ -25,10 +25,6 @@ def code(app: AppTest) -> str:
 
 def labels(app: AppTest) -> list[str]:
     return [button.proto.label for button in app.get("download_button")]
-
-
-def html(app: AppTest) -> str:
-    return "\n".join(part.proto.body for part in app.get("html"))
 
 
 def test_the_rules_in_force_are_rounded_and_no_decision_changes() -> None:

@@ -13,7 +13,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.forking import fork
-from tests.app.screens import errors, metrics, open_page, texts
+from tests.app.screens import errors, html, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 SEED = 100_003
@@ -68,7 +68,7 @@ def test_slider_table_and_buttons_are_one_selection(wanted: Episodes) -> None:
     assert app.slider(key="step").value == following
     assert chosen(app) == [following]
     assert table(app)["Changed"].iloc[table(app)["Step"].tolist().index(following)]
-    assert "Rule" in texts(app)
+    assert "<b>Rule " in html(app)
     # To another page of the table and back: the step stays where it is.
     app.session_state["recorder_page"] = 1
     app.run()

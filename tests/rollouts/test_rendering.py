@@ -330,3 +330,10 @@ def test_text_is_wrapped_and_shortened_to_what_there_is() -> None:
     assert wrapped(text, 14, 2_000, 2) == [text]
     assert fitted("x", 14, 100) == "x"
     assert text_width("≤ → −", 14) > text_width("", 14)
+
+
+def test_a_picture_as_a_file_is_the_picture() -> None:
+    replay = render_episode("CartPole-v1", "novice", seed=3)
+    for number in (0, len(replay.panels[0].film) // 2):
+        with Image.open(io.BytesIO(replay.png(number))) as picture:
+            assert (np.asarray(picture.convert("RGB")) == replay.frame(number)).all()
