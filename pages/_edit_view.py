@@ -202,8 +202,10 @@ def table(of: Base, found: Verdicts) -> Rule | None:
         if rows and rows[0] < len(ids):
             state.set_url_choice("rule", ids[rows[0]])
 
+    by_hand = tuple(told[at] for at in order if rule_set.rules[at].origin == "manual")
+    written = _written(of.digest, key, by_hand, ids, [told[at] for at in order])
     st.dataframe(
-        _frame(order, [told[at] for at in order], found),
+        _with_numbers(written, order, found),
         hide_index=True,
         column_config=_columns(rule_set),
         height=table_height(len(order), TABLE_ROWS),
@@ -226,24 +228,44 @@ def _touched(rule: Rule) -> bool:
     return rule.placed or not rule.enabled
 
 
-def _frame(order: list[int], texts: list[tuple[str, str]], found: Verdicts) -> Any:
-    import pandas as pd
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _written(
+    digest: str,
+    key: str,
+    by_hand: tuple[tuple[str, str], ...],
+    _ids: list[str],
+    _texts: list[tuple[str, str]],
+) -> Any:
+    """The columns that no edit changes as long as the same rules are shown, as an Arrow table."""
+    import pyarrow as pa
+
+    return pa.table(
+        {
+            "Rule": _ids,
+            "Action": [[does] for does, _ in _texts],
+            "When": [when for _, when in _texts],
+        }
+    )
+
+
+def _with_numbers(written: Any, order: list[int], found: Verdicts) -> Any:
+    """The table with what edits change."""
+    import pyarrow as pa
 
     rules = [found.rule_set.rules[at] for at in order]
     decided = found.decided[order]
-    columns: dict[str, Any] = {
-        "On": [rule.enabled for rule in rules],
-        "Kind": [state_text(rule).split(",")[0] for rule in rules],
-        "Rule": [rule.id for rule in rules],
-        "Action": [[does] for does, _ in texts],
-        "When": [when for _, when in texts],
-        "Decides": decided,
-    }
+    kinds = [state_text(rule).split(",")[0] if _touched(rule) else "mined" for rule in rules]
+    table = (
+        written.add_column(0, "On", pa.array([rule.enabled for rule in rules]))
+        .add_column(1, "Kind", pa.array(kinds))
+        .append_column("Decides", pa.array(decided))
+    )
     if found.right is not None:
         right = found.right[order].astype(float)
         right[decided == 0] = float("nan")
-        columns["Expert agrees"] = right / decided.clip(min=1)
-    return pd.DataFrame(columns)
+        share = pa.array(right / decided.clip(min=1), from_pandas=True)
+        table = table.append_column("Expert agrees", share)
+    return table
 
 
 def _columns(rule_set: RuleSet) -> dict[str, Any]:
