@@ -22,12 +22,14 @@ from _url import set_url_choice, url_choice
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import digest_of_pairs
 from sarl_core.errors import SarlError
 from sarl_core.explaining.tables import top_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.holding_out import count_held_out, with_held_out
 from sarl_core.mining.landscape import Landscape, NodeCounts, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
+from sarl_core.mining.rule_names import renamed_trees
 from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds, mine_rules
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 
@@ -234,8 +236,15 @@ def shipped_demonstrations(name: str) -> Demonstrations:
 
 
 @st.cache_resource(max_entries=12, show_spinner="Growing the decision tree …")
-def _trees(digest: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
+def _grown(pairs: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
     return grow_policy_trees(_demonstrations, divider=divider)
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _trees(digest: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
+    # Other names make no other tree.
+    grown = _grown(digest_of_pairs(_demonstrations), divider, _demonstrations)
+    return renamed_trees(grown, _demonstrations)
 
 
 def trees(demonstrations: Demonstrations, divider: int) -> tuple[PolicyTree, ...]:

@@ -1,12 +1,14 @@
-"""Rules under other names, so that rules from a file speak as the demonstrations do."""
+"""Rules and trees under other names, so that they speak as the demonstrations do."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.names import Names
+from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.tree import PolicyTree, Source
 
 
 def renamed_rules(rule_set: RuleSet, names: Names) -> RuleSet:
@@ -36,3 +38,28 @@ def renamed_rules(rule_set: RuleSet, names: Names) -> RuleSet:
             for action, name, labels in zip(actions, names.actions, names.labels, strict=True)
         )
     return replace(rule_set, source=source, actions=actions)
+
+
+def renamed_trees(
+    trees: tuple[PolicyTree, ...], demonstrations: Demonstrations
+) -> tuple[PolicyTree, ...]:
+    """Trees under the names of demonstrations, without growing them again.
+
+    Args:
+        trees: Grown from the same pairs under whatever names, one an action dimension.
+        demonstrations: The pairs.
+
+    Returns:
+        The same trees; the same objects where the names are the same too.
+
+    Raises:
+        ValueError: If there are not as many action dimensions.
+    """
+    source = Source.of(demonstrations)
+    dimensions = label_dimensions(demonstrations, trees[0].divider)
+    return tuple(
+        tree
+        if (tree.source, tree.dimension) == (source, dimension)
+        else replace(tree, source=source, dimension=dimension)
+        for tree, dimension in zip(trees, dimensions, strict=True)
+    )

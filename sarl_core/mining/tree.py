@@ -39,6 +39,24 @@ class Source:
     steps: int
     episodes: int
 
+    @classmethod
+    def of(cls, demonstrations: Demonstrations) -> Source:
+        """What is kept of demonstrations.
+
+        Args:
+            demonstrations: N pairs.
+
+        Returns:
+            Where trees and rules of them come from.
+        """
+        return cls(
+            env_id=demonstrations.env_id,
+            features=demonstrations.features,
+            digest=demonstrations.digest,
+            steps=len(demonstrations),
+            episodes=demonstrations.n_episodes,
+        )
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PolicyTree:
@@ -351,13 +369,7 @@ def count_tree(
         index=index,
         dimension=dimension,
         divider=int(divider),
-        source=Source(
-            env_id=demonstrations.env_id,
-            features=demonstrations.features,
-            digest=demonstrations.digest,
-            steps=len(demonstrations),
-            episodes=demonstrations.n_episodes,
-        ),
+        source=Source.of(demonstrations),
         feature=structure.feature,
         threshold=structure.threshold,
         children_left=left,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from sarl_core import (
     mine_rules,
     save_demonstrations,
 )
-from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
-from sarl_core.mining.rule_names import renamed_rules
+from sarl_core.demonstrations.names import Names, digest_of_pairs, names_of, renamed, tidy
+from sarl_core.mining.rule_names import renamed_rules, renamed_trees
 
 HOSTILE = ("<b>*bold*</b>", 'a "quoted" | name', "=cmd()", "\u202eright to left", "obs_0")
 
@@ -49,6 +50,27 @@ def test_names_change_no_tree_and_no_rule() -> None:
     assert rules.rules == named.rules
     assert named.actions == renamed_rules(rules, NEW).actions
     assert named.source.features == renamed_rules(rules, NEW).source.features
+
+
+def test_trees_take_other_names_without_being_grown_again() -> None:
+    before, after = two_actions(), renamed(two_actions(), NEW)
+    grown, wanted = grow_policy_trees(before), grow_policy_trees(after)
+    named = renamed_trees(grown, after)
+    for one, other in zip(named, wanted, strict=True):
+        assert (one.source, one.dimension) == (other.source, other.dimension)
+        assert one.threshold.tobytes() == other.threshold.tobytes()
+        assert one.counts.tobytes() == other.counts.tobytes()
+    rules = mine_rules(named, supp_min=0.0, conf_min=1.0)
+    assert rules == mine_rules(wanted, supp_min=0.0, conf_min=1.0)
+    assert all(one is other for one, other in zip(renamed_trees(named, after), named, strict=True))
+
+
+def test_pairs_are_known_under_every_name() -> None:
+    pairs = two_actions()
+    assert digest_of_pairs(pairs) == digest_of_pairs(renamed(pairs, NEW)) != pairs.digest
+    assert digest_of_pairs(pairs) != digest_of_pairs(pairs.select([0, 1]))
+    other = replace(pairs, actions=pairs.actions[::-1])
+    assert digest_of_pairs(pairs) != digest_of_pairs(other)
 
 
 def test_names_of_other_data_rename_what_fits() -> None:
