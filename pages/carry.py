@@ -46,7 +46,7 @@ WHAT = {
     "ONNX": "A model for ONNX runtimes; writing it needs the package onnx.",
 }
 FILE, MATRIX = "File", "Rules by features"
-LINES = 300
+LINES = 120
 
 
 def offered() -> list[str]:

@@ -116,7 +116,7 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
         assert "lean (turns)" in recorder
         assert {action for (action,) in recorder["Done"]} <= {"west", "east"}
         assert "west" in html(app)
-        assert "push left" not in shown
+        assert "push left" not in html(app)
     # Without the names, the replay of before is not shown under them.
     app.switch_page("names.py").run()
     app.button(key="names_back").click().run()
