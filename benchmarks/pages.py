@@ -56,7 +56,10 @@ def what_if(quick: bool) -> Iterable[Row]:
                 f"What if, a feature's slider, {rules}",
                 f"what_if?{query}",
                 partial(_arrow, name="angle (rad)"),
-                (".st-key-lines", ".st-key-decision", TABLES),
+                tuple(
+                    f".st-key-{part}"
+                    for part in ("decision", "lines", "changes", "misses", "tree_figure")
+                ),
             ),
         )
 
@@ -83,7 +86,7 @@ def difference(quick: bool) -> Iterable[Row]:
             "Difference, another second set",
             "difference",
             partial(_option, label="Second set", options=("compact", "unfiltered")),
-            (".js-plotly-plot", TABLES),
+            (".st-key-confusion", TABLES),
         ),
     )
 

@@ -13,9 +13,9 @@ from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.difference_figures import confusion_figure
+from sarl_core.explaining.confusion_table import confusion_html
 from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
-from sarl_core.explaining.difference_words import decided_text, kinds_text, rows_text
+from sarl_core.explaining.difference_words import decided_text, rows_text
 from sarl_core.explaining.language import action_text, counted
 from sarl_core.mining.difference import check_comparable
 from sarl_core.mining.rules import RuleSet
@@ -71,21 +71,54 @@ def compared(
     return disagreement(ground_of(_first, states), ground_of(_second, states)), states
 
 
-@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+@st.cache_resource(max_entries=24, show_spinner="Writing the rules in plain language …")
 def rules_frame(digests: tuple[str, str, str], kinds: tuple[str, ...], _found: Disagreement) -> Any:
     """The rules that differ, as a data frame."""
     import pandas as pd
 
     rows = rule_rows(_found, kinds)
     rows["Action"] = [[action] for action in rows["Action"]]
+    if "changed" not in rows["What"]:
+        del rows["Change"]
     return pd.DataFrame(rows)
+
+
+@st.cache_resource(max_entries=24, show_spinner=False)
+def decisions(
+    digests: tuple[str, str, str],
+    names: tuple[str, str],
+    dimension: int,
+    _found: Disagreement,
+    _states: Any,
+    _shown: Any,
+) -> tuple[str, Any]:
+    """What the two say of the states, as a table in HTML, and some states as a data frame."""
+    import pandas as pd
+
+    table = confusion_html(_found, dimension, names=names, noun=noun_of(_shown))
+    rows = example_rows(_found, dimension, _states, names=names, demonstrations=_shown)
+    return table, pd.DataFrame(rows)
+
+
+def noun_of(shown: Any) -> str:
+    """What one of the states is called."""
+    return "random state" if shown is None else "demonstrated state"
+
+
+def small(text: str) -> str:
+    """Markdown as a caption has it."""
+    return f":small[:gray[{text}]]"
+
+
+def headed(title: str, *paragraphs: str) -> str:
+    """A heading and what stands below it, in one piece of Markdown."""
+    return "\n\n".join([f"### {title}", *filter(None, paragraphs)])
 
 
 def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
     """Rules added, removed, changed."""
-    st.subheader("Rules")
-    st.caption(
-        rows_text(found),
+    st.markdown(
+        headed("Rules", small(rows_text(found))),
         help="Rules are the same rule where they ask the same, or where they share more than "
         "half of the states that either of them applies to. A changed one has other conditions, "
         "says something else, was switched on or off, or has another place.",
@@ -107,8 +140,6 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
         label_visibility="collapsed",
     )
     frame = rules_frame(digests, KINDS if view == EVERY else (str(view),), found)
-    if not len(found.difference.changed) or view not in (EVERY, "changed"):
-        frame = frame.drop(columns="Change")
     column = st.column_config
     colours = {
         action_text(label, action): label_colour(label)
@@ -140,19 +171,26 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
     )
 
 
-def show_states(found: Disagreement, states: Any, names: tuple[str, str], shown: Any) -> None:
+def show_states(
+    found: Disagreement,
+    digests: tuple[str, str, str],
+    states: Any,
+    names: tuple[str, str],
+    shown: Any,
+) -> None:
     """The states that are decided differently."""
-    import pandas as pd
-
-    noun = "random state" if shown is None else "demonstrated state"
-    st.subheader("Decisions")
-    st.markdown(f"**{escaped(decided_text(found, states=noun))}**")
-    if shown is None:
-        st.caption(
-            f"The states are {counted(found.states, 'random one')} over the range of the rules' "
-            "thresholds, because the chosen demonstrations are of something else. They say where "
-            "the two differ, not how often an agent comes there."
+    random = (
+        f"The states are {counted(found.states, 'random one')} over the range of the rules' "
+        "thresholds, because the chosen demonstrations are of something else. They say where "
+        "the two differ, not how often an agent comes there."
+    )
+    st.markdown(
+        headed(
+            "Decisions",
+            f"**{escaped(decided_text(found, states=noun_of(shown)))}**",
+            small(random) if shown is None else "",
         )
+    )
     actions = found.first.actions
     at = 0
     if len(actions) > 1:
@@ -162,25 +200,21 @@ def show_states(found: Disagreement, states: Any, names: tuple[str, str], shown:
             "Action", labels, default=most, key="decided", bind="query-params", required=True
         )
         at = labels.index(name) if name in labels else 0
-    if found.differs[:, at].any():
-        told = (f"the first ({names[0]})", f"the second ({names[1]})")
-        st.caption(f"Differently: {escaped(kinds_text(found, at, told))}.")
-    st.plotly_chart(
-        confusion_figure(found, at, names=names, noun=noun),
-        key="confusion",
-        config={"displayModeBar": False},
-        alt=f"What {names[0]} says against what {names[1]} says, in numbers of states",
-    )
-    columns = example_rows(found, at, states, names=names, demonstrations=shown)
-    count = len(next(iter(columns.values())))
+    table, examples = decisions(digests, names, at, found, states, shown)
+    with st.container(key="confusion"):
+        st.html(table)
+    count = len(examples)
     if not count:
         return
     several = int(found.differs[:, at].sum())
-    st.subheader("Example states")
-    if several > count:
-        st.caption(f"{count} of {several:,}, evenly spread.")
+    st.markdown(
+        headed(
+            "Example states",
+            small(f"{count} of {several:,}, evenly spread.") if several > count else "",
+        )
+    )
     st.dataframe(
-        pd.DataFrame(columns),
+        examples,
         hide_index=True,
         height=table_height(count, 9),
         key="examples",
@@ -216,5 +250,5 @@ try:
 except SarlError as error:
     st.error(in_full(str(error)), icon=":material/error:")
     st.stop()
-show_states(result, compared_on, (one_name, other_name), chosen)
+show_states(result, told_by, compared_on, (one_name, other_name), chosen)
 show_rules(result, told_by)

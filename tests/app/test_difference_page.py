@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
+import re
+from itertools import product
 
 from sarl_core import Shield, load_demonstrations, mine_rules
 from sarl_core.mining.rule_files import rules_to_json
-from tests.app.screens import ROUTER, errors, open_page, texts
+from tests.app.screens import ROUTER, errors, html, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -24,15 +25,14 @@ def test_two_sets_are_compared_on_the_demonstrations() -> None:
     one, other = said(COARSE), said(FINE)
     different = sum(a != b for a, b in zip(one, other, strict=True))
     assert f"decide {different:,} of {len(CARTPOLE):,} demonstrated states" in texts(app)
-    chart = json.loads(app.get("plotly_chart")[0].proto.spec)
-    told = {trace["name"]: trace["text"] for trace in chart["data"] if "text" in trace}
-    for row in range(3):
-        for column in range(3):
-            count = sum((a, b) == (row, column) for a, b in zip(one, other, strict=True))
-            cell = (
-                told["counts"][3 * row + row] if row == column else told["different"][row][column]
-            )
-            assert cell == (f"{count:,}" if count else "")
+    (table,) = (part for part in app.get("html") if "sarl-confusion" in part.proto.body)
+    counted = re.findall(r'<td title="([^"]*)"[^>]*>([\d,]*)</td>', table.proto.body)
+    assert len(counted) == 9
+    words = ("push left", "push right", "no rule")
+    for (title, cell), (row, column) in zip(counted, product(range(3), repeat=2), strict=True):
+        count = sum((a, b) == (row, column) for a, b in zip(one, other, strict=True))
+        assert title.startswith(f"at the thresholds: {words[row]}; unfiltered: {words[column]}; ")
+        assert cell == (f"{count:,}" if count else "")
     examples = app.dataframe[0].value
     assert len(examples) == min(50, different)
     shown = examples[["At the thresholds says", "Unfiltered says"]]
@@ -42,6 +42,15 @@ def test_two_sets_are_compared_on_the_demonstrations() -> None:
     assert counts.get("added", 0) - counts.get("removed", 0) == len(FINE) - len(COARSE)
     app.button_group(key="kind").set_value("added").run()
     assert set(app.dataframe[1].value["What"]) == {"added"}
+
+
+def test_a_set_that_was_compared_before_shows_the_same_again() -> None:
+    app = open_page("difference", data="cartpole", first="filtered", second="unfiltered")
+    first, rules = html(app), app.dataframe[1].value
+    for second in ("compact", "unfiltered"):
+        app.selectbox(key="second").set_value(second).run()
+        assert (html(app) == first) == (second == "unfiltered")
+        assert app.dataframe[1].value.equals(rules) == (second == "unfiltered")
 
 
 def test_a_set_and_itself() -> None:
@@ -65,7 +74,7 @@ def test_an_own_file_is_asked_for_and_one_for_something_else_is_refused() -> Non
     app.file_uploader(key="second_file").set_value(("fine.json", content, "application/json"))
     app.run()
     assert not errors(app)
-    assert "fine.json" in texts(app)
+    assert "fine.json says" in html(app)
 
 
 def test_one_action_of_several_at_a_time() -> None:

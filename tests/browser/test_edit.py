@@ -49,7 +49,7 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     # The edits are still there on another page, and go into a comparison.
     screen.get_by_role("link", name="Compare with the unedited set").click()
     expect(screen.get_by_role("heading", name="Difference", level=1)).to_be_visible()
-    expect(screen.locator(".js-plotly-plot")).to_be_visible()
+    expect(screen.locator(".st-key-confusion table")).to_be_visible()
     settle(screen)
     assert parameters(screen)["second"] == "edited"
     expect(screen.get_by_text("1 rule added, none removed, 1 rule changed")).to_be_visible()

@@ -1,15 +1,17 @@
-"""Edits and differences in words, tables and a figure."""
+"""Edits and differences in words, tables and a table in colour."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from sarl_core import RuleSet, mine_rules
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.difference_figures import confusion_figure
+from sarl_core.explaining.colours import LAYER_SCALE
+from sarl_core.explaining.confusion_table import confusion_html
 from sarl_core.explaining.difference_tables import example_rows, rule_rows
 from sarl_core.explaining.difference_words import (
     decided_text,
@@ -149,16 +151,53 @@ def test_a_document_and_tables():
     assert "Expert did" not in example_rows(FOUND, 0, STATES, names=("a", "b"))
 
 
-def test_the_figure_shows_every_cell_and_no_markup_of_a_file():
+def cells(table):
+    """What stands in the rows of a table in HTML, and the titles of its cells."""
+    document = ElementTree.fromstring(table[table.index("<figure") :])
+    rows = document.findall(".//tbody/tr")
+    found = [[cell for cell in row if cell.tag == "td"] for row in rows]
+    return document, [[cell.text or "" for cell in row] for row in found], found
+
+
+def test_the_table_shows_every_cell_and_no_markup_of_a_file():
     odd = (LabelledDimension("push", ("<b>left</b>", "right")),)
     found = disagreement(replace(RULES, actions=odd), replace(EDITED, actions=odd), STATES)
-    figure = confusion_figure(found, 0, names=("<i>a</i>", "b"))
-    told = {trace.name: trace for trace in figure.data}
-    assert list(told["different"].text[0]) == ["", "2", "3"]
-    assert list(told["different"].text[2]) == ["", "5", ""]
-    assert "<b>left" not in figure.to_json()
-    assert "<i>" not in figure.to_json()
-    assert figure.layout.xaxis.ticktext[-1] == "no rule"
+    names = ('<i>"a"</i>', "b & c")
+    table = confusion_html(found, 0, names=names)
+    document, texts, rows = cells(table)
+    assert texts == [["", "2", "3"], ["", "", ""], ["", "5", ""]]
+    assert rows[0][1].get("title") == '<i>"a"</i>: <b>left</b>; b & c: right; 2 states'
+    assert rows[2][1].get("title") == '<i>"a"</i>: no rule; b & c: right; 5 states'
+    heads = ["".join(head.itertext()) for head in document.iter("th")]
+    assert heads == [
+        "b & c says",
+        *("<b>left</b>", "right", "no rule"),
+        '<i>"a"</i> says',
+        *("<b>left</b>", "right", "no rule"),
+    ]
+    for tag in ("b", "i"):
+        assert document.find(f".//{tag}") is None
+    told = kinds_text(found, 0, (f"the first ({names[0]})", f"the second ({names[1]})"))
+    assert told in "".join(document.find("figcaption").itertext())
+    assert document.find(".//table").get("aria-label") == (
+        'What <i>"a"</i> says against what b & c says, in numbers of states'
+    )
+
+
+def test_the_table_tells_agreement_from_disagreement_by_colour():
+    half = apply(RULES, [Add(HAND)])
+    _, texts, rows = cells(confusion_html(disagreement(RULES, half, STATES), 0, names=("a", "b")))
+    assert texts == [["3", "2", ""], ["", "", ""], ["", "5", ""]]
+    for at, row in enumerate(rows):
+        assert [cell.get("class") == "same" for cell in row] == [at == 0, at == 1, at == 2]
+        assert row[at].get("style") is None
+    few, many = rows[0][1].get("style"), rows[2][1].get("style")
+    assert few != many  # the more states, the darker
+    assert f"background:{LAYER_SCALE[-1][1]}" in many
+    assert rows[1][0].get("style") is None
+    same = confusion_html(disagreement(RULES, RULES, STATES), 0, names=("a", "b"))
+    assert "Differently" not in same
+    assert cells(same)[1] == [["5", "", ""], ["", "", ""], ["", "", "5"]]
 
 
 def test_demonstrations_fit_rules_of_their_features_and_actions():
