@@ -1,37 +1,48 @@
-"""What the shield would do along each feature of a state, as a picture."""
+"""What the shield would do along each feature of a state, as bars in HTML without script."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 
 import numpy as np
-import plotly.graph_objects as go
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.language import label_text, number_text
-from sarl_core.explaining.markup import plain
+from sarl_core.explaining.path_table import label_key
 from sarl_core.explaining.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.near import Line
 
-_ROW = 34  # pixels
 _PALE = 0.32
-_QUIET = "#7d8a95"
-_HAIR = 0.004  # of a row: what is narrower is drawn so wide
+# The mark is dark with a white edge, so that it is seen on every colour and on both grounds.
+_STYLE = """<style>
+.sarl-lines { font-size: 0.82rem; line-height: 1.25; }
+.sarl-lines p { margin: 0 0 0.4rem 0; font-size: 1rem; font-weight: 600; }
+.sarl-lines p.note { margin: 0.3rem 0 0 0; font-size: 0.875rem; font-weight: 400; opacity: 0.65; }
+.sarl-lines .row { display: flex; align-items: flex-start; gap: 0.6rem; padding: 0.2rem 0; }
+.sarl-lines .name { flex: none; width: 28%; max-width: 11rem; text-align: right;
+  overflow-wrap: anywhere; }
+.sarl-lines .track { flex: 1; min-width: 0; padding-right: 4px; }
+.sarl-lines .bar { position: relative; height: 17px; }
+.sarl-lines .bar span { position: absolute; top: 0; bottom: 0; min-width: 2px; }
+.sarl-lines .bar b { position: absolute; top: -3px; bottom: -3px; width: 3px; margin-left: -1.5px;
+  background: #1d2730; box-shadow: 0 0 0 1.5px #ffffff; border-radius: 1px; }
+.sarl-lines .ends { display: flex; justify-content: space-between; font-size: 0.7rem;
+  opacity: 0.65; padding-top: 3px; }
+</style>"""
 
 
-def lines_figure(
+def lines_html(
     lines: Sequence[Line],
     ranges: Sequence[tuple[float, float]],
     values: Sequence[float],
     features: Sequence[Feature],
     dimension: int,
     rule_set: RuleSet,
-    *,
-    dark: bool = False,
-) -> go.Figure:
+) -> str:
     """A bar for each feature, coloured by what would be executed along it.
 
     Full colour where a rule decides, pale where the agent's action is passed on because no rule
@@ -40,83 +51,28 @@ def lines_figure(
     Args:
         lines: Of the features to show, from top to bottom.
         ranges: Ends of each bar, in the feature's unit.
-        values: The present values.
+        values: The present values, each within its bar.
         features: Names and units, likewise.
         dimension: Action dimension that gives the colours.
         rule_set: The shield's.
-        dark: Whether it stands on dark ground.
 
     Returns:
-        Every bar is as wide as the figure; the present value is marked on it.
+        HTML without script, every name escaped. Every bar is as wide as there is room; the
+        present value is marked on it.
     """
     labels = rule_set.actions[dimension]
-    bars: dict[tuple[int, bool], list[tuple[float, float, int, str]]] = {}
-    for row, (line, (low, high), feature) in enumerate(zip(lines, ranges, features, strict=True)):
-        for start, end, label, ruled in stretches(line, (low, high), dimension, rule_set):
-            left, right = (start - low) / (high - low), (end - low) / (high - low)
-            text = (
-                f"{plain(feature.name)} {number_text(start, apart_from=end)} to "
-                f"{plain(with_unit(number_text(end, apart_from=start), feature))}<br>"
-                + plain(_does(label, labels))
-                + ("" if ruled else ", as the agent wants")
-            )
-            bars.setdefault((label, ruled), []).append((left, right, row, text))
-    figure = go.Figure()
-    for (label, ruled), parts in sorted(bars.items()):
-        colour = label_colour(label)
-        figure.add_bar(
-            base=[left for left, *_ in parts],
-            x=[max(right - left, _HAIR) for left, right, *_ in parts],
-            y=[row for _, _, row, _ in parts],
-            orientation="h",
-            width=0.5,
-            marker={"color": colour if ruled else faded(colour, _PALE), "line": {"width": 0}},
-            name=plain(_does(label, labels)),
-            customdata=[text for *_, text in parts],
-            hovertemplate="%{customdata}<extra></extra>",
-        )
-    places = [
-        (value - low) / (high - low) for value, (low, high) in zip(values, ranges, strict=True)
-    ]
-    figure.add_scatter(
-        x=places,
-        y=list(range(len(lines))),
-        mode="markers",
-        marker={
-            "symbol": "line-ns-open",
-            "size": 17,
-            "color": "#f1f5f7" if dark else "#1d2730",
-            "line": {"width": 3, "color": "#f1f5f7" if dark else "#1d2730"},
-        },
-        customdata=[
-            plain(f"{feature.name} is {with_unit(number_text(value), feature)}")
-            for value, feature in zip(values, features, strict=True)
-        ],
-        hovertemplate="%{customdata}<extra></extra>",
-        name="the state",
+    rows = "".join(
+        _row(stretches(line, ends, dimension, rule_set), ends, value, feature, labels)
+        for line, ends, value, feature in zip(lines, ranges, values, features, strict=True)
     )
-    _add_ends(figure, ranges, features)
-    figure.update_layout(
-        height=_ROW * len(lines) + 16,
-        margin={"l": 8, "r": 8, "t": 8, "b": 8},
-        barmode="overlay",
-        showlegend=False,
-        hovermode="closest",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+    return (
+        f'{_STYLE}<div class="sarl-lines">'
+        "<p>If one feature were different, and all others as they are</p>"
+        f"{label_key(labels)}{rows}"
+        '<p class="note">Each bar is a feature from its least to its largest demonstrated value, '
+        "the mark is the state. Full colour: a rule decides. Pale: the agent's action is passed "
+        "on.</p></div>"
     )
-    figure.update_xaxes(visible=False, range=[-0.012, 1.012], fixedrange=True)
-    figure.update_yaxes(
-        tickvals=list(range(len(lines))),
-        ticktext=[plain(feature.name) for feature in features],
-        range=[len(lines) - 0.4, -0.6],
-        fixedrange=True,
-        showgrid=False,
-        zeroline=False,
-        ticklabelstandoff=6,
-    )
-    return figure
 
 
 def stretches(
@@ -157,27 +113,58 @@ def stretches(
     return found
 
 
-def _does(label: int, labels: LabelledDimension) -> str:
-    return label_text(label, labels) if 0 <= label < labels.n_labels else f"action {label}"
+def _row(
+    parts: Sequence[tuple[float, float, int, bool]],
+    ends: tuple[float, float],
+    value: float,
+    feature: Feature,
+    labels: LabelledDimension,
+) -> str:
+    low, high = ends
+    # The narrowest last: they are drawn wider than they are, and stay on top of their neighbours.
+    bar = "".join(
+        _part(part, ends, feature, labels)
+        for part in sorted(parts, key=lambda part: part[0] - part[1])
+    )
+    here = next(part for part in reversed(parts) if part[0] <= value or part is parts[0])
+    now = escape(f"{feature.name} is {with_unit(number_text(value), feature)}")
+    place = 100 * (value - low) / (high - low)
+    under = "".join(f"<span>{escape(with_unit(number_text(end), feature))}</span>" for end in ends)
+    return (
+        f'<div class="row" role="img" aria-label="{now}: {_done(here, labels)}">'
+        f'<div class="name">{escape(feature.name)}</div><div class="track"><div class="bar">{bar}'
+        f'<b style="left:{place:.2f}%" title="{now}"></b></div>'
+        f'<div class="ends">{under}</div></div></div>'
+    )
 
 
-def _add_ends(
-    figure: go.Figure, ranges: Sequence[tuple[float, float]], features: Sequence[Feature]
-) -> None:
-    """The ends of each bar, written under it in small.
+def _part(
+    part: tuple[float, float, int, bool],
+    ends: tuple[float, float],
+    feature: Feature,
+    labels: LabelledDimension,
+) -> str:
+    start, end, label, ruled = part
+    low, high = ends
+    # What ends with the bar hangs at its right, so that it stays within it however narrow it is.
+    side = (
+        f"left:{100 * (start - low) / (high - low):.2f}%"
+        if end < high or start == low
+        else "right:0"
+    )
+    colour = label_colour(label) if ruled else faded(label_colour(label), _PALE)
+    between = (
+        f"{feature.name} {number_text(start, apart_from=end)} to "
+        f"{with_unit(number_text(end, apart_from=start), feature)}"
+    )
+    return (
+        f'<span style="{side};width:{100 * (end - start) / (high - low):.2f}%;'
+        f'background:{colour}" title="{escape(between)}: {_done(part, labels)}"></span>'
+    )
 
-    As points with text: annotations take Plotly a hundred times as long.
-    """
-    for side, place, anchor in ((0, 0.0, "middle right"), (1, 1.0, "middle left")):
-        figure.add_scatter(
-            x=[place] * len(ranges),
-            y=[row + 0.4 for row in range(len(ranges))],
-            mode="text",
-            text=[
-                plain(with_unit(number_text(ends[side]), feature))
-                for ends, feature in zip(ranges, features, strict=True)
-            ],
-            textposition=anchor,
-            textfont={"size": 10, "color": _QUIET},
-            hoverinfo="skip",
-        )
+
+def _done(part: tuple[float, float, int, bool], labels: LabelledDimension) -> str:
+    """What is executed in a stretch, escaped."""
+    _, _, label, ruled = part
+    does = label_text(label, labels) if 0 <= label < labels.n_labels else f"action {label}"
+    return escape(does) + (", by a rule" if ruled else ", as the agent wants")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from sarl_core.explaining.what_if import (
     node_of_way,
     outside_texts,
 )
-from sarl_core.explaining.what_if_figures import lines_figure, stretches
+from sarl_core.explaining.what_if_figures import lines_html, stretches
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
@@ -140,24 +141,85 @@ def test_where_a_rule_abstains_the_bar_is_pale():
     ]
 
 
-def test_the_picture_has_a_bar_and_a_mark_for_each_feature():
-    near = Neighbourhood(Shield(SIDES))
-    lines = near.lines(np.zeros(3, dtype=np.float32), 0)
-    figure = lines_figure(lines, [(-1.0, 1.0)] * 3, [0.0] * 3, FEATURES, 0, SIDES)
-    bars = [trace for trace in figure.data if trace.type == "bar"]
-    assert {trace.marker.color for trace in bars} == {faded(label_colour(0), 0.32), label_colour(1)}
-    for row in range(3):
-        wide = [
-            (base, base + length)
-            for trace in bars
-            for base, length, at in zip(trace.base, trace.x, trace.y, strict=True)
-            if at == row
-        ]
-        assert min(left for left, _ in wide) == 0.0
-        assert max(right for _, right in wide) == pytest.approx(1.0)
-    mark = next(trace for trace in figure.data if trace.name == "the state")
-    assert list(mark.x) == [0.5] * 3
-    assert "<b>" not in "".join(figure.layout.yaxis.ticktext)
+def drawn(lines, ends, state):
+    """The rows of the picture, as elements."""
+    found = lines_html(lines, [ends] * len(lines), state, FEATURES, 0, SIDES)
+    root = ElementTree.fromstring(f"<root>{found}</root>")
+    return root.findall(".//div[@class='row']")
+
+
+def style(element):
+    """What an element's style says."""
+    return dict(part.split(":") for part in element.get("style").split(";"))
+
+
+def test_the_bar_has_a_part_for_each_stretch_in_its_colour():
+    """Of the angle, -1 to 1 rad: pale left to 0.125, full right to 0.5, pale left again."""
+    lines = Neighbourhood(Shield(SIDES)).lines(np.zeros(3, dtype=np.float32), 0)
+    row = drawn(lines, (-1.0, 1.0), [0.0] * 3)[0]
+    parts = {part.get("title"): style(part) for part in row.findall(".//span[@style]")}
+    pale, full = faded(label_colour(0), 0.32), label_colour(1)
+    assert parts == {
+        "pole angle -1 to 0.125 rad: left, as the agent wants": {
+            "left": "0.00%",
+            "width": "56.25%",
+            "background": pale,
+        },
+        "pole angle 0.125 to 0.5 rad: right, by a rule": {
+            "left": "56.25%",
+            "width": "18.75%",
+            "background": full,
+        },
+        # What ends with the bar hangs at its right.
+        "pole angle 0.5 to 1 rad: left, as the agent wants": {
+            "right": "0",
+            "width": "25.00%",
+            "background": pale,
+        },
+    }
+
+
+def test_the_narrowest_stretch_lies_on_top():
+    lines = Neighbourhood(Shield(SIDES)).lines(np.zeros(3, dtype=np.float32), 0)
+    parts = drawn(lines, (-1.0, 1.0), [0.0] * 3)[0].findall(".//span[@style]")
+    widths = [float(style(part)["width"].rstrip("%")) for part in parts]
+    assert widths == sorted(widths, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("angle", "place", "said"),
+    [
+        (-1.0, "0.00%", "pole angle is -1 rad: left, as the agent wants"),
+        (0.0, "50.00%", "pole angle is 0 rad: left, as the agent wants"),
+        (0.125, "56.25%", "pole angle is 0.125 rad: left, as the agent wants"),
+        (0.25, "62.50%", "pole angle is 0.25 rad: right, by a rule"),
+        (1.0, "100.00%", "pole angle is 1 rad: left, as the agent wants"),
+    ],
+)
+def test_the_mark_stands_at_the_present_value_and_is_told_to_screen_readers(angle, place, said):
+    state = [angle, 0.0, 0.0]
+    lines = Neighbourhood(Shield(SIDES)).lines(np.array(state, dtype=np.float32), 0)
+    row = drawn(lines, (-1.0, 1.0), state)[0]
+    (mark,) = row.findall(".//b")
+    assert style(mark) == {"left": place}
+    assert row.get("role") == "img"
+    assert row.get("aria-label") == said
+
+
+def test_every_feature_has_its_name_and_its_ends_and_none_is_markup():
+    lines = Neighbourhood(Shield(SIDES)).lines(np.zeros(3, dtype=np.float32), 0)
+    rows = drawn(lines, (-1.0, 2.5), [0.0] * 3)
+    names = [row.find("div[@class='name']") for row in rows]
+    assert [name.text for name in names] == [feature.name for feature in FEATURES]
+    ends = [[end.text for end in row.findall(".//div[@class='ends']/span")] for row in rows]
+    assert ends == [["-1 rad", "2.5 rad"], ["-1", "2.5"], ["-1", "2.5"]]
+    evil = replace(PUSH, label_names=("<i>left", '"east'))
+    found = lines_html(
+        lines, [(-1.0, 1.0)] * 3, [0.0] * 3, FEATURES, 0, replace(SIDES, actions=(evil,))
+    )
+    assert "&lt;i&gt;left" in found
+    assert "<i>left" not in found
+    assert '"east' not in found
 
 
 # --- the way of a state -------------------------------------------------------------------------

@@ -1,0 +1,291 @@
+"""What the page What if says of a state, in HTML without script; every name escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.explaining.language import action_text, counted, number_text, sentence
+from sarl_core.explaining.what_if import (
+    change_text,
+    condition_views,
+    exact_text,
+    executed_text,
+    near_miss_text,
+    outside_texts,
+    with_unit,
+)
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.near import DecisionChange, NearMiss
+from sarl_core.shielding.sampling import Span
+from sarl_core.shielding.shield import Decision, Outside
+
+PLACED = "A person gave this rule its place: it is asked before the tree is."
+_SHOWN = 3  # features beyond the data that are named
+
+_STYLE = """<style>
+.sarl-state { font-size: 1rem; line-height: 1.55; }
+.sarl-state h3 { font-size: 1.1rem; font-weight: 600; line-height: 1.2;
+  letter-spacing: -0.005em; margin: 0; padding: 0.75rem 0 0.8rem 0; }
+.sarl-state h4 { font-size: 1rem; font-weight: 600; line-height: 1.4; margin: 0;
+  padding: 0.4rem 0; }
+.sarl-state p { margin: 0 0 0.5rem 0; }
+.sarl-state p:last-child { margin-bottom: 0; }
+.sarl-state .badge { display: inline-block; padding: 0 0.5rem; border-radius: 0.5rem;
+  margin-right: 0.4rem; font-size: 0.85rem; background: rgba(128,140,150,0.18); }
+.sarl-state .changed { background: rgba(213,94,0,0.2); }
+.sarl-state .allowed { background: rgba(0,158,115,0.2); }
+.sarl-state .beyond { background: rgba(194,24,91,0.2); }
+.sarl-state .quiet { opacity: 0.65; font-size: 0.875rem; }
+.sarl-state .rows { overflow: auto; max-height: 24rem; margin-bottom: 0.5rem; }
+.sarl-state table { width: 100%; border-collapse: collapse; font-size: 0.875rem; }
+.sarl-state th { text-align: left; font-weight: 400; opacity: 0.7; white-space: nowrap;
+  padding: 0 0.8rem 0.2rem 0; }
+.sarl-state th[title] { text-decoration: underline dotted; text-underline-offset: 3px;
+  cursor: help; }
+.sarl-state td { padding: 0.24rem 0.8rem 0.24rem 0;
+  border-top: 1px solid rgba(128,140,150,0.25); }
+.sarl-state .w { min-width: 11rem; }
+.sarl-state .m { min-width: 7rem; }
+.sarl-state .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
+</style>"""
+
+_WIDTH = "interquartile range, the width of the middle half of its demonstrated values"
+_CHANGES = (
+    ("If", "w", ""),
+    ("Executed", "m", ""),
+    ("Rule", "", ""),
+    ("In spreads", "n", f"The change in units of the feature's {_WIDTH}"),
+    (
+        "From exactly",
+        "n",
+        "The nearest float32 number at which the decision is another: one step less changes "
+        "nothing",
+    ),
+    ("Demonstrated", "", "Whether values as far as this were demonstrated"),
+)
+_MISSES = (
+    ("Rule", "", ""),
+    ("Says", "m", ""),
+    ("Would apply if", "w", ""),
+    ("In spreads", "n", "The change in units of the features' interquartile ranges, summed up"),
+    (
+        "In force",
+        "",
+        "Whether it would then decide; else a rule that was given its place before it does",
+    ),
+    ("From exactly", "n", ""),
+)
+_CONDITIONS = (("Condition", "", ""), ("The state has", "n", ""), ("Room to move", "n", ""))
+
+
+def decision_html(
+    decision: Decision,
+    rule: Rule | None,
+    state: NDArray[np.float32],
+    rule_set: RuleSet,
+    outside: Outside,
+) -> str:
+    """What is executed, and the rule behind it.
+
+    Args:
+        decision: In the state.
+        rule: In force there in the action dimension that is looked at, or None.
+        state: Shape (d,).
+        rule_set: The shield's.
+        outside: What the shield does outside the data of a rule.
+
+    Returns:
+        HTML without script: how the rules met the agent's action, the action executed, the rule
+        as a sentence, its conditions beside the state's values, and whether the state lies
+        within its data.
+    """
+    if decision.intervened:
+        badges = _badge("Changed by the rules", "changed")
+    elif decision.outside and outside == "abstain":
+        badges = _badge("Rule abstains")
+    elif any(one is not None for one in decision.rules):
+        badges = _badge("Allowed by the rules", "allowed")
+    else:
+        badges = _badge("No rule applies")
+    if decision.outside:
+        badges += _badge("Outside the data", "beyond")
+    proposed, executed = (
+        executed_text(tuple(np.asarray(values, dtype=float).reshape(-1).tolist()), rule_set.actions)
+        for values in (decision.proposed, decision.executed)
+    )
+    heading = (
+        f"The agent wants {proposed}; executed is {executed}"
+        if decision.intervened
+        else f"{executed[:1].upper()}{executed[1:]} is executed, as the agent wants"
+    )
+    return _section(
+        f"<div>{badges}</div><h4>{escape(heading)}</h4>{_rule_html(rule, state, rule_set)}"
+    )
+
+
+def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet) -> str:
+    if rule is None:
+        return _note("No rule applies to this state: the agent's action is passed on as it is.")
+    values = tuple(state.astype(np.float64).tolist())
+    views = condition_views(rule, values, rule_set)
+    table = _table(_CONDITIONS, [(view.condition, view.value, view.room) for view in views])
+    said = f"<p><b>Rule {escape(rule.id)}.</b> {escape(sentence(rule, rule_set))}</p>"
+    return f"{said}{table if views else ''}{_data_html(rule, values, rule_set)}"
+
+
+def _data_html(rule: Rule, values: tuple[float, ...], rule_set: RuleSet) -> str:
+    """Whether the state lies within the data of a rule."""
+    if rule.box is None:
+        return _note("It is not kept where the data of this rule lay.")
+    texts = outside_texts(rule, values, rule_set.source.features)
+    if not texts:
+        return _note(
+            "The state lies inside this rule's data: every feature is between the least and the "
+            "largest value seen where it applies."
+        )
+    shown = escape("; ".join(texts[:_SHOWN]))
+    others = len(texts) - _SHOWN
+    more = f"; and {counted(others, 'feature')} more" if others > 0 else ""
+    return f"<p><b>Outside this rule's data:</b> {shown}{more}.</p>"
+
+
+def changes_html(
+    changes: Sequence[DecisionChange], spans: Sequence[Span], rule_set: RuleSet
+) -> str:
+    """The least change of each feature that makes the shield execute another action.
+
+    Args:
+        changes: The least first.
+        spans: Of all d features.
+        rule_set: The shield's.
+
+    Returns:
+        HTML without script: the first as a sentence, and all in a table.
+    """
+    heading = "<h3>The least change that changes the decision</h3>"
+    if not changes:
+        none = "No change of a single feature changes what is executed."
+        return _section(f"{heading}<p>{none}</p>")
+    rows = [_change_row(change, spans, rule_set) for change in changes]
+    condition, does, *_ = rows[0]
+    said = f"<p>Executed would be <b>{escape(does)}</b> if {escape(condition)}.</p>"
+    return _section(f"{heading}{said}{_table(_CHANGES, rows)}")
+
+
+def _change_row(
+    change: DecisionChange, spans: Sequence[Span], rule_set: RuleSet
+) -> tuple[str, ...]:
+    moved = change.change
+    feature, span = rule_set.source.features[moved.feature], spans[moved.feature]
+    rules = [rule_set.rules[rule].id for rule in change.rules.tolist() if rule >= 0]
+    return (
+        change_text(moved, feature),
+        executed_text(tuple(change.executed.astype(float).tolist()), rule_set.actions),
+        ", ".join(rules) or "none",
+        number_text(change.distance),
+        with_unit(exact_text(moved.after), feature),
+        _yes(span.low <= moved.after <= span.high),
+    )
+
+
+def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
+    """The rules that nearly apply.
+
+    Args:
+        misses: In the order in which they are shown.
+        rule_set: The shield's.
+
+    Returns:
+        HTML without script, in a table.
+    """
+    heading = "<h3>Rules that nearly apply</h3>"
+    if not misses:
+        none = "No rule would apply if one or two features were different."
+        return _section(f"{heading}<p>{none}</p>")
+    note = _note(
+        "First those that lack one feature, then those that lack two; each with the least change "
+        "that lets it apply."
+    )
+    return _section(
+        f"{heading}{_table(_MISSES, [_miss_row(miss, rule_set) for miss in misses])}{note}"
+    )
+
+
+def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
+    rule = rule_set.rules[miss.rule]
+    features = rule_set.source.features
+    return (
+        rule.id,
+        action_text(rule.action, rule_set.actions[rule.dimension]),
+        near_miss_text(miss.changes, features),
+        number_text(miss.distance),
+        _yes(miss.in_force),
+        ", ".join(
+            with_unit(exact_text(change.after), features[change.feature]) for change in miss.changes
+        ),
+    )
+
+
+def way_html(table: str, rule: Rule | None) -> str:
+    """The way of the state through rules that are not of the tree on screen.
+
+    Args:
+        table: Of its queries, as HTML.
+        rule: That it ends at, or None.
+
+    Returns:
+        HTML without script.
+    """
+    placed = _note(PLACED) if rule is not None and rule.placed else ""
+    note = _note(
+        "These rules were not cut from the tree of the chosen demonstrations, so it is not drawn."
+    )
+    return _section(f"<h3>Its way through the rules</h3>{placed}{table}{note}")
+
+
+# --- the parts ---------------------------------------------------------------------------------
+
+
+def _section(inner: str) -> str:
+    return f'{_STYLE}<div class="sarl-state">{inner}</div>'
+
+
+def _badge(text: str, css: str = "") -> str:
+    return f'<span class="badge {css}">{text}</span>'
+
+
+def _note(text: str) -> str:
+    return f'<p class="quiet">{escape(text)}</p>'
+
+
+def _yes(holds: bool) -> str:
+    return "yes" if holds else "no"
+
+
+def _table(columns: Sequence[tuple[str, str, str]], rows: Sequence[Sequence[str]]) -> str:
+    """A table whose columns are a title, a CSS class and help each."""
+    head = "".join(
+        f"<th{_attribute('class', css)}{_attribute('title', told)}>{escape(title)}</th>"
+        for title, css, told in columns
+    )
+    body = "".join(
+        "<tr>"
+        + "".join(
+            f"<td{_attribute('class', css)}>{escape(cell)}</td>"
+            for (_, css, _), cell in zip(columns, row, strict=True)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<div class="rows"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+def _attribute(name: str, value: str) -> str:
+    return f' {name}="{escape(value)}"' if value else ""
