@@ -414,20 +414,3 @@ def settle(page: str) -> None:
 def is_dark() -> bool:
     """Whether the visitor's theme is dark."""
     return str(st.context.theme.get("type", "light")) == "dark"
-
-
-# --- for the pages Demonstrations and Replay ---------------------------------------------------
-
-
-def with_own(options: tuple[str, ...], key: str) -> tuple[str, ...]:
-    """Options of a select box that also takes typed ones, with the typed one among them.
-
-    Args:
-        options: The usual ones.
-        key: Of the widget; it is bound to the URL.
-
-    Returns:
-        The options, and what was typed or came with the URL.
-    """
-    own = st.session_state.get(key) or st.query_params.get(key)
-    return options if own is None or own in options else (*options, str(own))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import _state as state
 import streamlit as st
 from _environments import registered
+from _url import with_own
 from _words import in_full
 
 from sarl_core.demonstrations.formats import (
@@ -130,7 +131,7 @@ def upload_section(*, expanded: bool) -> None:
         )
         right.selectbox(
             "Environment (optional)",
-            state.with_own(ENVIRONMENTS, "upload_env"),
+            with_own(ENVIRONMENTS, "upload_env"),
             index=None,
             accept_new_options=True,
             placeholder="none",

@@ -55,3 +55,17 @@ def set_url_choice(name: str, value: str, default: str = "") -> None:
             st.query_params[name] = value
     elif name in st.query_params:
         del st.query_params[name]
+
+
+def with_own(options: tuple[str, ...], key: str) -> tuple[str, ...]:
+    """Options of a select box that also takes typed ones, with the typed one among them.
+
+    Args:
+        options: The usual ones.
+        key: Of the widget; it is bound to the URL.
+
+    Returns:
+        The options, and what was typed or came with the URL.
+    """
+    own = st.session_state.get(key) or st.query_params.get(key)
+    return options if own is None or own in options else (*options, str(own))

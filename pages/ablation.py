@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import _state as state
 import streamlit as st
 from _ablation_view import show
 from _ablations import Ablating, Wanted
@@ -17,13 +16,11 @@ from _choices import (
     CHOSEN,
     COMPACT,
     EDITED,
-    ENVIRONMENTS,
     FRESH_SEED,
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
     agent_for,
-    compact_file,
     continuous,
     demonstrated,
     environment_of,
@@ -31,8 +28,13 @@ from _choices import (
 )
 from _compact import THRESHOLDS
 from _comparisons import row_key
-from _edits import offered as edits_offered
-from _outside import no_boxes_notice, outside_choice
+from _settings import (
+    environment_choice,
+    no_boxes_notice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
 from _words import in_full
 
 from sarl_core.demonstrations.environments import describe_environment
@@ -49,25 +51,11 @@ SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
 JOB = "_job_ablation"
 
 
-def rule_sets() -> list[str]:
-    """The rules that can be had."""
-    there = {COMPACT: compact_file().is_file(), EDITED: edits_offered()}
-    return [name for name in RULE_SETS if there.get(name, True)]
-
-
 def settings() -> Callable[[], tuple[Wanted, str]]:
     """The widgets; what they ask for is put together when it is needed, and may be refused."""
     with st.container(border=True):
         with st.grid(4, min_column_width=150, gap="small"):
-            env = st.selectbox(
-                "Environment",
-                state.with_own(ENVIRONMENTS, "env"),
-                key="env",
-                bind="query-params",
-                accept_new_options=True,
-                help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-                "CartPole-v1.",
-            )
+            env = environment_choice()
             agent = st.selectbox(
                 "Agent",
                 AGENTS,
@@ -78,7 +66,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
             )
             rules = st.selectbox(
                 "Rules",
-                rule_sets(),
+                offered_rule_sets(RULE_SETS),
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
@@ -116,15 +104,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
             )
             projection = PROJECTIONS[0]
             if continuous(env):
-                projection = st.selectbox(
-                    "Replace by",
-                    PROJECTIONS,
-                    key="projection",
-                    bind="query-params",
-                    help="What a continuous action that breaks a rule becomes. Centre: the "
-                    "middle of the rule's interval. Clip: the nearest value in it. Expert: "
-                    "what the expert typically did there.",
-                )
+                projection = projection_choice()
             outside = outside_choice()
         policy_file = rule_file = None
         if agent == OWN_FILE:

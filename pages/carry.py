@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import _compact
-import _edits
 import _state as state
 import streamlit as st
 from _carry import MIMES, PREVIEW, content_of, matrix_of, picture_of, prepared_for, vectors_of
@@ -15,9 +14,9 @@ from _choices import (
     EDITED,
     OWN_FILE,
     PROJECTIONS,
-    compact_file,
     rules_for,
 )
+from _settings import offered_rule_sets, projection_choice
 from _words import file_name, in_full
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -49,19 +48,9 @@ FILE, MATRIX = "File", "Rules by features"
 LINES = 120
 
 
-def offered() -> list[str]:
-    """The rule sets that can be exported."""
-    choices = [CHOSEN, COMPACT, EDITED, OWN_FILE]
-    if not compact_file().is_file():
-        choices.remove(COMPACT)
-    if not _edits.offered():
-        choices.remove(EDITED)
-    return choices
-
-
 def chosen_rules() -> tuple[RuleSet, str]:
     """The rules to carry away; where there are none to be had, say why and stop."""
-    choices = offered()
+    choices = offered_rule_sets([CHOSEN, COMPACT, EDITED, OWN_FILE])
     default = COMPACT if _compact.in_force() and COMPACT in choices else CHOSEN
     choice = st.selectbox(
         "Rules",
@@ -227,15 +216,7 @@ with st.container(border=True):
         )
         projection: Projection = PROJECTIONS[0]
         if rules.actions[0].is_interval and form in ("Python", "C", "ONNX"):
-            projection = st.selectbox(
-                "Replace by",
-                PROJECTIONS,
-                key="projection",
-                bind="query-params",
-                help="What a continuous action that breaks a rule becomes. Centre: the middle of "
-                "the rule's interval. Clip: the nearest value in it. Expert: what the expert "
-                "typically did there.",
-            )
+            projection = projection_choice()
     with right:
         rounded = st.toggle(
             "Round thresholds",

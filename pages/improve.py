@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import _state as state
 import streamlit as st
 from _choices import (
-    ENVIRONMENTS,
     OWN_FILE,
     agent_for,
     digest_of,
@@ -21,6 +20,7 @@ from _choices import (
 )
 from _improve_view import show_outcome, show_shipped
 from _improving import Order, Outcome, Working, kept_outcomes
+from _settings import environment_choice
 from _words import in_full
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
@@ -76,15 +76,7 @@ def settings(demonstrations: Demonstrations) -> Choices:
     divider, policy_file = state.MIN_DIVIDER, None
     with st.container(border=True):
         with st.grid(5, min_column_width=150, gap="small"):
-            env = st.selectbox(
-                "Environment",
-                state.with_own(ENVIRONMENTS, "env"),
-                key="env",
-                bind="query-params",
-                accept_new_options=True,
-                help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-                "CartPole-v1.",
-            )
+            env = environment_choice()
             expert = st.selectbox(
                 "Expert",
                 (SHIPPED_EXPERT, OWN_FILE, NOBODY),

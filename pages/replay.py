@@ -11,14 +11,12 @@ from _choices import (
     CHOSEN,
     COMPACT,
     EDITED,
-    ENVIRONMENTS,
     FRESH_SEED,
     NO_RULES,
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
     agent_for,
-    compact_file,
     continuous,
     demonstrated,
     digest_of,
@@ -26,8 +24,6 @@ from _choices import (
     rules_for,
 )
 from _compact import THRESHOLDS
-from _edits import offered as edits_offered
-from _outside import no_boxes_notice, outside_choice
 from _over_view import comparison
 from _replay_view import numbers, step_by_step
 from _replays import (
@@ -40,6 +36,13 @@ from _replays import (
     run,
     with_progress,
 )
+from _settings import (
+    environment_choice,
+    no_boxes_notice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
 from _words import escaped
 
 from sarl_core.demonstrations.environments import describe_environment
@@ -50,12 +53,6 @@ from sarl_core.mining.rules import UNFILTERED, RuleSet
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
 
 
-def rule_sets() -> list[str]:
-    """The rules that can be had."""
-    there = {COMPACT: compact_file().is_file(), EDITED: edits_offered()}
-    return [name for name in RULE_SETS if there.get(name, True)]
-
-
 # --- what is asked for -------------------------------------------------------------------------
 
 
@@ -64,15 +61,7 @@ def settings() -> Callable[[], Order]:
     with st.container(border=True):
         in_a_row = 6 if continuous(st.session_state.get("env")) else 5
         with st.grid(in_a_row, min_column_width=150, gap="small"):
-            env = st.selectbox(
-                "Environment",
-                state.with_own(ENVIRONMENTS, "env"),
-                key="env",
-                bind="query-params",
-                accept_new_options=True,
-                help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-                "CartPole-v1.",
-            )
+            env = environment_choice()
             agent = st.selectbox(
                 "Agent",
                 AGENTS,
@@ -84,7 +73,7 @@ def settings() -> Callable[[], Order]:
             )
             rules = st.selectbox(
                 "Rules",
-                rule_sets(),
+                offered_rule_sets(RULE_SETS),
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
@@ -104,15 +93,7 @@ def settings() -> Callable[[], Order]:
             )
             projection = PROJECTIONS[0]
             if continuous(env):
-                projection = st.selectbox(
-                    "Replace by",
-                    PROJECTIONS,
-                    key="projection",
-                    bind="query-params",
-                    help="What a continuous action that breaks a rule becomes. Centre: the "
-                    "middle of the rule's interval. Clip: the nearest value in it. Expert: "
-                    "what the expert typically did there.",
-                )
+                projection = projection_choice()
             outside = outside_choice()
         policy_file = rule_file = None
         if agent == OWN_FILE:

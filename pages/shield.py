@@ -9,29 +9,31 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import _state as state
 import streamlit as st
 from _choices import (
     AGENTS,
     CHOSEN,
     COMPACT,
     EDITED,
-    ENVIRONMENTS,
     FRESH_SEED,
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
     agent_for,
-    compact_file,
     continuous,
     demonstrated,
     environment_of,
     rules_for,
 )
 from _comparisons import Row, row_key
-from _edits import offered as edits_offered
-from _outside import no_boxes_notice, outside_choice
 from _run_bar import known, run_bar, working
+from _settings import (
+    environment_choice,
+    no_boxes_notice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
 from _shield_view import Line, show
 from _words import in_full
 from streamlit.runtime.uploaded_file_manager import UploadedFile
@@ -95,15 +97,7 @@ def settings() -> Choices:
     with st.container(border=True):
         in_a_row = 5 if continuous(st.session_state.get("env")) else 4
         with st.grid(in_a_row, min_column_width=150, gap="small"):
-            env = st.selectbox(
-                "Environment",
-                state.with_own(ENVIRONMENTS, "env"),
-                key="env",
-                bind="query-params",
-                accept_new_options=True,
-                help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-                "CartPole-v1.",
-            )
+            env = environment_choice()
             episodes = st.number_input(
                 "Episodes",
                 1,
@@ -126,15 +120,7 @@ def settings() -> Choices:
             )
             projection = PROJECTIONS[0]
             if continuous(env):
-                projection = st.selectbox(
-                    "Replace by",
-                    PROJECTIONS,
-                    key="projection",
-                    bind="query-params",
-                    help="What a continuous action that breaks a rule becomes. Centre: the "
-                    "middle of the rule's interval. Clip: the nearest value in it. Expert: "
-                    "what the expert typically did there.",
-                )
+                projection = projection_choice()
             outside = outside_choice()
         agents = st.pills(
             "Agents",
@@ -154,11 +140,7 @@ def settings() -> Choices:
                 accept_multiple_files=True,
                 key="policy_files",
             )
-        offered = [NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE]
-        if not edits_offered():
-            offered.remove(EDITED)
-        if not compact_file().is_file():
-            offered.remove(COMPACT)
+        offered = offered_rule_sets([NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE])
         shields = st.pills(
             "Shields",
             offered,

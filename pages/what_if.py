@@ -10,8 +10,8 @@ import _state as state
 import numpy as np
 import streamlit as st
 from _choices import PROJECTIONS
-from _outside import no_boxes_notice, outside_choice
 from _replays import kept_replays
+from _settings import no_boxes_notice, outside_choice
 from _what_if_view import show
 from _words import escaped
 from numpy.typing import NDArray
