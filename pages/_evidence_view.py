@@ -16,6 +16,7 @@ from _words import escaped
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining import evidence_figures as figures
+from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
 from sarl_core.explaining.evidence_tables import (
     enough_columns,
     episode_columns,
@@ -62,8 +63,8 @@ def _found(key: tuple[object, ...], episodes: int, _rule_set: RuleSet) -> Found:
 
 
 @st.cache_resource(max_entries=12, show_spinner=False)
-def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
-    return figures.overview_figure(_found.rules[:MOST_DRAWN], _rule_set, _found.threshold)
+def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> str:
+    return overview_plot(_found.rules[:MOST_DRAWN], _rule_set, _found.threshold)
 
 
 @st.cache_resource(max_entries=12, show_spinner=False)
@@ -111,19 +112,17 @@ def show_overview(evidence: Evidence) -> None:
             ("below", "The whole interval lies below the minimum confidence"),
         ):
             st.metric(VERDICTS[name].capitalize(), f"{counts[name]:,}", help=hint)
-    st.plotly_chart(
-        _overview(evidence.key, found, evidence.rule_set),
-        config=PLAIN,
-        key="overview",
-        alt="The 95 % interval of every rule's confidence, with the minimum confidence as a line",
-    )
     ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
     words = (
         f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
         + ("grey: on what it was mined from &ensp; " if held_out is not None else "")
         + f"dotted: minimum confidence {found.threshold:g}"
     )
-    st.html(f"<div style='font-size:0.85rem;opacity:0.9'>{words}</div>")
+    with st.container(key="overview"):
+        st.html(
+            _overview(evidence.key, found, evidence.rule_set)
+            + f"<div style='font-size:0.85rem;opacity:0.9;margin-top:0.6rem'>{words}</div>"
+        )
     st.caption(
         "The intervals count every state for itself. Steps of one episode are alike, so what is "
         "known is a little less than they say."
@@ -143,12 +142,7 @@ def show_enough(evidence: Evidence) -> None:
     )
     left, right = st.columns([2, 3], gap="medium")
     with left:
-        st.plotly_chart(
-            figures.enough_figure(found.missing),
-            config=PLAIN,
-            key="enough",
-            alt="How many rules would reach the minimum confidence after so many more episodes",
-        )
+        st.html(enough_plot(found.missing))
     with right:
         column = st.column_config
         st.dataframe(

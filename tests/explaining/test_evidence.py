@@ -159,36 +159,6 @@ def test_pairs_of_states_differ_and_the_nearest_come_first(lander_like):
         assert [str(lander_like.actions[row]) for row in rows] == [did, did_there]
 
 
-def test_the_overview_draws_every_interval_where_it_lies(tried):
-    figure = figures.overview_figure(tried.rules, tried, 0.85)
-    drawn = {
-        (round(low, 5), round(high, 5))
-        for trace in figure.data
-        if trace.mode == "lines"
-        for low, high in zip(trace.y[::3], trace.y[1::3], strict=True)
-    }
-    expected = set()
-    for rule in tried.rules:
-        for correct, samples in ((rule.correct, rule.samples), rule.held_out[::-1]):
-            expected.add(tuple(round(end, 5) for end in wilson(correct, samples)))
-    assert drawn == expected
-    assert sum(len(trace.x) for trace in figure.data if trace.mode == "markers") == 2 * len(tried)
-
-
-def test_names_in_the_overview_are_no_markup(tried):
-    action = replace(tried.actions[0], label_names=("<b>x</b>",) * 4)
-    figure = figures.overview_figure(tried.rules, replace(tried, actions=(action,)), 0.85)
-    texts = [text for trace in figure.data if trace.text is not None for text in trace.text]
-    assert texts
-    assert not any("<b>" in text for text in texts)
-
-
-def test_enough_counts_the_rules_that_are_certain_by_then():
-    figure = figures.enough_figure([0.0, 5.0, 5.0, 12.0, float("inf")])
-    assert list(figure.data[0].x[:3]) == [0, 5, 12]
-    assert list(figure.data[0].y[:3]) == [1, 3, 4]
-
-
 def test_the_curve_draws_mean_and_range():
     values = np.array([[1.0, 2.0, np.nan], [3.0, 2.0, np.nan]])
     curve = LearningCurve(np.array([1, 5, 9]), values, values, values, values, "not yet used")

@@ -1,0 +1,149 @@
+"""Plots of how sure rules are that follow the controls: all intervals, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR, MUTED_COLOUR, faded
+from sarl_core.explaining.evidence_words import (
+    VERDICT_COLOURS,
+    VERDICTS,
+    evidence_text,
+    intervals_text,
+    verdict_counts,
+)
+from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks
+from sarl_core.explaining.language import action_text, counted, share_text
+from sarl_core.mining.evidence import Interval
+from sarl_core.mining.holding_out import held_out_interval, mined_interval, verdict
+from sarl_core.mining.rules import Rule, RuleSet
+
+_ASIDE = 0.17  # of a rule's place: what it was mined from to the left, held out to the right
+_FEW = 60  # rules up to which whiskers are drawn wide
+_NUMBERED = 30  # rules up to which each has its number
+_TIPS = 60
+_MINED = faded(MUTED_COLOUR, 0.7)
+_STYLE = """<style>
+.sarl-sure b { margin-left: -0.5px; width: 1px; }
+.sarl-sure b::after { content: ''; position: absolute; left: 50%; bottom: var(--at);
+  width: 4px; height: 4px; margin: 0 0 -2px -2px; border-radius: 50%; background: inherit; }
+.sarl-few b { margin-left: -1.5px; width: 3px; }
+.sarl-few b::after { width: 9px; height: 9px; margin: 0 0 -4.5px -4.5px; }
+</style>"""
+
+
+def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> str:
+    """The intervals of many rules side by side.
+
+    Args:
+        rules: In the order in which they stand from left to right; at least one.
+        rule_set: Knows the names.
+        threshold: The minimum confidence, drawn as a line.
+
+    Returns:
+        HTML without script. Grey: on what each was mined from. In colour: held out, or, where
+        nothing was, the same by its verdict.
+    """
+    tried = any(rule.held_out is not None for rule in rules)
+    few = len(rules) <= _FEW
+    drawn: list[tuple[float, Interval, float, str]] = []
+    for place, rule in enumerate(rules, 1):
+        if not rule.samples:
+            continue
+        colour = VERDICT_COLOURS[verdict(rule, threshold)]
+        mined = mined_interval(rule)
+        if not tried:
+            drawn.append((place, mined, rule.confidence, colour))
+            continue
+        drawn.append((place - _ASIDE * few, mined, rule.confidence, _MINED))
+        held = held_out_interval(rule)
+        if held is not None and rule.held_out is not None:
+            drawn.append((place + _ASIDE * few, held, rule.held_out.confidence, colour))
+    floor = max(min([threshold, *(interval.low for _, interval, _, _ in drawn)]) - 0.03, 0.0)
+    across, upwards = Scale(0.5, len(rules) + 0.5), Scale(floor, 1.01)
+    whiskers = "".join(
+        f'<b style="left:{across.place(place)};bottom:{upwards.place(interval.low)};'
+        f"height:{upwards.length(interval.low, interval.high)};background:{colour};"
+        f'--at:{_within(share, interval)}"></b>'
+        for place, interval, share, colour in drawn
+    )
+    line = (
+        f'<i style="left:0;right:0;bottom:{upwards.place(threshold)};'
+        f'border-top:2px dotted {MARKER_COLOUR}"></i>'
+    )
+    counts = verdict_counts(rules, threshold)
+    told = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
+    numbers = (
+        [float(place) for place in range(1, len(rules) + 1)]
+        if len(rules) <= _NUMBERED
+        else [tick for tick in round_ticks(1, len(rules), 8) if tick >= 1]
+    )
+    heights = round_ticks(floor, 1.0, 5)
+    return (
+        f'{_STYLE}<div class="sarl-sure{" sarl-few" * few}">'
+        + plot(
+            whiskers + line,
+            Axis(
+                across,
+                numbers,
+                [f"{tick:,.0f}" for tick in numbers],
+                "Rules, the most support first",
+            ),
+            Axis(upwards, heights, [f"{tick:.2f}" for tick in heights], "Confidence"),
+            label="The 95 % interval of every rule's confidence against the minimum confidence of "
+            f"{threshold:g}: {told}",
+            height=262,
+            tips=[_tip(rule, rule_set) for rule in rules],
+        )
+        + "</div>"
+    )
+
+
+def _within(share: float, interval: Interval) -> str:
+    """Where a share stands in its interval, from the lower end up."""
+    width = interval.high - interval.low
+    return f"{100 * (share - interval.low) / width if width else 50:.1f}%"
+
+
+def _tip(rule: Rule, rule_set: RuleSet) -> str:
+    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    lines = (f"rule {rule.id}: {does}", evidence_text(rule), intervals_text(rule))
+    return "\n".join(line for line in lines if line)
+
+
+def enough_plot(missing: Sequence[float]) -> str:
+    """How many rules would reach the minimum confidence after so many more episodes.
+
+    Args:
+        missing: What `more_episodes` gives of each rule; at least one.
+
+    Returns:
+        HTML without script: episodes to the right, rules upwards, in steps.
+    """
+    some = np.sort([value for value in missing if np.isfinite(value)])
+    turns = [0.0, *np.unique(some[some > 0]).tolist()]
+    reached = np.searchsorted(some, turns, side="right").tolist()
+    far, most = max(turns[-1] * 1.1, 1.0), len(missing)
+    across, upwards = Scale(0.0, far), Scale(0.0, most * 1.04)
+    corners = []
+    for turn, end, count in zip(turns, [*turns[1:], far], reached, strict=True):
+        corners += [(turn, float(count)), (end, float(count))]
+    colour = LABEL_COLOURS[0]
+    middles = (np.arange(_TIPS) + 0.5) * far / _TIPS
+    by_then = np.searchsorted(some, middles, side="right").tolist()
+    widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, most, min(4, most))
+    return plot(
+        area(corners, across, upwards, faded(colour, 0.55)),
+        Axis(across, widths, [f"{tick:,g}" for tick in widths], "More episodes"),
+        Axis(upwards, heights, [f"{tick:,g}" for tick in heights], "Rules that reach it"),
+        label=f"Of {counted(most, 'rule')} {reached[0]:,} "
+        f"{'reaches' if reached[0] == 1 else 'reach'} the minimum confidence now, and "
+        f"{reached[-1]:,} ({share_text(reached[-1] / most)}) after enough more episodes",
+        height=200,
+        tips=[
+            f"{counted(count, 'rule')} after {episodes:,.0f} more episodes"
+            for episodes, count in zip(middles.tolist(), by_then, strict=True)
+        ],
+    )

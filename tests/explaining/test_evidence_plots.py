@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, RuleSet, mine_rules
+from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
+from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks
+from sarl_core.mining.evidence import wilson
+from sarl_core.mining.holding_out import hold_out, with_held_out
+
+
+@pytest.fixture(scope="module")
+def tried() -> RuleSet:
+    rng = np.random.default_rng(1)
+    states = rng.normal(size=(2_000, 3)).astype(np.float32)
+    actions = (states[:, 0] + 0.4 * rng.normal(size=2_000) > 0).astype(np.int64)
+    pairs = Demonstrations(states, actions, np.repeat(np.arange(20), 100))
+    mined, other = hold_out(pairs, share=0.3, seed=0)
+    return with_held_out(mine_rules(mined, supp_min=0.02, conf_min=0.85), other)
+
+
+def whiskers(html: str) -> list[tuple[float, float, float, float]]:
+    """From the left, from below, height, and where the dot is within; each a share."""
+    found = re.findall(
+        r"left:([\d.]+)%;bottom:([\d.]+)%;height:([\d.]+)%;[^\"]*--at:([\d.]+)%", html
+    )
+    return [tuple(float(part) / 100 for part in one) for one in found]
+
+
+def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None:
+    html = overview_plot(tried.rules, tried, 0.85)
+    drawn = whiskers(html)
+    assert len(drawn) == 2 * len(tried)
+    ticks = re.findall(r'class="y" style="bottom:([\d.]+)%">([\d.]+)<', html)
+    (low, at_low), (high, at_high) = [
+        (float(text), float(b) / 100) for b, text in ticks[:: len(ticks) - 1]
+    ]
+    per_share = (at_high - at_low) / (high - low)
+
+    def confidence(place: float) -> float:
+        return low + (place - at_low) / per_share
+
+    expected = []
+    for rule in tried.rules:
+        assert rule.held_out is not None
+        for correct, samples in (
+            (rule.correct, rule.samples),
+            (rule.held_out.correct, rule.held_out.samples),
+        ):
+            expected.append((*wilson(correct, samples), correct / samples))
+    for (_, bottom, height, dot), (least, most, share) in zip(drawn, expected, strict=True):
+        assert confidence(bottom) == pytest.approx(least, abs=1e-3)
+        assert confidence(bottom + height) == pytest.approx(most, abs=1e-3)
+        assert confidence(bottom + dot * height) == pytest.approx(share, abs=1e-3)
+    places = [left for left, *_ in drawn]
+    assert places == sorted(places)
+    assert html.count("<u title=") == len(tried)
+
+
+def test_without_held_out_episodes_there_is_one_interval_a_rule(tried: RuleSet) -> None:
+    alone = replace(tried, rules=tuple(replace(rule, held_out=None) for rule in tried.rules))
+    assert len(whiskers(overview_plot(alone.rules, alone, 0.85))) == len(tried)
+
+
+def test_names_in_the_overview_are_no_markup(tried: RuleSet) -> None:
+    action = replace(tried.actions[0], label_names=("<b>x</b>", '"y"'))
+    html = overview_plot(tried.rules, replace(tried, actions=(action,)), 0.85)
+    assert "<b>x" not in html
+    assert "&lt;b&gt;x&lt;/b&gt;" in html
+
+
+def test_enough_counts_the_rules_that_are_certain_by_then() -> None:
+    html = enough_plot([0.0, 5.0, 5.0, 12.0, float("inf")])
+    (outline,) = re.findall(r"polygon\(([^)]*)\)", html)
+    corners = [
+        (float(x) / 100 * 13.2, (100 - float(y)) / 100 * 5 * 1.04)
+        for x, y in re.findall(r"([\d.]+)% ([\d.]+)%", outline)
+    ][1:-1]
+    wanted = [(0, 1), (5, 1), (5, 3), (12, 3), (12, 4), (13.2, 4)]
+    assert np.allclose(corners, wanted, atol=1e-2)
+    assert 'aria-label="Of 5 rules 1 reaches the minimum confidence now, and 4 (80 %)' in html
+    tips = re.findall(r'<u title="(\d) rules?', html)
+    assert tips == sorted(tips)
+    assert {"1", "3", "4"} == set(tips)
+
+
+def test_nothing_is_missing_or_nothing_helps() -> None:
+    assert "Of 2 rules 2 reach" in enough_plot([0.0, 0.0])
+    assert "Of 1 rule 0 reach" in enough_plot([float("inf")])
+
+
+def test_an_axis_has_few_round_numbers() -> None:
+    assert round_ticks(0.0, 1.0, 5) == [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
+    assert round_ticks(-0.31, 0.3, 4) == [-0.2, 0.0, 0.2]
+    assert round_ticks(0, 3274, 8) == [0, 500, 1000, 1500, 2000, 2500, 3000]
+    for low, high in ((0.93, 1.0), (1e-7, 3e-7), (-5e4, 1e5)):
+        ticks = round_ticks(low, high, 5)
+        assert 2 <= len(ticks) <= 6
+        assert all(low <= tick <= high * (1 + 1e-9) for tick in ticks)
+
+
+def test_a_plot_places_and_escapes_what_is_written() -> None:
+    across = Axis(Scale(10, 20), [10, 15], ["<ten>", "15"], "a & b")
+    upwards = Axis(Scale(0, 4), [1], ["1"])
+    html = plot("<i></i>", across, upwards, label='"seen"', height=50, tips=["<tip>"])
+    assert 'style="left:50.000%">15<' in html
+    assert 'style="bottom:25.000%">1<' in html
+    assert "a &amp; b" in html
+    assert 'aria-label="&quot;seen&quot;"' in html
+    for raw in ("<ten>", "<tip>"):
+        assert raw not in html
+    cut = area([(10, 1), (20, 2)], across.scale, upwards.scale, "#123456")
+    assert "polygon(0.000% 100%,0.000% 75.00%,100.000% 50.00%,100.000% 100%)" in cut
