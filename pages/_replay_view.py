@@ -18,7 +18,7 @@ from _replays import (
 )
 from _words import escaped
 
-from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, label_colour
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.language import counted, label_text, number_text, share_text
 from sarl_core.explaining.lit_path import lit_paths_html
 from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
@@ -192,7 +192,9 @@ def mark_style(timeline: Timeline) -> str:
         f" bottom: {timeline.bottom}px; width: 2px; pointer-events: none;"
         f" left: calc({timeline.left - 1}px"
         f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
-        f" will-change: transform; background: {MARKER_COLOUR}; }}"
+        # Of the page's ink, with a rim, so that it is seen on every colour.
+        " will-change: transform; background: currentColor;"
+        " box-shadow: 0 0 0 1px rgba(140, 150, 160, 0.6); }"
         "</style>"
     )
 

@@ -90,7 +90,7 @@ class Timeline:
     n_steps: int
     left: int
     right: int = 12
-    bottom: int = 40
+    bottom: int = 46
 
     @classmethod
     def of(cls, tracks: Sequence[Track], n_steps: int) -> Timeline:
@@ -208,7 +208,7 @@ def return_figure(lines: Sequence[ReturnLine], timeline: Timeline) -> go.Figure:
             marker={"color": line.colour, "size": 8},
             hovertemplate=f"{plain(line.name)} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
         )
-    figure.update_layout(**_layout(170))
+    figure.update_layout(**_layout(176))
     figure.update_layout(
         showlegend=len(lines) > 1,
         margin=_margin(timeline, top=26 if len(lines) > 1 else 8, bottom=timeline.bottom),
