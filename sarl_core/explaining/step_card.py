@@ -53,7 +53,8 @@ def picture(png: bytes, alt: str) -> str:
         HTML, as wide as there is room.
     """
     source = f"data:image/png;base64,{b64encode(png).decode('ascii')}"
-    return f'<img class="sarl-picture" style="width:100%;margin-bottom:0.7rem" src="{source}" alt="{escape(alt)}">'
+    style = "width:100%;margin-bottom:0.7rem"
+    return f'<img class="sarl-picture" style="{style}" src="{source}" alt="{escape(alt)}">'
 
 
 def step_card(view: StepView, *, shielded: bool) -> str:
