@@ -129,7 +129,10 @@ def decision_html(
 
 def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet) -> str:
     if rule is None:
-        return _note("No rule applies to this state: the agent's action is passed on as it is.")
+        which = "No rule applies to this state"
+        if len(rule_set.actions) > 1:
+            which = "No rule for this action dimension applies to this state"
+        return _note(f"{which}: the agent's action is passed on as it is.")
     values = tuple(state.astype(np.float64).tolist())
     views = condition_views(rule, values, rule_set)
     table = _table(_CONDITIONS, [(view.condition, view.value, view.room) for view in views])
