@@ -18,6 +18,7 @@ from benchmarks.chromium import TABLES, WARM, Aim, Release, answers, opened, set
 from benchmarks.measure import Row, duration
 
 REACH, FILTER_REACH = 0.15, 0.3  # seconds
+TABLE_WAIT = 0.15  # seconds that Streamlit's tables wait before they send a selection
 UNFILTERED = "support=0&confidence=1"
 ROW, HEAD = 33, 33  # pixels of a table's rows and of its heading
 
@@ -121,14 +122,17 @@ def evidence(quick: bool) -> Iterable[Row]:
 
 
 def rules(quick: bool) -> Iterable[Row]:
-    """Another rule, and a filter by the lower bound."""
+    """Another rule, by its row and by a button, and a filter by the lower bound."""
+    watched = (".st-key-sentence", ".st-key-tree_figure", ".st-key-features", TABLES)
     yield from _rows(
         quick,
+        Control("Rules, next rule", "rules", _there_and_back, watched),
         Control(
-            "Rules, another rule",
+            "Rules, another rule, a row of the table (which waits 150 ms before it sends it)",
             "rules",
             partial(_table_row, selector=".st-key-rule_table"),
-            (".st-key-sentence", ".st-key-tree_figure"),
+            watched,
+            reach=TABLE_WAIT + REACH,
         ),
         Control(
             "Rules, lower bound at least, unfiltered",
@@ -230,6 +234,11 @@ def _arrow(page: Page, move: int, *, name: str) -> Release:
 
 def _button(page: Page, _: int, *, selector: str) -> Release:
     return _click(page.locator(selector).first)
+
+
+def _there_and_back(page: Page, move: int) -> Release:
+    """The buttons from rule to rule."""
+    return _click(page.get_by_role("button", name=("Next rule", "Previous rule")[move % 2]))
 
 
 def _click(target: Locator) -> Release:

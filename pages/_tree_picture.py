@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import streamlit as st
+from numpy.typing import NDArray
 
 from sarl_core.explaining.rule_figures import tree_figure
+from sarl_core.explaining.rule_place import place_html
 from sarl_core.mining.rules import Thresholds, cut_nodes
 from sarl_core.mining.tree import LEAF, PolicyTree
 
@@ -36,8 +38,28 @@ def tree_picture(
     Returns:
         The figure; shared between sessions.
     """
-    told = repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
-    return _picture(told, node, around, leaves, dark, tree, thresholds)
+    return _picture(_told(key, tree, thresholds), node, around, leaves, dark, tree, thresholds)
+
+
+def tree_place(
+    key: object,
+    tree: PolicyTree,
+    thresholds: Thresholds,
+    node: int,
+    *,
+    leaves: bool,
+    dark: bool,
+) -> str:
+    """The neighbourhood of a node in the tree, in HTML; the arguments are those of `tree_picture`.
+
+    Returns:
+        HTML without script.
+    """
+    return _place(_told(key, tree, thresholds), node, leaves, dark, tree, thresholds)
+
+
+def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
+    return repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
 
 
 @st.cache_resource(max_entries=48, show_spinner=False)
@@ -50,15 +72,26 @@ def _picture(
     _tree: PolicyTree,
     _thresholds: Thresholds,
 ) -> Any:
-    cut = (
-        np.flatnonzero(_tree.feature == LEAF)
-        if leaves
-        else cut_nodes(
-            _tree,
-            supp_min=_thresholds.support,
-            conf_min=_thresholds.confidence,
-            lift_min=_thresholds.lift,
-            max_depth=_thresholds.max_depth,
-        )
-    )
+    cut = _cut(told, leaves, _tree, _thresholds)
     return tree_figure(_tree, cut, node, around=around, dark=dark)
+
+
+@st.cache_resource(max_entries=96, show_spinner=False)
+def _place(
+    told: str, node: int, leaves: bool, dark: bool, _tree: PolicyTree, _thresholds: Thresholds
+) -> str:
+    return place_html(_tree, _cut(told, leaves, _tree, _thresholds), node, dark=dark)
+
+
+@st.cache_resource(max_entries=12, show_spinner=False)
+def _cut(told: str, leaves: bool, _tree: PolicyTree, _thresholds: Thresholds) -> NDArray[np.int64]:
+    """The nodes that are rules."""
+    if leaves:
+        return np.flatnonzero(_tree.feature == LEAF)
+    return cut_nodes(
+        _tree,
+        supp_min=_thresholds.support,
+        conf_min=_thresholds.confidence,
+        lift_min=_thresholds.lift,
+        max_depth=_thresholds.max_depth,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -10,10 +11,9 @@ import _edits
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
-from _tree_picture import tree_picture
+from _tree_picture import tree_picture, tree_place
 from _words import escaped
 
-from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
 from sarl_core.explaining.evidence_words import evidence_bar, evidence_text, intervals_text
@@ -26,12 +26,13 @@ from sarl_core.explaining.language import (
     share_text,
 )
 from sarl_core.explaining.path_table import path_table
+from sarl_core.explaining.rule_features import features_html
 from sarl_core.mining.holding_out import lower_bound, verdict, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet, node_of
+from sarl_core.mining.tree import PolicyTree
 
 TABLE_ROWS = 8
-FEATURES_SHOWN = 12
 MEASURES = """
 **Support**: share of all states to which the rule applies.
 
@@ -57,6 +58,27 @@ def table_of(key: tuple[object, ...], _rule_set: RuleSet) -> tuple[tuple[Rule, .
     """All rules, the most support first, and the same as a data frame."""
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     return rules, frame(rules, _rule_set)
+
+
+def key_of(rule: Rule) -> tuple[object, ...]:
+    """What tells a rule from all others, those of other data included."""
+    tree = grown[rule.dimension]
+    return tree.source.digest, tree.divider, compact.digest if compact else "", rule.id
+
+
+@st.cache_resource(max_entries=96, show_spinner=False)
+def features_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> str:
+    """A rule's intervals in HTML."""
+    found = feature_evidence(demonstrations, _tree, _rule)
+    return features_html(found, demonstrations.features, label_colour(_rule.action))
+
+
+@st.cache_resource(max_entries=96, show_spinner=False)
+def examples_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> Any:
+    """Some states of a rule as a data frame."""
+    import pandas as pd
+
+    return pd.DataFrame(example_columns(demonstrations, _tree, _rule))
 
 
 def downloads(rule_set: RuleSet) -> None:
@@ -93,9 +115,37 @@ def nothing_in_force() -> None:
 
 def pick(shown: list[int], rules: tuple[Rule, ...]) -> None:
     """Choose the rule whose row was selected."""
-    rows = st.session_state["rule_table"].selection.rows
+    rows = st.session_state["rule_table"]["selection"]["rows"]
     if rows and rows[0] < len(shown):
         state.set_url_choice("rule", rules[shown[rows[0]]].id)
+
+
+def select_row(place: int | None) -> None:
+    """Select a row of the table, or none, before it is drawn; it keeps a choice of its own."""
+    kept = st.session_state.get("rule_table")
+    rows = [] if place is None else [place]
+    if kept is not None and list(kept["selection"]["rows"]) != rows:
+        st.session_state["rule_table"] = {"selection": {"rows": rows}}
+
+
+def walk(shown: list[int], rules: tuple[Rule, ...], place: int | None) -> None:
+    """The buttons from rule to rule, in the order of the table."""
+    before = None if not place else rules[shown[place - 1]].id
+    at = -1 if place is None else place  # a rule that is not in the table stands before it
+    after = rules[shown[at + 1]].id if at + 1 < len(shown) else None
+    with st.container(horizontal=True, vertical_alignment="center", gap="small"):
+        for name, icon, rule_id in (
+            ("Previous rule", ":material/chevron_left:", before),
+            ("Next rule", ":material/chevron_right:", after),
+        ):
+            st.button(
+                name,
+                icon=icon,
+                key=name.split()[0].lower(),
+                on_click=state.set_url_choice,
+                args=("rule", rule_id),
+                disabled=rule_id is None,
+            )
 
 
 def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
@@ -163,8 +213,9 @@ def lower_bound_choice() -> float:
     return float(least or 0.0)
 
 
-def show_table(rule_set: RuleSet) -> Rule | None:
-    """The table of all rules; returns the chosen one."""
+@st.fragment
+def search_and_rules(rule_set: RuleSet) -> None:
+    """What is searched for, and the rules that match."""
     key = (
         (rule_set.source.digest, rule_set.divider, thresholds, state.held_out_digest())
         if compact is None
@@ -172,14 +223,24 @@ def show_table(rule_set: RuleSet) -> Rule | None:
     )
     rules, table = table_of(key, rule_set)
     shown = matching(rules, rule_set)
-    chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
-    if not shown:
+    if shown:
+        table_and_rule(rules, table, shown, rule_set)
+    else:
+        state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
         st.info(
             "No rule matches the search; clear it, and the lower bound, to see all.",
             icon=":material/search_off:",
         )
-        return None
+
+
+@st.fragment
+def table_and_rule(
+    rules: tuple[Rule, ...], table: Any, shown: list[int], rule_set: RuleSet
+) -> None:
+    """The table of rules, and the chosen one: another choice runs this part alone."""
+    chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
+    select_row(place)
     st.dataframe(
         table.iloc[shown],
         hide_index=True,
@@ -197,14 +258,19 @@ def show_table(rule_set: RuleSet) -> Rule | None:
         (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
         + "Click a heading to sort, the box at the left of a row to see the rule below."
     )
-    return next(rule for rule in rules if rule.id == chosen_id)
+    show_rule(
+        next(rule for rule in rules if rule.id == chosen_id),
+        rule_set,
+        lambda: walk(shown, rules, place),
+    )
 
 
-def show_rule(rule: Rule, rule_set: RuleSet) -> None:
+def show_rule(rule: Rule, rule_set: RuleSet, buttons: Callable[[], None]) -> None:
     """One rule and everything behind it."""
     tree = grown[rule.dimension]
     node = node_of(rule)
     with st.container(border=True, key="sentence"):
+        buttons()
         reached = rule.samples > 0
         st.markdown(f"#### {escaped(sentence(rule, rule_set, evidence=reached))}")
         st.caption(
@@ -277,27 +343,27 @@ def show_tree(rule: Rule) -> None:
     if rule.samples:
         view = st.segmented_control(
             "Tree",
-            [WHOLE_TREE, AROUND],
-            default=WHOLE_TREE,
+            [AROUND, WHOLE_TREE],
+            default=AROUND,
             key="tree",
             bind="query-params",
             required=True,
             label_visibility="collapsed",
         )
-    st.plotly_chart(
-        tree_picture(
-            compact.digest if compact is not None else "",
-            tree,
-            thresholds,
-            node_of(rule),
-            around=view == AROUND,
-            leaves=compact is not None,
-            dark=state.is_dark(),
-        ),
-        key="tree_figure",
-        config={"displaylogo": False, "scrollZoom": True},
-        alt="The decision tree with the path of the rule",
-    )
+    key = compact.digest if compact is not None else ""
+    leaves, dark = compact is not None, state.is_dark()
+    if view == AROUND:
+        with st.container(key="tree_figure"):
+            st.html(tree_place(key, tree, thresholds, node_of(rule), leaves=leaves, dark=dark))
+    else:
+        st.plotly_chart(
+            tree_picture(
+                key, tree, thresholds, node_of(rule), around=False, leaves=leaves, dark=dark
+            ),
+            key="tree_figure",
+            config={"displaylogo": False, "scrollZoom": True},
+            alt="The decision tree with the path of the rule",
+        )
     st.caption(
         f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. "
         + (
@@ -306,46 +372,26 @@ def show_tree(rule: Rule) -> None:
             else "Every leaf is a rule, full in colour. "
         )
         + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
-        + "Drag or scroll to zoom, double-click to go back."
+        + ("" if view == AROUND else "Drag or scroll to zoom, double-click to go back.")
     )
 
 
 def show_features(rule: Rule) -> None:
     """The interval on each feature against its distribution."""
     st.subheader("What it asks, feature by feature")
-    st.caption(
-        "Grey: all states. "
-        + ("In colour: the states of the rule. " if rule.samples else "")
-        + "Shaded: the interval."
-    )
-    colour = label_colour(rule.action)
-    found = feature_evidence(demonstrations, grown[rule.dimension], rule)
-    for start in range(0, min(len(found), FEATURES_SHOWN), 3):
-        for column, one in zip(st.columns(3), found[start : start + 3], strict=False):
-            feature = demonstrations.features[one.feature]
-            with column:
-                st.markdown(f"**{escaped(figures.interval_text(one, feature))}**")
-                st.plotly_chart(
-                    figures.feature_figure(one, feature, colour),
-                    key=f"feature_{one.feature}",
-                    config={"displayModeBar": False},
-                    alt=f"{feature.name}: all states and those of the rule",
-                )
-    if len(found) > FEATURES_SHOWN:
-        st.caption(f"The first {FEATURES_SHOWN} of {len(found)} features.")
+    with st.container(key="features"):
+        st.html(features_of(key_of(rule), grown[rule.dimension], rule))
 
 
 def show_examples(rule: Rule) -> None:
     """Some states to which the rule applies."""
-    import pandas as pd
-
     if not rule.samples:
         return
-    columns = example_columns(demonstrations, grown[rule.dimension], rule)
-    count = len(columns["Step"])
+    examples = examples_of(key_of(rule), grown[rule.dimension], rule)
+    count = len(examples)
     st.subheader("Example states" if count > 1 else "The one state it applies to")
     st.dataframe(
-        pd.DataFrame(columns),
+        examples,
         hide_index=True,
         height=table_height(count, 10),
         key="examples",
@@ -357,7 +403,7 @@ def show_examples(rule: Rule) -> None:
             name: st.column_config.NumberColumn(
                 format="%d" if name in ("Episode", "Step") else "%.4g"
             )
-            for name in list(columns)[2:]
+            for name in list(examples)[2:]
         },
         alt="States to which the rule applies",
     )
@@ -368,6 +414,4 @@ with st.spinner("Mining the rules …"):
 if not in_force.rules:
     nothing_in_force()
 else:
-    chosen = show_table(in_force)
-    if chosen is not None:
-        show_rule(chosen, in_force)
+    search_and_rules(in_force)

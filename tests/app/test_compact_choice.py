@@ -169,9 +169,11 @@ def test_a_compact_rule_is_explained_on_the_chosen_demonstrations(compact: RuleS
     assert f"support {share_text(shipped.support)}" in words
     assert html(app).count("<tr") == 1 + 1 + rule.length
     assert len(app.dataframe[1].value) == min(10, rule.samples)
-    assert len(app.get("plotly_chart")) == 1 + rule.merged_length
-    app.button_group(key="tree").set_value("Around this rule").run()
+    assert html(app).count("<figure>") == rule.merged_length
+    assert "The tree around the rule: " in html(app)
+    app.button_group(key="tree").set_value("Whole tree").run()
     assert not app.exception
+    assert len(app.get("plotly_chart")) == 1
 
 
 def test_a_rule_that_no_demonstrated_state_reaches_says_so(compact: RuleSet) -> None:
@@ -183,7 +185,8 @@ def test_a_rule_that_no_demonstrated_state_reaches_says_so(compact: RuleSet) -> 
     assert "so did the expert" not in "".join(
         part.value for part in app.markdown if part.value.startswith("####")
     )
-    assert len(app.get("plotly_chart")) == 1 + rule.merged_length
+    assert len(app.get("plotly_chart")) == 1
+    assert html(app).count("<figure>") == rule.merged_length
     assert len(app.dataframe) == 1
     assert html(app).count("<tr") == 1 + 1 + rule.length
 

@@ -39,9 +39,12 @@ def test_the_rule_of_a_link_is_explained(data: str) -> None:
     assert f"Rule {rule.id} ·" in texts(app)
     assert html(app).count("<tr") == 1 + 1 + rule.length
     assert "this is the rule" in html(app)
-    charts = app.get("plotly_chart")
-    assert len(charts) == 1 + rule.merged_length
-    lit = [t for t in json.loads(charts[0].proto.spec)["data"] if t.get("name") == "path"]
+    assert html(app).count("<figure>") == rule.merged_length
+    assert html(app).count('<i class="dot end"') == 1
+    assert not app.get("plotly_chart")
+    whole = open_page("rules", data=data, rule=rule.id, tree="Whole tree")
+    (chart,) = whole.get("plotly_chart")
+    lit = [t for t in json.loads(chart.proto.spec)["data"] if t.get("name") == "path"]
     assert len(lit[0]["marker"]["size"]) == rule.length + 1
     examples = app.dataframe[1].value
     assert len(examples) == min(10, rule.samples)
@@ -83,13 +86,61 @@ def test_one_condition_is_no_conditions() -> None:
     assert "quer" not in words
 
 
-def test_the_tree_can_be_seen_around_the_rule() -> None:
+def test_the_tree_is_seen_around_the_rule_first_and_as_a_whole_when_asked_for() -> None:
     app = open_page("rules", data="cartpole")
-    whole = json.loads(app.get("plotly_chart")[0].proto.spec)
-    app.button_group(key="tree").set_value("Around this rule").run()
-    around = json.loads(app.get("plotly_chart")[0].proto.spec)
-    assert not whole["layout"].get("annotations")
-    assert around["layout"]["annotations"]
+    assert "The tree around the rule: " in html(app)
+    assert "zoom" not in texts(app)
+    app.button_group(key="tree").set_value("Whole tree").run()
+    assert not app.exception
+    assert "The tree around the rule: " not in html(app)
+    assert len(app.get("plotly_chart")) == 1
+    assert "to zoom" in texts(app)
+
+
+def chosen_row(app: AppTest) -> list[int]:
+    """The selected row, as the browser is told."""
+    proto = app.dataframe[0].proto
+    told = json.loads(proto.selection_state or proto.selection_default)
+    return list(told["selection"]["rows"])
+
+
+def test_buttons_go_from_rule_to_rule_in_the_order_of_the_table() -> None:
+    rules = mined("cartpole", 0.005, 0.95)
+    ordered = sorted(rules.rules, key=lambda one: -one.samples)
+    app = open_page("rules", data="cartpole")
+    assert app.button(key="previous").disabled
+    for place in range(1, len(ordered)):
+        app.button(key="next").click().run()
+        assert sentence(ordered[place], rules) in texts(app)
+        assert app.query_params["rule"] == ordered[place].id
+        assert chosen_row(app) == [place]
+        assert not app.button(key="previous").disabled
+    assert app.button(key="next").disabled
+    for place in reversed(range(len(ordered) - 1)):
+        app.button(key="previous").click().run()
+        assert sentence(ordered[place], rules) in texts(app)
+        assert chosen_row(app) == [place]
+    assert app.button(key="previous").disabled
+    assert "rule" not in app.query_params
+
+
+def test_buttons_and_the_selected_row_follow_the_search() -> None:
+    rules = mined("cartpole", 0.005, 0.95)
+    ordered = sorted(rules.rules, key=lambda one: -one.samples)
+    right = [one for one in ordered if one.action == 1]
+    app = open_page("rules", data="cartpole", rule=right[1].id)
+    app.selectbox(key="action").select("push right").run()
+    assert chosen_row(app) == [1]
+    app.button(key="previous").click().run()
+    assert sentence(right[0], rules) in texts(app)
+    assert app.button(key="previous").disabled
+    app.selectbox(key="action").select("push left").run()
+    assert sentence(right[0], rules) in texts(app)  # stays, though the table has no row for it
+    assert chosen_row(app) == []
+    assert app.button(key="previous").disabled
+    app.button(key="next").click().run()
+    assert sentence(next(one for one in ordered if one.action == 0), rules) in texts(app)
+    assert chosen_row(app) == [0]
 
 
 def test_the_whole_set_can_be_taken_away() -> None:
@@ -111,7 +162,7 @@ def test_the_rule_always_is_explained() -> None:
     app = open_page("rules", data="lunar_lander", support="0.5", confidence="0.2")
     assert "Always " in texts(app)
     assert "This rule has no conditions" in texts(app)
-    assert len(app.get("plotly_chart")) == 1
+    assert html(app).count("<figure>") == 0
 
 
 def test_the_sidebar_says_what_is_in_force() -> None:

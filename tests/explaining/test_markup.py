@@ -11,6 +11,8 @@ from sarl_core.explaining.distributions import histogram_by_label
 from sarl_core.explaining.evidence import feature_evidence
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Timeline, Track, intervention_strip
+from sarl_core.explaining.rule_features import features_html
+from sarl_core.explaining.rule_place import place_html
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import cut_nodes, node_of
 
@@ -34,9 +36,11 @@ def test_names_from_files_are_no_markup_in_the_figures_of_a_rule(
     rule = mine_rules((tree,), **limits).rules[0]
     cut = cut_nodes(tree, **limits)
     around = rule_figures.tree_figure(tree, cut, node_of(rule), around=True).to_json()
-    one = feature_evidence(harmful, tree, rule)[0]
-    for feature in (harmful.features[one.feature], Feature("x", "<b>m</b>")):
-        around += rule_figures.feature_figure(one, feature, "#0072B2").to_json()
+    around += place_html(tree, cut, node_of(rule))
+    found = feature_evidence(harmful, tree, rule)
+    units = [replace(feature, unit="<b>m</b>") for feature in harmful.features]
+    for features in (harmful.features, units):
+        around += features_html(found, features, "#0072B2")
     for raw in ("<b>", "<i>", r"\u003cb\u003e", r"\u003ci\u003e"):
         assert raw not in around
 

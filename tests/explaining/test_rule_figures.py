@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
-from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining import rule_figures as figures
 from sarl_core.explaining.evidence import (
     example_columns,
@@ -97,13 +98,39 @@ def test_the_path_is_lit_in_the_tree(
     json.loads(figure.to_json())
 
 
+def boxes(figure: Any, what: str = "") -> list[tuple[float, float, int]]:
+    """From, to and depth of each box."""
+    found = re.findall(
+        r"M([^,]+),(\d+)H([^V]+)V",
+        "".join(shape.path for shape in figure.layout.shapes if shape.name.endswith(what)),
+    )
+    return [(float(left), float(right), int(depth)) for left, depth, right in found]
+
+
 def test_boxes_cover_every_level_of_the_tree(
     lander_trees: tuple[PolicyTree, ...], rules: RuleSet
 ) -> None:
     tree = lander_trees[0]
     figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node_of(rules.rules[0]))
-    boxes = sum(len(trace.x) // 5 for trace in figure.data if trace.fill == "toself")
-    assert boxes == tree.n_nodes
+    for depth in range(int(tree.depth.max()) + 1):
+        drawn = sum(right - left for left, right, level in boxes(figure) if level == depth)
+        assert drawn == pytest.approx(tree.support[tree.depth == depth].sum(), abs=1e-4)
+
+
+def test_boxes_around_a_rule_stand_where_its_states_do(
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet
+) -> None:
+    tree, node = lander_trees[0], node_of(rules.rules[-1])
+    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node, around=True)
+    start, end = tree.sample_start[node], tree.sample_start[node] + tree.samples[node]
+    assert any(
+        left <= start / len(tree.demonstrated) + 1e-5
+        and right >= end / len(tree.demonstrated) - 1e-5
+        and depth == tree.depth[node]
+        for left, right, depth in boxes(figure, "a rule")
+    )
+    hovers = next(trace for trace in figure.data if trace.name == "boxes")
+    assert f"{int(tree.samples[node]):,} states" in "".join(hovers.text)
 
 
 def test_a_large_tree_keeps_its_rules_when_boxes_are_left_out(
@@ -113,12 +140,8 @@ def test_a_large_tree_keeps_its_rules_when_boxes_are_left_out(
     tree = lander_trees[0]
     cut = cut_nodes(tree, **AT)
     figure = figures.tree_figure(tree, cut, int(cut[-1]))
-    boxes = sum(
-        len(trace.x) // 5
-        for trace in figure.data
-        if trace.fill == "toself" and trace.name.endswith("a rule")
-    )
-    assert boxes == len(cut)
+    drawn = sum(right - left for left, right, _ in boxes(figure, "a rule"))
+    assert drawn == pytest.approx(tree.support[cut].sum(), abs=1e-4)
 
 
 def test_a_rule_at_the_root_has_a_figure(lander_trees: tuple[PolicyTree, ...]) -> None:
@@ -126,18 +149,6 @@ def test_a_rule_at_the_root_has_a_figure(lander_trees: tuple[PolicyTree, ...]) -
     assert cut.tolist() == [0]
     for around in (False, True):
         assert figures.tree_figure(lander_trees[0], cut, 0, around=around).data
-
-
-def test_the_interval_is_shaded(
-    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
-) -> None:
-    for one in feature_evidence(lander_like, lander_trees[0], rules.rules[0]):
-        figure = figures.feature_figure(one, lander_like.features[one.feature], "#0072B2")
-        assert len(figure.data) == 2
-        shade = figure.layout.shapes[0]
-        assert shade.x0 < shade.x1
-        finite = np.isfinite([one.bounds.low, one.bounds.high]).sum()
-        assert len(figure.layout.shapes) == 1 + finite
 
 
 def test_the_path_table_escapes_names_from_files(
@@ -154,13 +165,6 @@ def test_the_path_table_escapes_names_from_files(
     assert "<script>" not in html
     assert "<b>" not in html
     assert "this is the rule" in html
-
-
-def test_interval_text_names_the_feature(
-    lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
-) -> None:
-    one = feature_evidence(lander_like, lander_trees[0], rules.rules[0])[0]
-    assert "tilt" in figures.interval_text(one, Feature("tilt", "rad"))
 
 
 def test_the_largest_rules_are_the_first_of_all(lander_trees: tuple[PolicyTree, ...]) -> None:
