@@ -47,15 +47,25 @@ def tree_place(
     thresholds: Thresholds,
     node: int,
     *,
+    note: str,
     leaves: bool,
     dark: bool,
 ) -> str:
-    """The neighbourhood of a node in the tree, in HTML; the arguments are those of `tree_picture`.
+    """The neighbourhood of a node in the tree, in HTML without script.
+
+    Args:
+        key: As those that follow, see `tree_picture`.
+        tree: One action dimension's.
+        thresholds: At which it is cut.
+        node: At the end of the path.
+        note: Said below it.
+        leaves: Whether every leaf is a rule, whatever the thresholds.
+        dark: Whether the theme is.
 
     Returns:
-        HTML without script.
+        Made once for each choice.
     """
-    return _place(_told(key, tree, thresholds), node, leaves, dark, tree, thresholds)
+    return _place(_told(key, tree, thresholds), node, note, leaves, dark, tree, thresholds)
 
 
 def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
@@ -78,9 +88,16 @@ def _picture(
 
 @st.cache_resource(max_entries=96, show_spinner=False)
 def _place(
-    told: str, node: int, leaves: bool, dark: bool, _tree: PolicyTree, _thresholds: Thresholds
+    told: str,
+    node: int,
+    note: str,
+    leaves: bool,
+    dark: bool,
+    _tree: PolicyTree,
+    _thresholds: Thresholds,
 ) -> str:
-    return place_html(_tree, _cut(told, leaves, _tree, _thresholds), node, dark=dark)
+    cut = _cut(told, leaves, _tree, _thresholds)
+    return place_html(_tree, cut, node, note=note, dark=dark)
 
 
 @st.cache_resource(max_entries=12, show_spinner=False)

@@ -276,13 +276,14 @@ def show_rule(rule: Rule, rule_set: RuleSet, buttons: Callable[[], None]) -> Non
         st.caption(
             f"Rule {rule.id} · "
             + (f"{measures(rule)} · " if reached else "")
-            + f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}",
+            + f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}"
+            + (f"  \n{sureness(rule)}" if reached and compact is None else ""),
             help=MEASURES,
         )
         if compact is not None:
             show_origin(compact.as_shipped(rule), compact.shipped)
         elif reached:
-            show_sureness(rule)
+            st.html(evidence_bar(rule, thresholds.confidence))
         if not reached:
             st.info(
                 "No demonstrated state reaches this rule. It is for states that the expert never "
@@ -315,12 +316,11 @@ def measures(rule: Rule) -> str:
     )
 
 
-def show_sureness(rule: Rule) -> None:
+def sureness(rule: Rule) -> str:
     """How sure the rule is, on what it was mined from and on what was held out."""
     words = f"{evidence_text(rule)} · {intervals_text(rule)}"
     below = rule.held_out is not None and verdict(rule, thresholds.confidence) == "below"
-    st.caption(f":red[{words}; too low]" if below else words)
-    st.html(evidence_bar(rule, thresholds.confidence))
+    return f":red[{words}; too low]" if below else words
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
@@ -350,11 +350,20 @@ def show_tree(rule: Rule) -> None:
             required=True,
             label_visibility="collapsed",
         )
+    note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
+        "Rules are full in colour, what is cut off below them is grey. "
+        if compact is None
+        else "Every leaf is a rule, full in colour. "
+    )
     key = compact.digest if compact is not None else ""
     leaves, dark = compact is not None, state.is_dark()
     if view == AROUND:
         with st.container(key="tree_figure"):
-            st.html(tree_place(key, tree, thresholds, node_of(rule), leaves=leaves, dark=dark))
+            st.html(
+                tree_place(
+                    key, tree, thresholds, node_of(rule), note=note, leaves=leaves, dark=dark
+                )
+            )
     else:
         st.plotly_chart(
             tree_picture(
@@ -364,16 +373,11 @@ def show_tree(rule: Rule) -> None:
             config={"displaylogo": False, "scrollZoom": True},
             alt="The decision tree with the path of the rule",
         )
-    st.caption(
-        f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. "
-        + (
-            "Rules are full in colour, what is cut off below them is grey. "
-            if compact is None
-            else "Every leaf is a rule, full in colour. "
+        st.caption(
+            note
+            + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
+            + "Drag or scroll to zoom, double-click to go back."
         )
-        + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
-        + ("" if view == AROUND else "Drag or scroll to zoom, double-click to go back.")
-    )
 
 
 def show_features(rule: Rule) -> None:

@@ -47,7 +47,7 @@ _STYLE = """<style>
 .sarl-features .x { top: 100%; margin-top: 0.4rem; transform: translateX(-50%); }
 .sarl-features .bins { position: absolute; inset: 0; display: flex; }
 .sarl-features .bins b { flex: 1 1 0; }
-.sarl-features .bins b:hover { background: rgba(128,140,150,0.2); }
+.sarl-features .bins b[title]:hover { background: rgba(128,140,150,0.2); }
 .sarl-features .name { font-size: 0.8rem; opacity: 0.75; text-align: center;
   margin: 1.5rem 0.6rem 0 2.9rem; }
 </style>""".replace("MARKER", MARKER_COLOUR).replace("ASKED", faded(MARKER_COLOUR, 0.13))
@@ -156,14 +156,22 @@ def _bins(one: FeatureEvidence, feature: Feature) -> str:
     unit = f" {feature.unit}" if feature.unit else ""
     edges = [number_text(edge) for edge in one.edges.tolist()]
     reached = one.at_rule.any()
-    parts = []
+    parts, empty = [], 0
     for index, (everywhere, at_rule) in enumerate(
         zip(one.everywhere.tolist(), one.at_rule.tolist(), strict=True)
     ):
+        if not everywhere and not at_rule:
+            empty += 1
+            continue
+        if empty:
+            parts.append(f'<b style="flex-grow:{empty}"></b>')
+            empty = 0
         told = f"{edges[index]} to {edges[index + 1]}{unit}: {share_text(everywhere)} of all states"
         if reached:
             told += f", {share_text(at_rule)} of those of the rule"
         parts.append(f'<b title="{escape(told)}"></b>')
+    if empty:
+        parts.append(f'<b style="flex-grow:{empty}"></b>')
     return "".join(parts)
 
 

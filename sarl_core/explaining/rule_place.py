@@ -52,16 +52,25 @@ _STYLE = """<style>
   transform: translateY(-50%) rotate(180deg); opacity: 0.75; }
 .sarl-place .name { font-size: 0.8rem; opacity: 0.75; text-align: center;
   margin: 1.6rem 0.6rem 0 2.9rem; }
+.sarl-place .note { font-size: 0.875rem; opacity: 0.7; margin: 1rem 0 0; }
 </style>""".replace("MARKER", MARKER_COLOUR)
 
 
-def place_html(tree: PolicyTree, cut: NDArray[np.int64], node: int, *, dark: bool = False) -> str:
+def place_html(
+    tree: PolicyTree,
+    cut: NDArray[np.int64],
+    node: int,
+    *,
+    note: str = "",
+    dark: bool = False,
+) -> str:
     """What lies around a rule: a box a node, as wide as its share of the states.
 
     Args:
         tree: With n nodes.
         cut: Nodes that are rules, (k,).
         node: The rule whose path is lit.
+        note: Said below it.
         dark: Whether it stands on dark ground.
 
     Returns:
@@ -95,7 +104,8 @@ def place_html(tree: PolicyTree, cut: NDArray[np.int64], node: int, *, dark: boo
         f"{_queries(tree, path, window)}"
         f'<span aria-hidden="true">{_ticks(tree, window)}'
         '<small class="side">Conditions so far</small></span></div>'
-        '<div class="name" aria-hidden="true">Share of the states</div></div>'
+        '<div class="name" aria-hidden="true">Share of the states</div>'
+        f'<p class="note">{escape(note)}</p></div>'
     )
 
 

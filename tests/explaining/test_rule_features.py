@@ -65,14 +65,15 @@ def test_the_interval_is_shaded_and_its_bounds_are_lines(
     assert re.findall(r'class="bound" style="left:([^"]+)"', html) == lines
 
 
-def test_every_bin_says_what_is_in_it() -> None:
-    told = re.findall(r'<b title="([^"]+)"', drawn(evidence(4.0, 6.0)))
+def test_every_bin_says_what_is_in_it_and_an_empty_one_keeps_its_room() -> None:
+    html = drawn(evidence(4.0, 6.0))
+    told = re.findall(r'<b title="([^"]+)"', html)
     assert told == [
         "0 to 2 m: 50 % of all states, 0 % of those of the rule",
         "2 to 4 m: 25 % of all states, 0 % of those of the rule",
         "4 to 6 m: 25 % of all states, 100 % of those of the rule",
-        "6 to 8 m: 0 % of all states, 0 % of those of the rule",
     ]
+    assert re.findall(r'<b style="([^"]+)"', html) == ["flex-grow:1"]
 
 
 def test_a_figure_is_told_in_words_and_in_signs() -> None:
