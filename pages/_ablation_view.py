@@ -7,6 +7,7 @@ from typing import Any
 
 import streamlit as st
 from _ablations import Wanted
+from _rule_table import action_column
 from _words import escaped
 
 from sarl_core.explaining.ablation_figures import (
@@ -19,8 +20,7 @@ from sarl_core.explaining.ablation_figures import (
     left_out_text,
 )
 from sarl_core.explaining.cells import safe_cells
-from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.language import action_text, sentence
+from sarl_core.explaining.language import sentence
 from sarl_core.rollouts.ablation import Ablation
 
 PLAIN = {"displayModeBar": False}
@@ -144,12 +144,7 @@ def query() -> Mapping[str, str]:
 def column_config(found: Ablation) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
-    rule_set = found.shield.rule_set
-    colours = {
-        action_text(label, dimension): label_colour(label)
-        for dimension in rule_set.actions
-        for label in range(dimension.n_labels)
-    }
+    action, _ = action_column(found.shield.rule_set.actions, "What the rule says")
     failures = (
         f"Of {len(found.base):,} episodes; with all rules it is {found.base_failures:,}"
         if found.failures_known
@@ -182,9 +177,7 @@ def column_config(found: Ablation) -> dict[str, Any]:
         "Episodes": column.NumberColumn(
             format="localized", width=86, help="In which it made a difference to an action"
         ),
-        "Action": column.MultiselectColumn(
-            options=list(colours), color=list(colours.values()), width=150
-        ),
+        "Action": action,
         "When": column.TextColumn(width=300, help="The conditions under which the rule applies"),
     }
 

@@ -8,11 +8,10 @@ import _edits
 import _state as state
 import streamlit as st
 from _edits import Base
-from _rule_table import table_height
+from _rule_table import action_column, table_height
 from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.edit_words import change_text, edit_text, state_text
 from sarl_core.explaining.language import (
     action_text,
@@ -270,24 +269,14 @@ def _with_numbers(written: Any, order: list[int], found: Verdicts) -> Any:
 
 def _columns(rule_set: RuleSet) -> dict[str, Any]:
     column = st.column_config
-    colours = {
-        action_text(label, dimension): label_colour(label)
-        for dimension in rule_set.actions
-        for label in range(dimension.n_labels)
-    }
-    action_width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    action, action_width = action_column(rule_set.actions, "What the rule says")
     return {
         "On": column.CheckboxColumn(width=40, help="Whether a shield uses the rule"),
         "Kind": column.TextColumn(
             width=70, help="Mined; pinned, so that it keeps its place; or added by hand"
         ),
         "Rule": column.TextColumn(width=80, help="Its name"),
-        "Action": column.MultiselectColumn(
-            width=action_width,
-            help="What the rule says",
-            options=list(colours),
-            color=list(colours.values()),
-        ),
+        "Action": action,
         "When": column.TextColumn(
             width=570 - action_width, help="The conditions under which the rule applies"
         ),

@@ -12,9 +12,25 @@ from sarl_core.explaining.evidence_tables import held_out_columns
 from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.tables import rule_columns
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, RuleSet
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
+
+
+def action_column(actions: Sequence[LabelledDimension], meaning: str) -> tuple[Any, int]:
+    """The column of what rules say, each action in its colour, and how many pixels wide it is."""
+    colours = {
+        action_text(label, dimension): label_colour(label)
+        for dimension in actions
+        for label in range(dimension.n_labels)
+    }
+    # About seven pixels a letter; what a long action takes, the conditions give.
+    width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    column = st.column_config.MultiselectColumn(
+        width=width, help=meaning, options=list(colours), color=list(colours.values())
+    )
+    return column, width
 
 
 def column_config(rule_set: RuleSet) -> dict[str, Any]:
@@ -24,20 +40,9 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
     beginning of the conditions are seen.
     """
     column = st.column_config
-    colours = {
-        action_text(label, dimension): label_colour(label)
-        for dimension in rule_set.actions
-        for label in range(dimension.n_labels)
-    }
-    # About seven pixels a letter; what a long action takes, the conditions give.
-    action_width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    action, action_width = action_column(rule_set.actions, "What the expert does there")
     return {
-        "Action": column.MultiselectColumn(
-            width=action_width,
-            help="What the expert does there",
-            options=list(colours),
-            color=list(colours.values()),
-        ),
+        "Action": action,
         "When": column.TextColumn(
             width=472 - action_width, help="The conditions under which the rule applies"
         ),

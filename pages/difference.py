@@ -8,15 +8,14 @@ import _edits
 import _state as state
 import streamlit as st
 from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, compact_file, rules_for
-from _rule_table import table_height
+from _rule_table import action_column, table_height
 from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.confusion_table import confusion_html
 from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
 from sarl_core.explaining.difference_words import decided_text, rows_text
-from sarl_core.explaining.language import action_text, counted
+from sarl_core.explaining.language import counted
 from sarl_core.mining.difference import check_comparable
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import ground_of
@@ -141,11 +140,7 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
     )
     frame = rules_frame(digests, KINDS if view == EVERY else (str(view),), found)
     column = st.column_config
-    colours = {
-        action_text(label, action): label_colour(label)
-        for action in found.first.actions
-        for label in range(action.n_labels)
-    }
+    action, _ = action_column(found.first.actions, "What the rule says")
     st.dataframe(
         frame,
         hide_index=True,
@@ -155,11 +150,7 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
         column_config={
             "What": column.TextColumn(width=75),
             "Rule": column.TextColumn(width=80),
-            "Action": column.MultiselectColumn(
-                width=min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250),
-                options=list(colours),
-                color=list(colours.values()),
-            ),
+            "Action": action,
             "When": column.TextColumn(width=320 if "Change" in frame else 500),
             "Change": column.TextColumn(width=240),
             "States": column.NumberColumn(
