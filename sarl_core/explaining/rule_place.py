@@ -25,7 +25,7 @@ from sarl_core.explaining.rule_figures import (
 from sarl_core.mining.tree import PolicyTree
 
 _WIDTH = 620  # pixels that the boxes have on a wide screen
-_THINNEST = 0.5  # pixels: boxes that are narrower are drawn together
+_THINNEST = 1.0  # pixels: boxes that are narrower are drawn together
 _HIT = 4.0  # pixels: what is narrower is not met by the pointer
 _BOX = 0.92  # of a row's height
 _LEVELS = 9  # numbered at most
