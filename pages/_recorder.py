@@ -89,7 +89,8 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
     selected = [] if place is None or place // PAGE != page else [place % PAGE]
     wanted = {"selection": {"rows": selected, "columns": [], "cells": []}}
     before = st.session_state.get("recorder_table")
-    if before is not None and list(before["selection"]["rows"]) != selected:
+    jumped = st.session_state.pop("_jumped", False)
+    if before is not None and (jumped or list(before["selection"]["rows"]) != selected):
         st.session_state["recorder_table"] = wanted
     st.dataframe(
         frame(recorded, on_page),

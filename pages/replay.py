@@ -233,3 +233,8 @@ with st.container(horizontal=True):
 SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
 step_by_step(replayed, shown, linked=SHOWN_AS.get(asked.rules))
 comparison(shown)
+if chosen is not None:
+    # The slider of another episode is another widget, and a new one takes its step from the URL:
+    # now that it is there, it is told again, and the row of the step with it.
+    st.session_state["_step"], st.session_state["_jumped"] = chosen[1], True
+    st.rerun()
