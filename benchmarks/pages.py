@@ -148,10 +148,11 @@ def names(quick: bool) -> Iterable[Row]:
     yield from _rows(
         quick,
         Control(
-            "Names, a feature's name",
+            "Names, a feature's name (the table waits 150 ms before it sends it)",
             "names",
             _typed_name,
             ("[data-testid=stMarkdown]",),
+            reach=TABLE_WAIT + REACH,
         ),
     )
 
@@ -177,11 +178,12 @@ def replay(quick: bool) -> Iterable[Row]:
         quick,
         Control("Replay, the step", path, partial(_arrow, name="Step"), watched, _run),
         Control(
-            "Replay, a row of the flight recorder",
+            "Replay, a row of the flight recorder (sent 150 ms later, too)",
             path,
             partial(_table_row, selector=".st-key-recorder_table"),
             watched,
             _run,
+            TABLE_WAIT + REACH,
         ),
     )
 
