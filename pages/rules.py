@@ -15,7 +15,7 @@ from _tree_picture import tree_picture, tree_place
 from _words import escaped
 
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.evidence import example_columns, feature_evidence, path_steps
+from sarl_core.explaining.evidence import feature_evidence, path_steps
 from sarl_core.explaining.evidence_words import evidence_bar, evidence_text, intervals_text
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import (
@@ -26,6 +26,7 @@ from sarl_core.explaining.language import (
     share_text,
 )
 from sarl_core.explaining.path_table import path_table
+from sarl_core.explaining.rule_examples import examples_html
 from sarl_core.explaining.rule_features import features_html
 from sarl_core.mining.holding_out import lower_bound, verdict, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
@@ -74,11 +75,10 @@ def features_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> str:
 
 
 @st.cache_resource(max_entries=96, show_spinner=False)
-def examples_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> Any:
-    """Some states of a rule as a data frame."""
-    import pandas as pd
-
-    return pd.DataFrame(example_columns(demonstrations, _tree, _rule))
+def examples_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> str:
+    """Some states of a rule, under a heading."""
+    heading = "Example states" if _rule.samples > 1 else "The one state it applies to"
+    return f"<h3>{heading}</h3>{examples_html(demonstrations, _tree, _rule)}"
 
 
 def downloads(rule_set: RuleSet) -> None:
@@ -389,28 +389,9 @@ def show_features(rule: Rule) -> None:
 
 def show_examples(rule: Rule) -> None:
     """Some states to which the rule applies."""
-    if not rule.samples:
-        return
-    examples = examples_of(key_of(rule), grown[rule.dimension], rule)
-    count = len(examples)
-    st.subheader("Example states" if count > 1 else "The one state it applies to")
-    st.dataframe(
-        examples,
-        hide_index=True,
-        height=table_height(count, 10),
-        key="examples",
-        column_config={
-            "Expert did": st.column_config.TextColumn(width=130),
-            "As the rule says": st.column_config.CheckboxColumn(width=125),
-        }
-        | {
-            name: st.column_config.NumberColumn(
-                format="%d" if name in ("Episode", "Step") else "%.4g"
-            )
-            for name in list(examples)[2:]
-        },
-        alt="States to which the rule applies",
-    )
+    if rule.samples:
+        with st.container(key="examples"):
+            st.html(examples_of(key_of(rule), grown[rule.dimension], rule))
 
 
 with st.spinner("Mining the rules …"):

@@ -14,7 +14,7 @@ from sarl_core.explaining.evidence_words import (
     intervals_text,
     verdict_counts,
 )
-from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks
+from sarl_core.explaining.html_plot import PLOT_STYLE, Axis, Scale, area, plot, round_ticks
 from sarl_core.explaining.language import action_text, counted, share_text
 from sarl_core.mining.evidence import Interval
 from sarl_core.mining.holding_out import held_out_interval, mined_interval, verdict
@@ -25,13 +25,16 @@ _FEW = 60  # rules up to which whiskers are drawn wide
 _NUMBERED = 30  # rules up to which each has its number
 _TIPS = 60
 _MINED = faded(MUTED_COLOUR, 0.7)
-_STYLE = """<style>
+_STYLE = (
+    """<style>
 .sarl-sure b { margin-left: -0.5px; width: 1px; }
 .sarl-sure b::after { content: ''; position: absolute; left: 50%; bottom: var(--at);
   width: 4px; height: 4px; margin: 0 0 -2px -2px; border-radius: 50%; background: inherit; }
 .sarl-few b { margin-left: -1.5px; width: 3px; }
 .sarl-few b::after { width: 9px; height: 9px; margin: 0 0 -4.5px -4.5px; }
 </style>"""
+    + PLOT_STYLE
+)
 
 
 def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> str:
@@ -134,7 +137,7 @@ def enough_plot(missing: Sequence[float]) -> str:
     middles = (np.arange(_TIPS) + 0.5) * far / _TIPS
     by_then = np.searchsorted(some, middles, side="right").tolist()
     widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, most, min(4, most))
-    return plot(
+    return PLOT_STYLE + plot(
         area(corners, across, upwards, faded(colour, 0.55)),
         Axis(across, widths, [f"{tick:,g}" for tick in widths], "More episodes"),
         Axis(upwards, heights, [f"{tick:,g}" for tick in heights], "Rules that reach it"),

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # of round numbers
 
-_STYLE = """<style>
+PLOT_STYLE = """<style>
 .sarl-plot { position: relative; margin: 0.4rem 0.6rem 0 3.4rem; }
 .sarl-plot i, .sarl-plot b { position: absolute; }
 .sarl-plot .grid { left: 0; right: 0; height: 1px; background: currentColor; opacity: 0.13; }
@@ -24,7 +24,7 @@ _STYLE = """<style>
 .sarl-plot .x { top: 100%; margin-top: 0.4rem; transform: translateX(-50%); }
 .sarl-plot .bins { position: absolute; inset: 0; display: flex; }
 .sarl-plot .bins u { flex: 1 1 0; }
-.sarl-plot .bins u:hover { background: rgba(128,140,150,0.16); }
+.sarl-plot .bins u[title]:hover { background: rgba(128,140,150,0.16); }
 .sarl-plot-name { font-size: 0.8rem; opacity: 0.75; }
 .sarl-plot-under { text-align: center; margin: 1.5rem 0.6rem 0 3.4rem; }
 </style>"""
@@ -43,11 +43,11 @@ class Scale(NamedTuple):
 
     def place(self, value: float) -> str:
         """Where a number stands, as "12.5%"."""
-        return f"{100 * (value - self.low) / (self.high - self.low):.3f}%"
+        return f"{100 * (value - self.low) / (self.high - self.low):.2f}%"
 
     def length(self, first: float, last: float) -> str:
         """How far it is from one number to a larger one, likewise."""
-        return f"{100 * (last - first) / (self.high - self.low):.3f}%"
+        return f"{100 * (last - first) / (self.high - self.low):.2f}%"
 
 
 class Axis(NamedTuple):
@@ -83,10 +83,12 @@ def plot(
         upwards: The axis at the left.
         label: What is seen, in words, for those who do not see it.
         height: Of the ground, in pixels.
-        tips: What is said where the pointer is, for as many equal parts from left to right.
+        tips: What is said where the pointer is, for as many equal parts from left to right; "" for
+            nothing.
 
     Returns:
-        HTML without script; `label`, `tips` and the axes' texts are escaped.
+        HTML without script; `label`, `tips` and the axes' texts are escaped. `PLOT_STYLE` has to
+        stand before the first.
     """
     grid = "".join(
         f'<i class="grid" style="bottom:{upwards.scale.place(tick)}"></i>' for tick in upwards.ticks
@@ -98,11 +100,11 @@ def plot(
         f'<small class="x" style="left:{across.scale.place(tick)}">{escape(text)}</small>'
         for tick, text in zip(across.ticks, across.texts, strict=True)
     )
-    bins = "".join(f'<u title="{escape(tip)}"></u>' for tip in tips)
+    bins = "".join(f'<u title="{escape(tip)}"></u>' if tip else "<u></u>" for tip in tips)
     above = f'<div class="sarl-plot-name">{escape(upwards.name)}</div>' if upwards.name else ""
     below = f'<div class="sarl-plot-name sarl-plot-under">{escape(across.name) or "&nbsp;"}</div>'
     return (
-        f'{_STYLE}{above}<div class="sarl-plot" style="height:{height}px">'
+        f'{above}<div class="sarl-plot" style="height:{height}px">'
         f'<div role="img" aria-label="{escape(label)}">{grid}{content}</div>'
         f'<span aria-hidden="true">{numbers}</span>'
         f'<div class="bins" aria-hidden="true">{bins}</div></div>{below}'

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
+from sarl_core.explaining.html_plot import round_ticks
 from sarl_core.explaining.language import counted, label_text
-from sarl_core.explaining.rule_features import round_ticks
 from sarl_core.explaining.rule_figures import (
     below_rules,
     node_lines,

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.language import action_text, counted, number_text, sentence
 from sarl_core.explaining.what_if import (
     change_text,
@@ -26,7 +27,8 @@ from sarl_core.shielding.shield import Decision, Outside
 PLACED = "A person gave this rule its place: it is asked before the tree is."
 _SHOWN = 3  # features beyond the data that are named
 
-_STYLE = """<style>
+_STYLE = (
+    """<style>
 .sarl-state { font-size: 1rem; line-height: 1.55; }
 .sarl-state h3 { font-size: 1.1rem; font-weight: 600; line-height: 1.2;
   letter-spacing: -0.005em; margin: 0; padding: 0.75rem 0 0.8rem 0; }
@@ -40,46 +42,39 @@ _STYLE = """<style>
 .sarl-state .allowed { background: rgba(0,158,115,0.2); }
 .sarl-state .beyond { background: rgba(194,24,91,0.2); }
 .sarl-state .quiet { opacity: 0.65; font-size: 0.875rem; }
-.sarl-state .rows { overflow: auto; max-height: 24rem; margin-bottom: 0.5rem; }
-.sarl-state table { width: 100%; border-collapse: collapse; font-size: 0.875rem; }
-.sarl-state th { text-align: left; font-weight: 400; opacity: 0.7; white-space: nowrap;
-  padding: 0 0.8rem 0.2rem 0; }
-.sarl-state th[title] { text-decoration: underline dotted; text-underline-offset: 3px;
-  cursor: help; }
-.sarl-state td { padding: 0.24rem 0.8rem 0.24rem 0;
-  border-top: 1px solid rgba(128,140,150,0.25); }
-.sarl-state .w { min-width: 11rem; }
-.sarl-state .m { min-width: 7rem; }
-.sarl-state .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 </style>"""
+    + TABLE_STYLE
+)
 
 _WIDTH = "interquartile range, the width of the middle half of its demonstrated values"
 _CHANGES = (
-    ("If", "w", ""),
-    ("Executed", "m", ""),
-    ("Rule", "", ""),
-    ("In spreads", "n", f"The change in units of the feature's {_WIDTH}"),
-    (
+    Column("If", "w"),
+    Column("Executed", "m"),
+    Column("Rule"),
+    Column("In spreads", "n", f"The change in units of the feature's {_WIDTH}"),
+    Column(
         "From exactly",
         "n",
         "The nearest float32 number at which the decision is another: one step less changes "
         "nothing",
     ),
-    ("Demonstrated", "", "Whether values as far as this were demonstrated"),
+    Column("Demonstrated", "", "Whether values as far as this were demonstrated"),
 )
 _MISSES = (
-    ("Rule", "", ""),
-    ("Says", "m", ""),
-    ("Would apply if", "w", ""),
-    ("In spreads", "n", "The change in units of the features' interquartile ranges, summed up"),
-    (
+    Column("Rule"),
+    Column("Says", "m"),
+    Column("Would apply if", "w"),
+    Column(
+        "In spreads", "n", "The change in units of the features' interquartile ranges, summed up"
+    ),
+    Column(
         "In force",
         "",
         "Whether it would then decide; else a rule that was given its place before it does",
     ),
-    ("From exactly", "n", ""),
+    Column("From exactly", "n"),
 )
-_CONDITIONS = (("Condition", "", ""), ("The state has", "n", ""), ("Room to move", "n", ""))
+_CONDITIONS = (Column("Condition"), Column("The state has", "n"), Column("Room to move", "n"))
 
 
 def decision_html(
@@ -135,7 +130,7 @@ def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet)
         return _note(f"{which}: the agent's action is passed on as it is.")
     values = tuple(state.astype(np.float64).tolist())
     views = condition_views(rule, values, rule_set)
-    table = _table(_CONDITIONS, [(view.condition, view.value, view.room) for view in views])
+    table = table_html(_CONDITIONS, [(view.condition, view.value, view.room) for view in views])
     said = f"<p><b>Rule {escape(rule.id)}.</b> {escape(sentence(rule, rule_set))}</p>"
     return f"{said}{table if views else ''}{_data_html(rule, values, rule_set)}"
 
@@ -176,7 +171,7 @@ def changes_html(
     rows = [_change_row(change, spans, rule_set) for change in changes]
     condition, does, *_ = rows[0]
     said = f"<p>Executed would be <b>{escape(does)}</b> if {escape(condition)}.</p>"
-    return _section(f"{heading}{said}{_table(_CHANGES, rows)}")
+    return _section(f"{heading}{said}{table_html(_CHANGES, rows)}")
 
 
 def _change_row(
@@ -214,7 +209,7 @@ def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
         "that lets it apply."
     )
     return _section(
-        f"{heading}{_table(_MISSES, [_miss_row(miss, rule_set) for miss in misses])}{note}"
+        f"{heading}{table_html(_MISSES, [_miss_row(miss, rule_set) for miss in misses])}{note}"
     )
 
 
@@ -267,28 +262,3 @@ def _note(text: str) -> str:
 
 def _yes(holds: bool) -> str:
     return "yes" if holds else "no"
-
-
-def _table(columns: Sequence[tuple[str, str, str]], rows: Sequence[Sequence[str]]) -> str:
-    """A table whose columns are a title, a CSS class and help each."""
-    head = "".join(
-        f"<th{_attribute('class', css)}{_attribute('title', told)}>{escape(title)}</th>"
-        for title, css, told in columns
-    )
-    body = "".join(
-        "<tr>"
-        + "".join(
-            f"<td{_attribute('class', css)}>{escape(cell)}</td>"
-            for (_, css, _), cell in zip(columns, row, strict=True)
-        )
-        + "</tr>"
-        for row in rows
-    )
-    return (
-        f'<div class="rows"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
-    )
-
-
-def _attribute(name: str, value: str) -> str:
-    return f' {name}="{escape(value)}"' if value else ""

@@ -107,11 +107,11 @@ def test_a_plot_places_and_escapes_what_is_written() -> None:
     across = Axis(Scale(10, 20), [10, 15], ["<ten>", "15"], "a & b")
     upwards = Axis(Scale(0, 4), [1], ["1"])
     html = plot("<i></i>", across, upwards, label='"seen"', height=50, tips=["<tip>"])
-    assert 'style="left:50.000%">15<' in html
-    assert 'style="bottom:25.000%">1<' in html
+    assert 'style="left:50.00%">15<' in html
+    assert 'style="bottom:25.00%">1<' in html
     assert "a &amp; b" in html
     assert 'aria-label="&quot;seen&quot;"' in html
     for raw in ("<ten>", "<tip>"):
         assert raw not in html
     cut = area([(10, 1), (20, 2)], across.scale, upwards.scale, "#123456")
-    assert "polygon(0.000% 100%,0.000% 75.00%,100.000% 50.00%,100.000% 100%)" in cut
+    assert "polygon(0.00% 100%,0.00% 75.00%,100.00% 50.00%,100.00% 100%)" in cut
