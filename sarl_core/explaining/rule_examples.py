@@ -35,5 +35,5 @@ def _text(name: str, value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float) and name not in _WHOLE:
-        return f"{value:.4g}"
+        return f"{value + 0.0:.4g}"  # no -0
     return str(value)
