@@ -82,15 +82,13 @@ def ablation(quick: bool) -> Iterable[Row]:
     """Rules taken out one by one, on all cores against one."""
     cores = os.cpu_count() or 1
     shield = Shield(data.rules())
-    count, most = (40, 30) if quick else (100, 60)  # starting processes takes seconds
+    count, most = (40, 20) if quick else (50, 30)  # starting processes takes seconds
     found: dict[int, Ablation] = {}
 
     def with_jobs(jobs: int) -> None:
         found[jobs] = ablate(data.ENV_ID, "novice", shield, episodes=count, most=most, jobs=jobs)
 
-    ours, theirs = side_by_side(
-        lambda: with_jobs(cores), lambda: with_jobs(1), repeats=1 if quick else 2
-    )
+    ours, theirs = side_by_side(lambda: with_jobs(cores), lambda: with_jobs(1), repeats=1)
     yield Row(
         f"ablation of {most} rules, {count} LunarLander episodes, {cores} cores",
         "the same on one core",
