@@ -39,7 +39,7 @@ WARM = 2  # moves that do not count: the first find a server that has just woken
 # second later.
 WATCH = """
 (() => {
-  const seen = ['d', 'src', 'style', 'x', 'transform', 'value'];
+  const seen = ['class', 'd', 'height', 'src', 'style', 'transform', 'value', 'width', 'x', 'y'];
   let drawn = 0;
   const write = CanvasRenderingContext2D.prototype.fillText;
   CanvasRenderingContext2D.prototype.fillText = function (text, x, y, ...rest) {
@@ -53,7 +53,8 @@ WATCH = """
   window.released = (answer, most) => new Promise(done => {
     const tables = answer.includes('tables');
     const chosen = answer.filter(one => one !== 'tables').join(',') || 'nothing';
-    let changed = [false, false], before = 0, start = null, last = [null, null];
+    let changed = [false, false], pending = [false, false];
+    let before = 0, start = null, last = [null, null];
     const watch = new MutationObserver(records => {
       changed[1] = true;
       changed[0] ||= records.some(({target, addedNodes, removedNodes}) =>
@@ -63,11 +64,13 @@ WATCH = """
     const look = () => {
       const now = performance.now() - start;
       if (drawn !== before) { changed = [changed[0] || tables, true]; before = drawn; }
-      last = last.map((then, which) => changed[which] ? now : then);
-      changed = [false, false];
+      // What changed before a frame is on screen as the next one begins.
+      last = last.map((then, which) => pending[which] ? now : then);
+      [pending, changed] = [changed, [false, false]];
       const state = document.querySelector('[data-test-script-state]');
       const idle = state.getAttribute('data-test-script-state') === 'notRunning';
-      if (idle && now - (last[1] ?? 0) > 500 || now > most) { watch.disconnect(); done(last); }
+      const quiet = !pending[1] && now - (last[1] ?? 0) > 500;
+      if (idle && quiet || now > most) { watch.disconnect(); done(last); }
       else requestAnimationFrame(look);
     };
     const begin = () => {
@@ -91,7 +94,7 @@ Aim = Callable[[Page, int], Release]
 
 
 class Answer(NamedTuple):
-    """What one release took, in seconds.
+    """What one press took, in seconds.
 
     Attributes:
         answer: Until what was watched was new.

@@ -1,4 +1,4 @@
-"""What waits on each page: a control released, until the page's answer is on screen.
+"""What waits on each page: a control pressed, until the page's answer is on screen.
 
 On the shipped Lunar Lander, 15,000 steps. The answer is what the control is for, and it is there
 when the last of it is; behind it stands how long the rest of the page took. What a page mines or
@@ -116,17 +116,30 @@ def evidence(quick: bool) -> Iterable[Row]:
             "Evidence, another share held out",
             "evidence?holdout=0.2",
             partial(_arrow, name="Share of the episodes held out"),
-            (".st-key-verdicts", ".st-key-overview", TABLES),
+            (".st-key-verdicts", ".st-key-overview", ".st-key-enough", TABLES),
         ),
     )
 
 
 def rules(quick: bool) -> Iterable[Row]:
     """Another rule, by its row and by a button, and a filter by the lower bound."""
-    watched = (".st-key-sentence", ".st-key-tree_figure", ".st-key-features", TABLES)
+    watched = (
+        ".st-key-sentence",
+        ".sarl-path",
+        ".st-key-tree_figure",
+        ".st-key-features",
+        ".st-key-examples",
+        TABLES,
+    )
     yield from _rows(
         quick,
         Control("Rules, next rule", "rules", _there_and_back, watched),
+        Control(
+            "Rules, next rule, never seen before, unfiltered",
+            f"rules?{UNFILTERED}",
+            partial(_button, selector="button:has-text('Next rule')"),
+            watched,
+        ),
         Control(
             "Rules, another rule, a row of the table (which waits 150 ms before it sends it)",
             "rules",
@@ -138,7 +151,7 @@ def rules(quick: bool) -> Iterable[Row]:
             "Rules, lower bound at least, unfiltered",
             f"rules?{UNFILTERED}&lower=0.5",
             partial(_step, label="Lower bound at least"),
-            ("[data-testid=stCaptionContainer]",),
+            ("[data-testid=stCaptionContainer]", TABLES),
         ),
     )
 
@@ -173,7 +186,7 @@ def report(quick: bool) -> Iterable[Row]:
 def replay(quick: bool) -> Iterable[Row]:
     """The step of an episode: its slider, and its row in the flight recorder."""
     path = "replay?agent=novice&rules=unfiltered"
-    watched = (".st-key-timeline", ".sarl-picture", ".sarl-step", ".sarl-lit", TABLES)
+    watched = (".sarl-picture", ".sarl-step", ".sarl-lit", TABLES)
     yield from _rows(
         quick,
         Control("Replay, the step", path, partial(_arrow, name="Step"), watched, _run),

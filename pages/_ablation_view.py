@@ -144,7 +144,7 @@ def query() -> Mapping[str, str]:
 def column_config(found: Ablation) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
-    action, _ = action_column(found.shield.rule_set.actions, "What the rule says")
+    action, action_width = action_column(found.shield.rule_set.actions, "What the rule says")
     failures = (
         f"Of {len(found.base):,} episodes; with all rules it is {found.base_failures:,}"
         if found.failures_known
@@ -178,7 +178,9 @@ def column_config(found: Ablation) -> dict[str, Any]:
             format="localized", width=86, help="In which it made a difference to an action"
         ),
         "Action": action,
-        "When": column.TextColumn(width=300, help="The conditions under which the rule applies"),
+        "When": column.TextColumn(
+            width=450 - action_width, help="The conditions under which the rule applies"
+        ),
     }
 
 

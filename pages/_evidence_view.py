@@ -141,7 +141,7 @@ def show_enough(evidence: Evidence) -> None:
         "enough."
     )
     left, right = st.columns([2, 3], gap="medium")
-    with left:
+    with left, st.container(key="enough"):
         st.html(enough_plot(found.missing))
     with right:
         column = st.column_config

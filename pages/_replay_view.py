@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 from collections.abc import Callable
 
@@ -17,6 +18,7 @@ from _replays import (
     Replay,
 )
 from _words import escaped
+from streamlit.errors import StreamlitAPIException
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.language import counted, label_text, number_text, share_text
@@ -130,7 +132,9 @@ def pick_step() -> None:
     if points:
         step = points[0]["customdata"]
         st.session_state["_step"] = int(step["0"] if isinstance(step, dict) else step[0])
-        st.rerun("at_step")
+        # A click in a picture that is about to go finds no fragment: then the page runs as a whole.
+        with contextlib.suppress(StreamlitAPIException):
+            st.rerun("at_step")
 
 
 def go_to(step: int) -> None:
@@ -193,7 +197,7 @@ def mark_style(timeline: Timeline) -> str:
         f" left: calc({timeline.left - 1}px"
         f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
         # Of the page's ink, with a rim, so that it is seen on every colour.
-        " will-change: transform; background: currentColor;"
+        " background: currentColor;"
         " box-shadow: 0 0 0 1px rgba(140, 150, 160, 0.6); }"
         "</style>"
     )

@@ -55,11 +55,7 @@ def projection_choice(width: Width = "stretch") -> Projection:
 
 
 def outside_choice(width: Width = "stretch") -> Outside:
-    """The choice, kept in the URL (outside).
-
-    Args:
-        width: Of the widget, in pixels.
-    """
+    """What a rule does outside the data it was mined from (URL: outside)."""
     return cast(
         "Outside",
         st.selectbox(

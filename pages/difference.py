@@ -7,8 +7,9 @@ from typing import Any
 import _edits
 import _state as state
 import streamlit as st
-from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, compact_file, rules_for
+from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, rules_for
 from _rule_table import action_column, table_height
+from _settings import offered_rule_sets
 from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
@@ -29,12 +30,10 @@ SIDES = (("first", "First set", CHOSEN), ("second", "Second set", "unfiltered"))
 
 def options() -> list[str]:
     """The rule sets that can be had."""
-    offered = [CHOSEN, *PAPERS]
-    if compact_file().is_file():
-        offered.append(COMPACT)
-    if _edits.offered():
-        offered += [UNEDITED, EDITED]
-    return [*offered, OWN_FILE]
+    offered = offered_rule_sets([CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE])
+    if EDITED in offered:
+        offered.insert(offered.index(EDITED), UNEDITED)
+    return offered
 
 
 def side(key: str, label: str, default: str) -> tuple[RuleSet, str, str]:
@@ -140,7 +139,7 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
     )
     frame = rules_frame(digests, KINDS if view == EVERY else (str(view),), found)
     column = st.column_config
-    action, _ = action_column(found.first.actions, "What the rule says")
+    action, action_width = action_column(found.first.actions, "What the rule says")
     st.dataframe(
         frame,
         hide_index=True,
@@ -151,7 +150,7 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
             "What": column.TextColumn(width=75),
             "Rule": column.TextColumn(width=80),
             "Action": action,
-            "When": column.TextColumn(width=320 if "Change" in frame else 500),
+            "When": column.TextColumn(width=(470 if "Change" in frame else 650) - action_width),
             "Change": column.TextColumn(width=240),
             "States": column.NumberColumn(
                 format="localized",

@@ -232,9 +232,9 @@ with st.container(horizontal=True):
 # Which set the Rules page has to show, to show a rule of this replay.
 SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
 step_by_step(replayed, shown, linked=SHOWN_AS.get(asked.rules))
-comparison(shown)
-if chosen is not None:
+if chosen is not None and shown is elsewhere:
     # The slider of another episode is another widget, and a new one takes its step from the URL:
     # now that it is there, it is told again, and the row of the step with it.
     st.session_state["_step"], st.session_state["_jumped"] = chosen[1], True
     st.rerun()
+comparison(shown)

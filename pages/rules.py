@@ -14,6 +14,7 @@ from _rule_table import column_config, frame, table_height
 from _tree_picture import tree_picture, tree_place
 from _words import escaped
 
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import feature_evidence, path_steps
 from sarl_core.explaining.evidence_words import evidence_bar, evidence_text, intervals_text
@@ -68,17 +69,21 @@ def key_of(rule: Rule) -> tuple[object, ...]:
 
 
 @st.cache_resource(max_entries=96, show_spinner=False)
-def features_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> str:
+def features_of(
+    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
+) -> str:
     """A rule's intervals in HTML."""
-    found = feature_evidence(demonstrations, _tree, _rule)
-    return features_html(found, demonstrations.features, label_colour(_rule.action))
+    found = feature_evidence(_demonstrations, _tree, _rule)
+    return features_html(found, _demonstrations.features, label_colour(_rule.action))
 
 
 @st.cache_resource(max_entries=96, show_spinner=False)
-def examples_of(key: tuple[object, ...], _tree: PolicyTree, _rule: Rule) -> str:
+def examples_of(
+    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
+) -> str:
     """Some states of a rule, under a heading."""
     heading = "Example states" if _rule.samples > 1 else "The one state it applies to"
-    return f"<h3>{heading}</h3>{examples_html(demonstrations, _tree, _rule)}"
+    return f"<h3>{heading}</h3>{examples_html(_demonstrations, _tree, _rule)}"
 
 
 def downloads(rule_set: RuleSet) -> None:
@@ -145,6 +150,7 @@ def walk(shown: list[int], rules: tuple[Rule, ...], place: int | None) -> None:
                 on_click=state.set_url_choice,
                 args=("rule", rule_id),
                 disabled=rule_id is None,
+                help="In the order of support, the most first",
             )
 
 
@@ -384,14 +390,14 @@ def show_features(rule: Rule) -> None:
     """The interval on each feature against its distribution."""
     st.subheader("What it asks, feature by feature")
     with st.container(key="features"):
-        st.html(features_of(key_of(rule), grown[rule.dimension], rule))
+        st.html(features_of(key_of(rule), grown[rule.dimension], rule, demonstrations))
 
 
 def show_examples(rule: Rule) -> None:
     """Some states to which the rule applies."""
     if rule.samples:
         with st.container(key="examples"):
-            st.html(examples_of(key_of(rule), grown[rule.dimension], rule))
+            st.html(examples_of(key_of(rule), grown[rule.dimension], rule, demonstrations))
 
 
 with st.spinner("Mining the rules …"):

@@ -14,7 +14,15 @@ from sarl_core.explaining.evidence_words import (
     intervals_text,
     verdict_counts,
 )
-from sarl_core.explaining.html_plot import PLOT_STYLE, Axis, Scale, area, plot, round_ticks
+from sarl_core.explaining.html_plot import (
+    PLOT_STYLE,
+    Axis,
+    Scale,
+    area,
+    plot,
+    round_ticks,
+    tick_text,
+)
 from sarl_core.explaining.language import action_text, counted, share_text
 from sarl_core.mining.evidence import Interval
 from sarl_core.mining.holding_out import held_out_interval, mined_interval, verdict
@@ -81,7 +89,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
     numbers = (
         [float(place) for place in range(1, len(rules) + 1)]
         if len(rules) <= _NUMBERED
-        else [tick for tick in round_ticks(1, len(rules), 8) if tick >= 1]
+        else [tick for tick in round_ticks(1, len(rules), 8, whole=True) if tick >= 1]
     )
     heights = round_ticks(floor, 1.0, 5)
     return (
@@ -94,9 +102,9 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
                 [f"{tick:,.0f}" for tick in numbers],
                 "Rules, the most support first",
             ),
-            Axis(upwards, heights, [f"{tick:.2f}" for tick in heights], "Confidence"),
-            label="The 95 % interval of every rule's confidence against the minimum confidence of "
-            f"{threshold:g}: {told}",
+            Axis(upwards, heights, list(map(tick_text, heights)), "Confidence"),
+            label=f"The 95 % interval of the confidence of {counted(len(rules), 'rule')} against "
+            f"the minimum confidence of {threshold:g}: {told}",
             height=262,
             tips=[_tip(rule, rule_set) for rule in rules],
         )
@@ -136,11 +144,11 @@ def enough_plot(missing: Sequence[float]) -> str:
     colour = LABEL_COLOURS[0]
     middles = (np.arange(_TIPS) + 0.5) * far / _TIPS
     by_then = np.searchsorted(some, middles, side="right").tolist()
-    widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, most, min(4, most))
+    widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, most, 4, whole=True)
     return PLOT_STYLE + plot(
         area(corners, across, upwards, faded(colour, 0.55)),
-        Axis(across, widths, [f"{tick:,g}" for tick in widths], "More episodes"),
-        Axis(upwards, heights, [f"{tick:,g}" for tick in heights], "Rules that reach it"),
+        Axis(across, widths, list(map(tick_text, widths)), "More episodes"),
+        Axis(upwards, heights, list(map(tick_text, heights)), "Rules that reach it"),
         label=f"Of {counted(most, 'rule')} {reached[0]:,} "
         f"{'reaches' if reached[0] == 1 else 'reach'} the minimum confidence now, and "
         f"{reached[-1]:,} ({share_text(reached[-1] / most)}) after enough more episodes",

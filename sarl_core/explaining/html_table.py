@@ -35,18 +35,19 @@ class Column(NamedTuple):
     told: str = ""
 
 
-def table_html(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> str:
+def table_html(columns: Sequence[Column], rows: Sequence[Sequence[str]], label: str) -> str:
     """A table that scrolls within itself where there is not enough room.
 
     Args:
         columns: From left to right.
         rows: From top to bottom, each with a text a column.
+        label: What it shows, for those who do not see it.
 
     Returns:
         HTML; `TABLE_STYLE` has to stand before the first.
     """
     head = "".join(
-        f"<th{_attribute('class', css)}{_attribute('title', told)}>{escape(title)}</th>"
+        f'<th scope="col"{_attribute("class", css)}{_attribute("title", told)}>{escape(title)}</th>'
         for title, css, told in columns
     )
     body = "".join(
@@ -59,8 +60,8 @@ def table_html(columns: Sequence[Column], rows: Sequence[Sequence[str]]) -> str:
         for row in rows
     )
     return (
-        f'<div class="sarl-rows"><table><thead><tr>{head}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
+        f'<div class="sarl-rows" role="region" tabindex="0" aria-label="{escape(label)}"><table>'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
 

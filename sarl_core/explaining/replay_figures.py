@@ -18,6 +18,7 @@ SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it
 UNSHIELDED_COLOUR = MUTED_COLOUR
 _ROW_HEIGHT = 30
 _LEAST_ROOM = 64  # pixels: what the numbers and the title of the returns take
+_LONGEST = 22  # letters of a track's name: half of a phone is left for its steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ class Timeline:
         Returns:
             Where everything stands.
         """
-        longest = max(len(track.name) for track in tracks)
+        longest = max(len(shortened(track.name)) for track in tracks)
         return cls(n_steps, max(_LEAST_ROOM, 14 + 7 * longest))
 
     @property
@@ -115,6 +116,22 @@ class Timeline:
         """Where a step stands between the two rooms, 0 to 1."""
         low, high = self.range
         return (step - low) / (high - low)
+
+
+def shortened(name: str) -> str:
+    """The name of a track as there is room for it; what it shows stands at its end.
+
+    Args:
+        name: As "left knee torque: wanted".
+
+    Returns:
+        At most 22 letters, as "left knee to…: wanted".
+    """
+    if len(name) <= _LONGEST:
+        return name
+    about, colon, what = name.rpartition(": ")
+    end = f"{colon}{what}" if about else ""
+    return f"{(about or name)[: _LONGEST - 1 - len(end)]}…{end}"
 
 
 def intervention_strip(
@@ -169,7 +186,7 @@ def intervention_strip(
     )
     figure.update_yaxes(
         tickvals=list(range(len(tracks))),
-        ticktext=[plain(track.name) for track in tracks],
+        ticktext=[plain(shortened(track.name)) for track in tracks],
         range=[len(tracks) - 0.5, -0.5],
         fixedrange=True,
         showgrid=False,

@@ -28,7 +28,9 @@ def examples_html(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) 
         Column(name, "m" if name == _DID else "" if name == _AGREES else "n") for name in columns
     ]
     texts = [[_text(name, value) for value in values] for name, values in columns.items()]
-    return TABLE_STYLE + table_html(shown, list(zip(*texts, strict=True)))
+    return TABLE_STYLE + table_html(
+        shown, list(zip(*texts, strict=True)), "States to which the rule applies"
+    )
 
 
 def _text(name: str, value: object) -> str:

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
 from sarl_core.explaining.evidence import FeatureEvidence
-from sarl_core.explaining.html_plot import PLOT_STYLE, Axis, Scale, area, plot, round_ticks
+from sarl_core.explaining.html_plot import (
+    PLOT_STYLE,
+    Axis,
+    Scale,
+    area,
+    plot,
+    round_ticks,
+    tick_text,
+)
 from sarl_core.explaining.language import condition_text, number_text, share_text, short_condition
 
 MOST = 12  # features
@@ -87,7 +95,7 @@ def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> str:
     values, shares = round_ticks(low, high, _X_TICKS), round_ticks(0.0, highest, _Y_TICKS)
     drawn = plot(
         "".join(parts),
-        Axis(across, values, list(map(number_text, values)), feature.unit or feature.name),
+        Axis(across, values, list(map(tick_text, values)), feature.unit or feature.name),
         Axis(upwards, shares, [f"{100 * share:g} %" for share in shares]),
         label=_in_words(one, feature),
         height=132,
@@ -118,15 +126,15 @@ def _bars(
 def _tips(one: FeatureEvidence, feature: Feature) -> list[str]:
     """What is said of each bin: over the whole height, since many bars are low."""
     unit = f" {feature.unit}" if feature.unit else ""
-    edges = [number_text(edge) for edge in one.edges.tolist()]
+    edges = one.edges.tolist()
     reached = one.at_rule.any()
     told = []
     for index, (everywhere, at_rule) in enumerate(
         zip(one.everywhere.tolist(), one.at_rule.tolist(), strict=True)
     ):
-        words = (
-            f"{edges[index]} to {edges[index + 1]}{unit}: {share_text(everywhere)} of all states"
-        )
+        low, high = edges[index : index + 2]
+        words = f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{unit}"
+        words += f": {share_text(everywhere)} of all states"
         if reached:
             words += f", {share_text(at_rule)} of those of the rule"
         told.append(words if everywhere or at_rule else "")
@@ -135,7 +143,8 @@ def _tips(one: FeatureEvidence, feature: Feature) -> list[str]:
 
 def _in_words(one: FeatureEvidence, feature: Feature) -> str:
     unit = f" {feature.unit}" if feature.unit else ""
-    low, high = (number_text(float(edge)) for edge in one.edges[[0, -1]])
+    first, last = float(one.edges[0]), float(one.edges[-1])
+    low, high = number_text(first, apart_from=last), number_text(last, apart_from=first)
     whose = "all states and those of the rule" if one.at_rule.any() else "all states"
     return (
         f"{feature.name} of {whose}, from {low} to {high}{unit}; the rule asks that "

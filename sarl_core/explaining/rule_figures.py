@@ -18,9 +18,9 @@ from sarl_core.mining.tree import LEAF, PolicyTree
 
 MAX_BOXES = 2000  # more take a browser the better part of a second
 _HOVERS = 400
-_WIDTH = 620  # pixels that the boxes have on a wide screen
+WIDTH = 620  # pixels that the boxes have on a wide screen
 _THINNEST = 0.5  # pixels: what is narrower is not seen
-_HIT = 4.0  # pixels: what is narrower is not met by the pointer
+HIT = 4.0  # pixels: what is narrower is not met by the pointer
 _NEIGHBOURHOOD = 30  # "around" a rule is what is at most so many times as wide
 
 
@@ -200,7 +200,7 @@ def _shown(
     left, right, top, bottom = window
     start, end = tree.sample_start, tree.sample_start + tree.samples
     inside = (end > left) & (start < right) & (tree.depth >= top) & (tree.depth < bottom)
-    seen = inside if thin else inside & (tree.samples >= (right - left) * _THINNEST / _WIDTH)
+    seen = inside if thin else inside & (tree.samples >= (right - left) * _THINNEST / WIDTH)
     nodes = np.flatnonzero(seen)
     if len(nodes) > MAX_BOXES:
         # The narrowest are less than a hair wide; those that matter stay.
@@ -249,7 +249,7 @@ def _add_hover(
 ) -> None:
     """Invisible points that say what a box is; the widest boxes are enough."""
     left, right, _, _ = window
-    wide = nodes[tree.samples[nodes] >= (right - left) * _HIT / _WIDTH]
+    wide = nodes[tree.samples[nodes] >= (right - left) * HIT / WIDTH]
     some = wide[np.argsort(-tree.samples[wide], kind="stable")][:_HOVERS]
     total = float(tree.samples[0])
     start = np.maximum(tree.sample_start[some], left)

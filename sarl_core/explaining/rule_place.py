@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
-from sarl_core.explaining.html_plot import round_ticks
+from sarl_core.explaining.html_plot import round_ticks, tick_text
 from sarl_core.explaining.language import counted, label_text
 from sarl_core.explaining.rule_figures import (
+    HIT,
+    WIDTH,
     below_rules,
     node_lines,
     path_queries,
@@ -24,9 +26,7 @@ from sarl_core.explaining.rule_figures import (
 )
 from sarl_core.mining.tree import PolicyTree
 
-_WIDTH = 620  # pixels that the boxes have on a wide screen
 _THINNEST = 1.0  # pixels: boxes that are narrower are drawn together
-_HIT = 4.0  # pixels: what is narrower is not met by the pointer
 _BOX = 0.92  # of a row's height
 _LEVELS = 9  # numbered at most
 
@@ -131,7 +131,7 @@ def _gradient(
 ) -> str:
     """The boxes of a row, from left to right, as hard stops: one element draws them all."""
     left, right, _, _ = window
-    thinnest = (right - left) * _THINNEST / _WIDTH
+    thinnest = (right - left) * _THINNEST / WIDTH
     boxes: list[tuple[int, int, dict[str, int]]] = []  # from, to, and how many states of a colour
     for node in nodes.tolist():
         first, states = int(tree.sample_start[node]), int(tree.samples[node])
@@ -198,7 +198,7 @@ def _line(points: Sequence[tuple[float, float]], half: float, css: str) -> str:
 def _hits(tree: PolicyTree, nodes: NDArray[np.int64], window: tuple[int, int, int, int]) -> str:
     """What is said of the boxes that are wide enough to point at."""
     left, right, top, bottom = window
-    wide = nodes[tree.samples[nodes] >= (right - left) * _HIT / _WIDTH]
+    wide = nodes[tree.samples[nodes] >= (right - left) * HIT / WIDTH]
     parts = []
     for node in wide.tolist():
         start = max(int(tree.sample_start[node]), left)
@@ -239,7 +239,8 @@ def _ticks(tree: PolicyTree, window: tuple[int, int, int, int]) -> str:
         "</small>"
         for depth in range(top, bottom, every)
     ) + "".join(
-        f'<small class="x" style="left:{_share(tick - low, high - low)}">{tick:g} %</small>'
+        f'<small class="x" style="left:{_share(tick - low, high - low)}">{tick_text(tick)} %'
+        "</small>"
         for tick in round_ticks(low, high, 5)
     )
 

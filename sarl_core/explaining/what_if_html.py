@@ -130,7 +130,11 @@ def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet)
         return _note(f"{which}: the agent's action is passed on as it is.")
     values = tuple(state.astype(np.float64).tolist())
     views = condition_views(rule, values, rule_set)
-    table = table_html(_CONDITIONS, [(view.condition, view.value, view.room) for view in views])
+    table = table_html(
+        _CONDITIONS,
+        [(view.condition, view.value, view.room) for view in views],
+        "The rule's conditions and the state's values",
+    )
     said = f"<p><b>Rule {escape(rule.id)}.</b> {escape(sentence(rule, rule_set))}</p>"
     return f"{said}{table if views else ''}{_data_html(rule, values, rule_set)}"
 
@@ -171,7 +175,9 @@ def changes_html(
     rows = [_change_row(change, spans, rule_set) for change in changes]
     condition, does, *_ = rows[0]
     said = f"<p>Executed would be <b>{escape(does)}</b> if {escape(condition)}.</p>"
-    return _section(f"{heading}{said}{table_html(_CHANGES, rows)}")
+    return _section(
+        f"{heading}{said}{table_html(_CHANGES, rows, 'The least changes that change the decision')}"
+    )
 
 
 def _change_row(
@@ -208,9 +214,8 @@ def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
         "First those that lack one feature, then those that lack two; each with the least change "
         "that lets it apply."
     )
-    return _section(
-        f"{heading}{table_html(_MISSES, [_miss_row(miss, rule_set) for miss in misses])}{note}"
-    )
+    rows = [_miss_row(miss, rule_set) for miss in misses]
+    return _section(f"{heading}{table_html(_MISSES, rows, 'Rules that nearly apply')}{note}")
 
 
 def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import pytest
 
 from sarl_core import Demonstrations, RuleSet, mine_rules
 from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
-from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks
+from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks, tick_text
 from sarl_core.mining.evidence import wilson
 from sarl_core.mining.holding_out import hold_out, with_held_out
 
@@ -115,3 +115,19 @@ def test_a_plot_places_and_escapes_what_is_written() -> None:
         assert raw not in html
     cut = area([(10, 1), (20, 2)], across.scale, upwards.scale, "#123456")
     assert "polygon(0.00% 100%,0.00% 75.00%,100.00% 50.00%,100.00% 100%)" in cut
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(100, 111), (100, 101), (0.89, 1.0), (0.98, 1.0), (0, 1)]
+)
+def test_what_is_written_at_a_tick_is_where_it_stands(low: float, high: float) -> None:
+    ticks = round_ticks(low, high, 5)
+    assert [float(tick_text(tick)) for tick in ticks] == ticks
+    assert all(tick == int(tick) for tick in round_ticks(low, high, 5, whole=True))
+
+
+def test_rules_are_counted_in_whole_numbers() -> None:
+    html = enough_plot([0.0] * 9)
+    texts = re.findall(r'class="y"[^>]*>([^<]+)<', html)
+    assert len(texts) > 1
+    assert all(text.isdigit() for text in texts)

@@ -21,10 +21,13 @@ from sarl_core.explaining.replay_figures import (
     ReturnLine,
     ReturnRow,
     Timeline,
+    Track,
     comparison_figure,
     intervention_strip,
     return_figure,
+    shortened,
 )
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.steps import StepTable
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
@@ -197,3 +200,15 @@ def test_episodes_are_drawn_with_their_interval() -> None:
     assert points.x.tolist() == [1.0, 2.0, 6.0]
     assert mean.error_x.array[0] == 2.5
     assert mean.error_x.arrayminus[0] == 1.5
+
+
+def test_a_long_name_of_a_track_leaves_room_for_the_steps() -> None:
+    dimension = LabelledDimension("d", ("0", "1"))
+    rows = [Track(f"{'left knee torque ' * 4}: wanted", np.zeros(3), dimension)]
+    timeline = Timeline.of(rows, 3)
+    assert timeline.left <= 180
+    (name,) = intervention_strip(rows, ["", "", ""], timeline).layout.yaxis.ticktext
+    assert name.startswith("left knee")
+    assert name.endswith("…: wanted")
+    assert len(name) == 22
+    assert shortened("done") == "done"
