@@ -5,24 +5,20 @@ from __future__ import annotations
 from base64 import b64encode
 from html import escape
 
+from sarl_core.explaining.badges import BADGE_STYLE, badge
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.replay import ActionView, StepView, margin_text
 
-_STYLE = """<style>
+_STYLE = (
+    """<style>
 .sarl-step { font-size: 0.95rem; line-height: 1.55; }
 .sarl-step p { margin: 0 0 0.5rem 0; }
-.sarl-step .badge { display: inline-block; padding: 0 0.5rem; border-radius: 0.5rem;
-  font-size: 0.85rem; background: rgba(128,140,150,0.18); }
-.sarl-step .changed { background: rgba(213,94,0,0.2); }
-.sarl-step .allowed { background: rgba(0,158,115,0.2); }
 .sarl-step .quiet { opacity: 0.7; font-size: 0.85rem; }
-.sarl-step .state { overflow: auto; max-height: 25rem; }
-.sarl-step table { width: 100%; border-collapse: collapse; font-size: 0.84rem; }
-.sarl-step th { text-align: left; font-weight: 400; opacity: 0.7; padding: 0 0.5rem 0.2rem 0; }
-.sarl-step td { padding: 0.16rem 0.5rem 0.16rem 0;
-  border-top: 1px solid rgba(128,140,150,0.25); }
-.sarl-step .n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 </style>"""
+    + TABLE_STYLE
+    + BADGE_STYLE
+)
 
 
 def swatch(name: str, colour: str) -> str:
@@ -76,36 +72,29 @@ def step_card(view: StepView, *, shielded: bool) -> str:
         )
     if shielded:
         parts.append(f'<p class="quiet">{margin_text(view.margin)}.</p>')
-    rows = "".join(
-        f'<tr><td>{escape(name)}</td><td class="n">{escape(value)}</td>'
-        f"<td>{escape(unit) or '–'}</td></tr>"
-        for name, value, unit in view.state
-    )
-    table = (
-        '<div class="state"><table><thead><tr><th>State</th><th class="n">Value</th>'
-        f"<th>Unit</th></tr></thead><tbody>{rows}</tbody></table></div>"
-    )
+    rows = [(name, value, unit or "–") for name, value, unit in view.state]
+    table = table_html((Column("State"), Column("Value", "n"), Column("Unit")), rows, "The state")
     return f'{_STYLE}<div class="sarl-step">{"".join(parts)}{table}</div>'
 
 
 def _action(action: ActionView, *, shielded: bool, named: bool) -> str:
     done = swatch(action.executed, label_colour(action.executed_label))
-    badge, css, text = "", "", f"The agent chose {done}."
+    said, text = "", f"The agent chose {done}."
     if action.changed:
         wanted = swatch(action.proposed, label_colour(action.proposed_label))
-        badge, css = "Changed by the rules", "changed"
+        said = badge("Changed by the rules", "changed")
         text = f"The agent wanted {wanted}, and {done} was done."
     elif action.abstains:
-        badge = "Rule abstains"
+        said = badge("Rule abstains")
         text = f"The agent wanted {done}. The rule left it as it is, outside its data."
     elif action.rule:
-        badge, css = "Allowed by the rules", "allowed"
+        said = badge("Allowed by the rules", "allowed")
         text = f"The agent wanted {done}, as the rule says."
     elif shielded:
-        badge = "No rule applies"
+        said = badge("No rule applies")
     parts = [f"<p><b>{escape(action.dimension)}</b></p>" if named else ""]
-    if badge:
-        parts.append(f'<p><span class="badge {css}">{badge}</span></p>')
+    if said:
+        parts.append(f"<p>{said}</p>")
     parts.append(f"<p>{text}</p>")
     if action.rule:
         parts.append(f"<p><b>Rule {escape(action.rule_id)}.</b> {escape(action.rule)}</p>")

@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.explaining.badges import badge
 from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.language import action_text, counted, number_text, sentence
 from sarl_core.explaining.what_if import (
@@ -36,11 +37,6 @@ _STYLE = (
   padding: 0.4rem 0; }
 .sarl-state p { margin: 0 0 0.5rem 0; }
 .sarl-state p:last-child { margin-bottom: 0; }
-.sarl-state .badge { display: inline-block; padding: 0 0.5rem; border-radius: 0.5rem;
-  margin-right: 0.4rem; font-size: 0.85rem; background: rgba(128,140,150,0.18); }
-.sarl-state .changed { background: rgba(213,94,0,0.2); }
-.sarl-state .allowed { background: rgba(0,158,115,0.2); }
-.sarl-state .beyond { background: rgba(194,24,91,0.2); }
 .sarl-state .quiet { opacity: 0.65; font-size: 0.875rem; }
 </style>"""
     + TABLE_STYLE
@@ -99,15 +95,15 @@ def decision_html(
         within its data.
     """
     if decision.intervened:
-        badges = _badge("Changed by the rules", "changed")
+        badges = badge("Changed by the rules", "changed")
     elif decision.outside and outside == "abstain":
-        badges = _badge("Rule abstains")
+        badges = badge("Rule abstains")
     elif any(one is not None for one in decision.rules):
-        badges = _badge("Allowed by the rules", "allowed")
+        badges = badge("Allowed by the rules", "allowed")
     else:
-        badges = _badge("No rule applies")
+        badges = badge("No rule applies")
     if decision.outside:
-        badges += _badge("Outside the data", "beyond")
+        badges += badge("Outside the data", "beyond")
     proposed, executed = (
         executed_text(tuple(np.asarray(values, dtype=float).reshape(-1).tolist()), rule_set.actions)
         for values in (decision.proposed, decision.executed)
@@ -255,10 +251,6 @@ def way_html(table: str, rule: Rule | None) -> str:
 
 def _section(inner: str) -> str:
     return f'{_STYLE}<div class="sarl-state">{inner}</div>'
-
-
-def _badge(text: str, css: str = "") -> str:
-    return f'<span class="badge {css}">{text}</span>'
 
 
 def _note(text: str) -> str:
