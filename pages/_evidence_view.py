@@ -377,6 +377,8 @@ def _show_contradictions(evidence: Evidence, found: Contradictions) -> None:
             key="contradictions",
             alt="Share of contradicting steps of each episode",
         )
+        if len(episodes) > figures.EPISODES_DRAWN:
+            st.caption(f"The first {figures.EPISODES_DRAWN} of {len(episodes):,} episodes.")
     with right:
         selected = st.dataframe(
             episode_columns(episodes),

@@ -37,7 +37,7 @@ FORMATS = {
     "ONNX": ".onnx",
 }
 WHAT = {
-    "JSON": "The rule file: every number at full precision; all of this project reads it.",
+    "JSON": "The rule file: every number in full, as it stands; all of this project reads it.",
     "CSV": "A line a rule, for a spreadsheet.",
     "Markdown": "A table for a wiki or a repository.",
     "Python": "One function that needs nothing but Python 3.",

@@ -142,9 +142,9 @@ def left_out_text(ablation: Ablation) -> str:
     if not count:
         return ""
     return (
-        f"{counted(count, 'rule')} more changed actions, at fewer steps, and "
-        f"{'was' if count == 1 else 'were'} not taken out; raise the number of rules to see "
-        f"{'it' if count == 1 else 'them'}."
+        f"{counted(count, 'rule')} more changed actions and "
+        f"{'was' if count == 1 else 'were'} not taken out; run it to the end, or raise the number "
+        f"of rules, to see {'it' if count == 1 else 'them'}."
     )
 
 

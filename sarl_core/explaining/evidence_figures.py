@@ -25,7 +25,7 @@ CURVE_TITLES: dict[CurveLayer, str] = {
     "fidelity": "Fidelity on other episodes",
 }
 _LINE = LABEL_COLOURS[0]
-_EPISODES = 60
+EPISODES_DRAWN = 60
 
 
 def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
@@ -90,7 +90,7 @@ def contradictions_figure(episodes: Sequence[EpisodeContradictions]) -> go.Figur
     Returns:
         A bar an episode.
     """
-    some = episodes[:_EPISODES]
+    some = episodes[:EPISODES_DRAWN]
     figure = go.Figure()
     figure.add_bar(
         x=[str(one.episode) for one in some],

@@ -137,6 +137,11 @@ def pair_columns(
         Column name to one value a pair of states, the nearest first.
     """
     rows = np.flatnonzero(found.near[:, dimension])
+    # Where two states are each other's nearest, the pair is told once.
+    twice = found.near[found.neighbour[rows], dimension] & (
+        found.neighbour[found.neighbour[rows]] == rows
+    )
+    rows = rows[~twice | (rows < found.neighbour[rows])]
     rows = rows[np.argsort(found.distance[rows], kind="stable")][:most]
     others = found.neighbour[rows]
     named = label_dimensions(demonstrations, divider)[dimension]

@@ -139,6 +139,15 @@ def test_tables_have_a_row_a_rule(tried):
 def test_pairs_of_states_differ_and_the_nearest_come_first(lander_like):
     found = find_contradictions(lander_like, reach=1.0)
     columns = pair_columns(lander_like, found, most=30)
+    pairs = [
+        frozenset(pair)
+        for pair in zip(
+            zip(columns["Episode"], columns["Step"], strict=True),
+            zip(columns["Other episode"], columns["Other step"], strict=True),
+            strict=True,
+        )
+    ]
+    assert len(set(pairs)) == len(pairs)
     assert len(columns["Did"]) == 30
     assert columns["Distance"] == sorted(columns["Distance"])
     for episode, step, other, there, did, did_there in zip(
