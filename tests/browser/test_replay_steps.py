@@ -68,7 +68,7 @@ def expect_step(screen: Page, step: int, steps: StepTable) -> None:
     badge = "No rule applies"
     if steps.rules[step, 0] >= 0:
         badge = "Changed by" if steps.intervened[step] else "Allowed by"
-    expect(words.locator(".badge")).to_contain_text(badge)
+    expect(words.locator(".sarl-badge")).to_contain_text(badge)
     lengths = [
         int(metric(screen, f"Length {which}").replace(",", ""))
         for which in ("with rules", "without")

@@ -94,7 +94,7 @@ def counted_by_hand(rule, dimension, held):
         held.observations, held.action_columns[:, rule.dimension], strict=True
     ):
         if all(
-            (state[feature] <= threshold) == (op == "<=")
+            (float(state[feature]) <= threshold) == (op == "<=")  # not rounded to float32
             for feature, op, threshold in rule.conditions
         ):
             samples += 1
