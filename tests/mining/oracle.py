@@ -26,7 +26,7 @@ def paths_of(learner, observations, labels):
             found.append(path)
             return
         feature, threshold = int(tree.feature[node]), float(tree.threshold[node])
-        below = observations[rows, feature] <= threshold
+        below = observations[rows, feature] <= np.float64(threshold)  # not rounded to float32
         descend(tree.children_left[node], (*queries, (feature, "<=", threshold)), rows[below], path)
         descend(
             tree.children_right[node], (*queries, (feature, ">", threshold)), rows[~below], path
