@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import _compact
 import _edits
@@ -11,7 +11,7 @@ import numpy as np
 import streamlit as st
 from _choices import PROJECTIONS
 from _replays import kept_replays
-from _settings import no_boxes_notice, outside_choice
+from _settings import no_boxes_notice, outside_choice, projection_choice
 from _what_if_view import show
 from _words import escaped
 from numpy.typing import NDArray
@@ -308,19 +308,9 @@ if not rule_set.rules:
     st.stop()
 with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
     beyond = outside_choice(220)
-    projection = cast(
-        "Projection",
-        st.selectbox(
-            "Replace by",
-            PROJECTIONS,
-            key="projection",
-            bind="query-params",
-            width=220,
-            help="What a continuous action that breaks a rule becomes.",
-        )
-        if rule_set.actions[0].is_interval
-        else PROJECTIONS[0],
-    )
+    projection: Projection = PROJECTIONS[0]
+    if rule_set.actions[0].is_interval:
+        projection = projection_choice(220)
 no_boxes_notice([rule_set], beyond)
 neighbourhood = prepared(rules_key, projection, beyond, rule_set)
 spans, spreads = spans_of(demonstrations.digest, demonstrations)
