@@ -35,11 +35,13 @@ WARM = 2  # moves that do not count: the first find a server that has just woken
 # the frame in which what is watched has changed for the last time; how long that takes for the
 # answer, and for all of the page. The browser itself tells what has changed, since reading the page
 # in every frame would take longer than most answers; what is written again as it was counts too.
+# Classes are left out: Streamlit marks all that a run may change with one as the run begins, takes
+# it off at its end, and nothing looks different for it within these times.
 # Tables are watched as they draw their text: what they tell screen readers follows a fifth of a
 # second later.
 WATCH = """
 (() => {
-  const seen = ['class', 'd', 'height', 'src', 'style', 'transform', 'value', 'width', 'x', 'y'];
+  const seen = ['d', 'height', 'src', 'style', 'transform', 'value', 'width', 'x', 'y'];
   let drawn = 0;
   const write = CanvasRenderingContext2D.prototype.fillText;
   CanvasRenderingContext2D.prototype.fillText = function (text, x, y, ...rest) {

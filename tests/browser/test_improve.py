@@ -21,7 +21,7 @@ def test_rules_are_improved_taken_away_and_used(screen: Page, tmp_path: Path) ->
     expect(screen.get_by_text("All done already")).to_be_visible()
     settle(screen)
     expect(screen.get_by_text("100 fresh episodes").last).to_be_visible()
-    assert screen.locator(".js-plotly-plot .subplot").count() == 4
+    expect(screen.locator(".js-plotly-plot .subplot")).to_have_count(4)
     taken = {}
     for label, name in (
         ("Rules", "rules.json"),

@@ -36,7 +36,7 @@ def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> 
     screen.goto(path.as_uri())
     expect(screen.get_by_role("heading", name="Figure 2. Number of rules")).to_be_visible()
     expect(screen.locator(".js-plotly-plot .main-svg").first).to_be_visible()
-    assert screen.locator(".js-plotly-plot").count() >= 8
+    expect(screen.locator(".js-plotly-plot").nth(7)).to_be_visible()
 
 
 def test_a_page_in_a_clone_shows_its_picture_until_the_script_is_back(
@@ -50,7 +50,7 @@ def test_a_page_in_a_clone_shows_its_picture_until_the_script_is_back(
     expect(picture).to_be_visible()
     screen.wait_for_function("document.querySelector('.still img').naturalWidth > 1000")
     expect(screen.get_by_text("is not beside this page")).to_be_visible()
-    assert screen.locator(".row:visible").count() == 0
+    expect(screen.locator(".row:visible")).to_have_count(0)
     (tmp_path / SCRIPT).write_text(get_plotlyjs(), encoding="utf-8")
     screen.goto(address)
     expect(screen.locator(".js-plotly-plot .main-svg").first).to_be_visible()

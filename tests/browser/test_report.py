@@ -33,7 +33,7 @@ def test_a_report_is_made_and_opens_without_the_dashboard(
     alone.goto(path.as_uri())
     expect(alone.get_by_role("heading", name="What is not guaranteed")).to_be_visible()
     images = alone.locator("img")
-    assert images.count() == 5
+    expect(images).to_have_count(5)
     for number in range(5):
         assert images.nth(number).evaluate("image => image.naturalWidth") == 400
     # Nothing is fetched, and nothing is cut off at the width of a telephone.

@@ -21,8 +21,9 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
     settle(screen)
     expect(screen.get_by_text("the typical return of the novice rises")).to_be_visible()
-    assert screen.locator(".js-plotly-plot").count() == 2
-    assert screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace").count() == 6
+    expect(screen.locator(".js-plotly-plot")).to_have_count(2)
+    traces = screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace")
+    expect(traces).to_have_count(6)
     with screen.expect_download() as started:
         screen.get_by_test_id("stDownloadButton").click()
     path = tmp_path / "comparison.csv"
@@ -40,9 +41,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     settle(screen)
     assert parameters(screen)["agents"] == "novice"
     visit(screen, screen.url, "Shield")
-    expect(screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace")).to_have_count(
-        3
-    )
+    expect(traces).to_have_count(3)
     no_trace(screen)
 
 

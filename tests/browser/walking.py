@@ -16,14 +16,27 @@ def visit(screen: Page, path: str, title: str) -> None:
     settle(screen)
 
 
+# Whether the script has ended, all parts of the page are there (Streamlit fetches the code of
+# some of them, of charts for one, when it first needs it), and the page has stood still.
+STILL = """
+quiet => {
+  if (window.lastChange === undefined) {
+    window.lastChange = performance.now();
+    new MutationObserver(() => { window.lastChange = performance.now(); }).observe(
+      document.body, {subtree: true, childList: true, characterData: true});
+  }
+  return document.querySelector('[data-test-script-state]')
+      ?.getAttribute('data-test-script-state') === 'notRunning'
+    && document.querySelector('[data-testid=stSkeleton]') === null
+    && performance.now() - window.lastChange > quiet;
+}
+"""
+
+
 def settle(screen: Page) -> None:
-    """Wait until the script has run to its end, and the page says so twice in a row."""
-    for _ in range(2):
-        screen.wait_for_timeout(150)
-        screen.wait_for_function(
-            "() => document.querySelector('[data-test-script-state]')"
-            "?.getAttribute('data-test-script-state') === 'notRunning'"
-        )
+    """Wait until the script has run to its end, and what it sent is drawn."""
+    screen.wait_for_timeout(150)  # until a press has reached the server
+    screen.wait_for_function(STILL, arg=250)
 
 
 def metric(screen: Page, label: str) -> str:
