@@ -213,6 +213,7 @@ with st.container(border=True):
             key="format",
             bind="query-params",
             required=True,
+            wrap=True,  # else the last ones are cut off on a telephone
         )
         projection: Projection = PROJECTIONS[0]
         if rules.actions[0].is_interval and form in ("Python", "C", "ONNX"):
