@@ -23,6 +23,7 @@ from sarl_core.explaining.language import (
     share_text,
     short_condition,
 )
+from sarl_core.explaining.scrolling import WIDE_STYLE, wide_html
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
 
 PAGE_ROWS = 50
@@ -32,6 +33,7 @@ LEGEND = (
 )
 PLACED_LEGEND = "* written by hand or pinned: tried first, in this order."
 PLACED_MARK = "* "
+OFF_LEGEND = "Pale: switched off."
 _MANY_COLUMNS = 8  # from here on their names stand upright
 _INSET = 8.0  # percent of a cell beyond the range of the data, where open intervals go on
 _OPEN = 1.5  # to here, so that bars of neighbours do not run into each other
@@ -160,11 +162,11 @@ def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> str:
         for column in matrix.columns
     )
     body = "".join(_row(matrix, rule) for rule in rules)
-    return (
-        f'{_STYLE}{_key(matrix.rule_set)}<div class="sarl-matrix"><table><thead><tr>'
-        f'<th class="a">Action</th><th class="n">States</th><th class="n">Expert agrees</th>{head}'
-        f"</tr></thead><tbody>{body}</tbody></table></div>"
+    table = (
+        '<table class="sarl-matrix"><thead><tr><th class="a">Action</th><th class="n">States</th>'
+        f'<th class="n">Expert agrees</th>{head}</tr></thead><tbody>{body}</tbody></table>'
     )
+    return f"{_STYLE}{_key(rules, matrix.rule_set)}{wide_html(table, 'Rules by features')}"
 
 
 def matrix_document(matrix: RuleMatrix) -> str:
@@ -188,15 +190,18 @@ def matrix_document(matrix: RuleMatrix) -> str:
     )
 
 
-def _key(rule_set: RuleSet) -> str:
+def _key(rules: Sequence[Rule], rule_set: RuleSet) -> str:
+    """What the colours and marks of some rows mean."""
     shown = {(rule.dimension, rule.action) for rule in rule_set.rules}
     entries = "".join(
         f'<span><i style="background:{label_colour(label)}"></i>'
         f"{escape(_action(label, rule_set, dimension))}</span>"
         for dimension, label in sorted(shown)
     )
-    if any(rule.placed for rule in rule_set.rules):
+    if any(rule.placed for rule in rules):
         entries += f"<span>{PLACED_LEGEND}</span>"
+    if not all(rule.enabled for rule in rules):
+        entries += f"<span>{OFF_LEGEND}</span>"
     return f'<div class="sarl-matrix-key">{entries}</div>'
 
 
@@ -271,9 +276,10 @@ def _bar(bounds: Bounds, column: Column) -> Bar:
     return Bar(place(bounds.low), place(bounds.high), short_condition(bounds, column.name))
 
 
-_STYLE = """<style>
-.sarl-matrix { overflow-x: auto; max-width: 100%; }
-.sarl-matrix table { border-collapse: collapse; font-size: 0.8rem; min-width: 100%; }
+_STYLE = (
+    WIDE_STYLE
+    + """<style>
+.sarl-matrix { border-collapse: collapse; font-size: 0.8rem; min-width: 100%; }
 .sarl-matrix th { text-align: left; vertical-align: bottom; font-weight: 400; padding: 0 6px 4px;
   border: 0; }
 .sarl-matrix th b { font-weight: 600; display: block; }
@@ -298,10 +304,10 @@ _STYLE = """<style>
   margin-bottom: 0.5rem; }
 .sarl-matrix-key i { display: inline-block; width: 11px; height: 11px; border-radius: 2px;
   margin-right: 0.35rem; vertical-align: -1px; }
-@media print { .sarl-matrix { overflow: visible; }
-  .sarl-matrix thead { display: table-header-group; }
+@media print { .sarl-matrix thead { display: table-header-group; }
   .sarl-matrix tr { break-inside: avoid; } }
 </style>"""
+)
 
 _DOCUMENT_STYLE = """<style>
 @page { size: A4 landscape; margin: 12mm; }

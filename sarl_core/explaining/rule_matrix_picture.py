@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.export_program import one_line
 from sarl_core.explaining.language import label_text, share_text
-from sarl_core.explaining.rule_matrix import PLACED_MARK, RuleMatrix
+from sarl_core.explaining.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
 from sarl_core.mining.rules import Rule
 
 _SCALE = 2  # pixels a unit, for sharp print
@@ -31,7 +31,8 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
 
     first = _MARGIN + _ACTION + _STATES + _AGREES
     width = first + _CELL * len(matrix.columns) + _MARGIN
-    height = 2 * _MARGIN + _HEAD + _ROW * len(rules)
+    placed = any(rule.placed for rule in rules)
+    height = 2 * _MARGIN + _HEAD + _ROW * (len(rules) + placed)
     picture = Image.new("RGB", (width * _SCALE, height * _SCALE), _GROUND)
     pen = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=_TEXT * _SCALE)
@@ -83,6 +84,9 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
                 start = left + bar.left / 100 * _CELL
                 end = max(left + bar.right / 100 * _CELL, start + 1.5)
                 box(start, top + 5, end, top + 15, colour)
+    if placed:
+        below = _MARGIN + _HEAD + len(rules) * _ROW
+        write(_MARGIN, below + 8, PLACED_LEGEND, width - 2 * _MARGIN, muted=True)
     content = io.BytesIO()
     picture.save(content, format="PNG")
     return content.getvalue()

@@ -11,7 +11,9 @@ from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.markdown import markdown_text, rules_to_markdown
 from sarl_core.explaining.rule_matrix import (
+    OFF_LEGEND,
     PAGE_ROWS,
+    PLACED_LEGEND,
     matrix_document,
     matrix_html,
     rule_matrix,
@@ -102,6 +104,33 @@ def test_the_picture_shows_a_row_a_rule(lander_trees: tuple[PolicyTree, ...]) ->
     first = tuple(int(label_colour(matrix.rules[0].action)[at : at + 2], 16) for at in (1, 3, 5))
     pixels = np.asarray(few.convert("RGB")).reshape(-1, 3)
     assert (pixels == first).all(axis=1).any()
+
+
+def test_marks_are_explained_where_they_are_seen(lander_trees: tuple[PolicyTree, ...]) -> None:
+    rules = rules_of(lander_trees)
+    first, second, *others = rules.rules
+    pinned, off = replace(first, pinned=True), replace(second, enabled=False)
+    matrix = rule_matrix(replace(rules, rules=(pinned, off, *others)))
+    plain = tuple(rule for rule in matrix.rules if rule.enabled and not rule.placed)
+    for shown, legends in (
+        ((pinned, off), {PLACED_LEGEND, OFF_LEGEND}),
+        ((pinned, *plain), {PLACED_LEGEND}),
+        (plain, set()),
+    ):
+        text = matrix_html(matrix, shown)
+        assert {legend for legend in (PLACED_LEGEND, OFF_LEGEND) if legend in text} == legends
+    marked, unmarked = (
+        Image.open(io.BytesIO(matrix_png(matrix, shown))) for shown in ((pinned, off), plain[:2])
+    )
+    assert marked.height > unmarked.height  # by a line that says what the mark means
+
+
+def test_the_style_stays_when_the_page_is_cleaned(lander_trees: tuple[PolicyTree, ...]) -> None:
+    # A style that holds something like a tag, as "<length>", is taken out as a whole.
+    text = matrix_html(rule_matrix(rules_of(lander_trees)), ())
+    styles = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    assert len(styles) == 2
+    assert not any("<" in style for style in styles)
 
 
 def test_markdown_holds_every_rule_with_every_digit(
