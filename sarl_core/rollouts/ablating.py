@@ -11,19 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.errors import InputError, SarlError
-from sarl_core.rollouts.ablation import MOST_RULES, Ablation, rules_to_take_out, spans
+from sarl_core.rollouts.ablation import MOST_RULES, Ablation, rules_to_take_out
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.comparison import crashed
-from sarl_core.rollouts.episodes import Episodes, join, rollout
+from sarl_core.rollouts.episodes import Episodes, join, run_seeds
 from sarl_core.rollouts.player import check_environment
-from sarl_core.rollouts.pool import Found, Task, WorkerPool
+from sarl_core.rollouts.pool import LARGEST_PIECE, Found, Task, WorkerPool
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rule
 from sarl_core.shielding.shield import Shield
 
 LEAST_EPISODES = 2  # a difference that was seen once says nothing about the next
-
-_TOGETHER = 8  # rules; a shield without each of them is made and sent to the processes
 
 Runner = Callable[[Sequence[Task]], Iterator[Found]]
 """Runs tasks, as `WorkerPool.run` does."""
@@ -106,15 +104,13 @@ class AblationRecord:
         )
         yield Step(done, total, "Taking rules out …")
         missing = [rule for rule in chosen if not self._known(rule).keys() >= set(matters[rule])]
-        for first in range(0, len(missing), _TOGETHER):
-            tasks, owners = self._tasks(missing[first : first + _TOGETHER], use)
-            for piece in _pieces(runner(tasks)):
-                rule = owners[piece.task]
-                assert isinstance(piece.result, Episodes)
-                self._keep(rule, piece.result)
-                done += len(piece.result)
-                place = chosen.index(rule) + 1
-                yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+        for piece in _pieces(runner([self._task(rule, use) for rule in missing])):
+            rule = missing[piece.task]
+            assert isinstance(piece.result, Episodes)
+            self._keep(rule, piece.result)
+            done += len(piece.result)
+            place = chosen.index(rule) + 1
+            yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
 
     def _run_base(self, episodes: int, runner: Runner) -> Iterator[Step]:
         have = len(self._base) if self._base is not None else 0
@@ -154,20 +150,21 @@ class AblationRecord:
         with self._lock:
             return dict(self._without.get(rule, {}))
 
-    def _tasks(self, rules: Sequence[int], use: RuleUse) -> tuple[list[Task], list[int]]:
-        """The episodes to run without some rules, and which task is of which rule."""
-        tasks, owners = [], []
-        for rule in rules:
-            known = self._known(rule)
-            wanted = [
-                bool(matters) and episode not in known
-                for episode, matters in enumerate(use.matters[rule].tolist())
-            ]
-            shield = without_rule(self.shield, rule)
-            for start, count in spans(wanted):
-                tasks.append(Task(self.env_id, self.agent, shield, self.seed + start, count))
-                owners.append(rule)
-        return tasks, owners
+    def _task(self, rule: int, use: RuleUse) -> Task:
+        """The episodes to run without a rule: those in which it matters, if not known yet."""
+        known = self._known(rule)
+        which = [
+            place for place in np.flatnonzero(use.matters[rule]).tolist() if place not in known
+        ]
+        return Task(
+            self.env_id,
+            self.agent,
+            self.shield,
+            self.seed,
+            which[-1] + 1,
+            without=rule,
+            which=tuple(which),
+        )
 
     def _keep(self, rule: int, found: Episodes) -> None:
         places = (found.seeds - self.seed).tolist()
@@ -284,20 +281,18 @@ def run_here(tasks: Sequence[Task]) -> Iterator[Found]:
         tasks: What to run.
 
     Yields:
-        Each when it is finished.
+        Pieces as they are finished, in the order of tasks and seeds.
     """
     for index, task in enumerate(tasks):
-        yield Found(
-            index,
-            rollout(
-                task.env_id,
-                task.agent,
-                shield=task.shield,
-                episodes=task.episodes,
-                seed=task.seed,
-                keep_steps=task.keep_steps,
-            ),
-        )
+        shield = task.shield
+        if shield is not None and task.without is not None:
+            shield = without_rule(shield, task.without)
+        for start in range(0, len(task.seeds), LARGEST_PIECE):
+            seeds = task.seeds[start : start + LARGEST_PIECE]
+            yield Found(
+                index,
+                run_seeds(task.env_id, task.agent, shield, seeds, keep_steps=task.keep_steps),
+            )
 
 
 def _pieces(found: Iterator[Found]) -> Iterator[Found]:

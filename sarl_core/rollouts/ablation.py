@@ -8,7 +8,6 @@ nothing there, exactly.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -225,16 +224,3 @@ def rules_to_take_out(use: RuleUse, most: int) -> tuple[tuple[int, ...], tuple[i
     order = np.lexsort((np.arange(len(changed)), -matched, -changed))
     found = [int(index) for index in order if use.matters[index].any()]
     return tuple(found[:most]), tuple(found[most:])
-
-
-def spans(wanted: Sequence[bool]) -> list[tuple[int, int]]:
-    """Runs of neighbours that are wanted.
-
-    Args:
-        wanted: E entries.
-
-    Returns:
-        For each run its first index and its length.
-    """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(wanted, dtype=np.int8), [0]])))
-    return [(int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

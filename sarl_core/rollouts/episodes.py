@@ -6,7 +6,7 @@ does not depend on what runs beside it, nor on the number of processes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -263,23 +263,61 @@ def rollout(
         report(progress, done, episodes)
 
     if jobs == 1:
-        outcome = play(
+        return run_seeds(
             env_id,
             actor,
             shield,
             seeds,
             batch=batch,
-            max_steps=MAX_STEPS,
             keep_steps=keep_steps,
             finished=lambda: finished(1),
         )
-        return _episodes(env_id, actor.name, seeds, outcome)
     found = []
     outcomes = _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps)
     for piece, outcome in zip(pieces, outcomes, strict=True):
         found.append(_episodes(env_id, actor.name, piece, outcome))
         finished(len(piece))
     return join(found)
+
+
+def run_seeds(
+    env_id: str,
+    agent: Agent,
+    shield: Shield | None,
+    seeds: NDArray[np.int64],
+    *,
+    batch: int = _BATCH,
+    keep_steps: bool = True,
+    finished: Callable[[], None] | None = None,
+) -> Episodes:
+    """Run the episodes of some seeds, which need not follow each other, in this process.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: Chooses the actions.
+        shield: Checks them; None for none.
+        seeds: Shape (E,), at least one.
+        batch: Environments side by side; changes the speed, never the result.
+        keep_steps: Whether to keep the record of every step.
+        finished: Called after every episode; may raise to stop.
+
+    Returns:
+        The episodes in the order of the seeds; each is what `rollout` makes of its seed.
+
+    Raises:
+        InputError: If agent, shield and environment do not fit.
+    """
+    outcome = play(
+        env_id,
+        agent,
+        shield,
+        seeds,
+        batch=batch,
+        max_steps=MAX_STEPS,
+        keep_steps=keep_steps,
+        finished=finished,
+    )
+    return _episodes(env_id, agent.name, seeds, outcome)
 
 
 def _in_processes(

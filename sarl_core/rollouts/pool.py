@@ -12,17 +12,22 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock, Thread
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.rollouts.agents import Agent
-from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.episodes import Episodes, run_seeds
+from sarl_core.rollouts.packed_shield import PackedShield, pack, unpack
 from sarl_core.shielding.shield import Shield
 
 _PIECE_SECONDS = 1.0  # what one piece should take: progress is told, and work ends, this often
 _FIRST_PIECE = 4
-_LARGEST_PIECE = 32  # environments that `play` steps side by side
+LARGEST_PIECE = 32  # environments that `play` steps side by side
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
 _LOOK_SECONDS = 2.0  # between two looks at whether the server is still there
 _NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
@@ -39,6 +44,8 @@ class Task:
         seed: Of the first episode.
         episodes: How many; episode i has seed + i.
         keep_steps: Whether to keep the record of every step.
+        without: Index of a rule that is taken out of the shield; None for none.
+        which: Indices of the episodes that are run, ascending; all where None.
     """
 
     env_id: str
@@ -47,6 +54,8 @@ class Task:
     seed: int
     episodes: int
     keep_steps: bool = False
+    without: int | None = None
+    which: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run.
@@ -59,6 +68,12 @@ class Task:
                 f"{self.episodes} episodes from seed {self.seed} cannot be run; give at least "
                 "one episode, and a seed of 0 or more"
             )
+
+    @cached_property
+    def seeds(self) -> NDArray[np.int64]:
+        """Of the episodes that are run."""
+        which = range(self.episodes) if self.which is None else self.which
+        return self.seed + np.array(which, dtype=np.int64)
 
 
 class Found(NamedTuple):
@@ -77,22 +92,28 @@ class Found(NamedTuple):
 class _Piece(NamedTuple):
     task: int
     start: int
-    episodes: int
+    seeds: NDArray[np.int64]
+
+
+class _Pace:
+    """How many episodes of an agent in an environment make a piece, as far as is known."""
+
+    size = _FIRST_PIECE
 
 
 class _Progress:
     """How far a task is."""
 
-    def __init__(self, task: Task) -> None:
-        self.task = task
+    def __init__(self, task: Task, pace: _Pace, shield: PackedShield | None) -> None:
+        self.task, self.pace, self.shield = task, pace, shield
+        self.seeds = task.seeds
         self.asked = self.given = 0  # episodes handed to a process; given to the caller
-        self.size = _FIRST_PIECE
         self.early: dict[int, Episodes] = {}  # finished before those that come before them
         self.failed = False
 
     @property
     def is_open(self) -> bool:
-        return not self.failed and self.asked < self.task.episodes
+        return not self.failed and self.asked < len(self.seeds)
 
 
 class WorkerPool:
@@ -122,7 +143,7 @@ class WorkerPool:
         Raises:
             WorkError: If a process ended in the middle of its work.
         """
-        progress = [_Progress(task) for task in tasks]
+        progress = _prepare(tasks)
         waiting = deque(range(len(tasks)))
         running: dict[Any, _Piece] = {}
         try:
@@ -133,7 +154,7 @@ class WorkerPool:
                 # all at once, so that another caller's pieces come in between.
                 if waiting and len(running) <= self.workers:
                     piece = _next_piece(waiting[0], progress[waiting[0]])
-                    running[self._submit(tasks[piece.task], piece)] = piece
+                    running[self._submit(progress[piece.task], piece)] = piece
                     continue
                 if not running:
                     return
@@ -149,21 +170,13 @@ class WorkerPool:
         if processes is not None:
             processes.shutdown(wait=True)
 
-    def _submit(self, task: Task, piece: _Piece) -> Any:
+    def _submit(self, state: _Progress, piece: _Piece) -> Any:
         from concurrent.futures import BrokenExecutor
 
         from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
-        seed = task.seed + piece.start
-        work = (
-            _work,
-            task.env_id,
-            task.agent,
-            task.shield,
-            seed,
-            piece.episodes,
-            task.keep_steps,
-        )
+        task = state.task
+        work = (_work, task.env_id, task.agent, state.shield, piece.seeds, task.keep_steps)
         with self._lock:
             if self._processes is not None:
                 try:
@@ -199,17 +212,33 @@ class WorkerPool:
                     "a process that ran episodes ended unexpectedly, as when memory runs out; "
                     "run again, with fewer episodes at a time"
                 ) from error
-            state.size = round(piece.episodes * _PIECE_SECONDS / max(seconds, 1e-3))
+            state.pace.size = round(len(episodes) * _PIECE_SECONDS / max(seconds, 1e-3))
             state.early[piece.start] = episodes
             while (ready := state.early.pop(state.given, None)) is not None:
                 state.given += len(ready)
                 yield Found(piece.task, ready)
 
 
+def _prepare(tasks: Sequence[Task]) -> list[_Progress]:
+    """Tasks with the same shield share its packing; with the same agent, what is known of it."""
+    contents: dict[int, bytes] = {}
+    paces: dict[tuple[str, int], _Pace] = {}
+    found = []
+    for task in tasks:
+        packed = None
+        if task.shield is not None:
+            if id(task.shield) not in contents:
+                contents[id(task.shield)] = pack(task.shield)
+            packed = PackedShield(contents[id(task.shield)], task.without)
+        pace = paces.setdefault((task.env_id, id(task.agent)), _Pace())
+        found.append(_Progress(task, pace, packed))
+    return found
+
+
 def _next_piece(task: int, state: _Progress) -> _Piece:
-    size = min(max(state.size, 1), _LARGEST_PIECE, state.task.episodes - state.asked)
-    piece = _Piece(task, state.asked, size)
-    state.asked += size
+    size = min(max(state.pace.size, 1), LARGEST_PIECE)
+    piece = _Piece(task, state.asked, state.seeds[state.asked : state.asked + size])
+    state.asked += len(piece.seeds)
     return piece
 
 
@@ -228,14 +257,17 @@ def _end_with(parent: int) -> None:
 
 
 def _work(
-    env_id: str, agent: Agent, shield: Shield | None, seed: int, count: int, keep_steps: bool
+    env_id: str,
+    agent: Agent,
+    shield: PackedShield | None,
+    seeds: NDArray[np.int64],
+    keep_steps: bool,
 ) -> tuple[Episodes, float]:
     """Run one piece and say how long it took; in a process."""
+    in_force = None if shield is None else unpack(shield)
     start = time.perf_counter()
     try:
-        episodes = rollout(
-            env_id, agent, shield=shield, episodes=count, seed=seed, keep_steps=keep_steps
-        )
+        episodes = run_seeds(env_id, agent, in_force, seeds, keep_steps=keep_steps)
     except SarlError:
         raise
     except Exception as error:  # of other people's environments, which may raise anything

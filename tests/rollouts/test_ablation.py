@@ -1,19 +1,23 @@
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
 from sarl_core import InputError, RuleSet, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core.errors import WorkError
 from sarl_core.rollouts.ablating import AblationRecord, ablate, run_here
-from sarl_core.rollouts.ablation import Ablation, rules_to_take_out, spans
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.ablation import Ablation, rules_to_take_out
+from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.comparison import crashed
-from sarl_core.rollouts.pool import Found, Task
+from sarl_core.rollouts.pool import Found, Task, WorkerPool
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.rule_use import RuleUse, rule_use
 
@@ -104,7 +108,7 @@ def test_of_the_episodes_only_those_are_run_that_can_differ() -> None:
         )
         if on
     }
-    assert sum(task.episodes for task in tasks[1:]) == len(changed) == found.played
+    assert sum(len(task.seeds) for task in tasks[1:]) == len(changed) == found.played
     assert {rule for rule, _ in changed} == set(found.rules)
     # Asked again, nothing is run; with more episodes, only what is new.
     tasks.clear()
@@ -112,8 +116,8 @@ def test_of_the_episodes_only_those_are_run_that_can_differ() -> None:
     assert not tasks
     assert record.result(6, 200) is found
     list(record.run(8, 200, runner))
-    assert [task.episodes for task in tasks[:1]] == [2]
-    assert all(task.seed >= 46 for task in tasks)
+    assert tasks[0].seeds.tolist() == [46, 47]
+    assert all(task.seeds.min() >= 46 for task in tasks)
     more = record.result(8, 200)
     whole = ablate("CartPole-v1", "novice", shield, episodes=8, seed=40)
     assert more is not None
@@ -121,11 +125,61 @@ def test_of_the_episodes_only_those_are_run_that_can_differ() -> None:
     assert more.returns.tolist() == whole.returns.tolist()
 
 
-def test_processes_change_nothing() -> None:
-    shield = Shield(mined())
-    here = ablate("CartPole-v1", "novice", shield, episodes=5, seed=9)
-    there = ablate("CartPole-v1", "novice", shield, episodes=5, seed=9, jobs=2)
+@pytest.mark.parametrize(
+    ("env_id", "rules", "jobs"),
+    [("CartPole-v1", mined, 2), ("CartPole-v1", overlapping, 3), ("Pendulum-v1", torque, 2)],
+    ids=["mined", "overlapping", "continuous"],
+)
+def test_processes_change_nothing(env_id: str, rules: object, jobs: int) -> None:
+    shield = Shield(rules(), projection="clip")  # type: ignore[operator]
+    here = ablate(env_id, "novice", shield, episodes=5, seed=9)
+    there = ablate(env_id, "novice", shield, episodes=5, seed=9, jobs=jobs)
+    assert here.rules == there.rules
+    assert here.returns.tolist() == there.returns.tolist()
+    assert here.failed.tolist() == there.failed.tolist()
     assert here.to_frame().equals(there.to_frame())
+
+
+@dataclass(frozen=True)
+class DeadlyOnce:
+    """An agent that takes its process with it when a file says so, and takes the file away."""
+
+    inner: Agent
+    file: Path
+    name: str = "novice"
+    n_uniforms: int = 1
+
+    def act(self, observations: NDArray[np.float32], uniforms: Any) -> NDArray[Any]:
+        if self.file.exists():
+            self.file.unlink(missing_ok=True)
+            os._exit(1)
+        return self.inner.act(observations, uniforms)
+
+
+def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(tmp_path: Path) -> None:
+    shield, novice = Shield(mined()), make_agent("novice", "CartPole-v1")
+    file = tmp_path / "deadly"
+    agent = DeadlyOnce(novice, file, n_uniforms=novice.n_uniforms)
+    record = AblationRecord("CartPole-v1", agent, shield, 9)
+    pool = WorkerPool(2)
+    try:
+        steps = record.run(5, 200, pool.run)
+        for step in steps:
+            if step.text.startswith("Taking rules out"):
+                file.touch()
+                break
+        with pytest.raises(WorkError, match="ended unexpectedly"):
+            list(steps)
+        assert not file.exists()
+        # The new processes were given nothing before, and need nothing of what the others knew.
+        list(record.run(5, 200, pool.run))
+    finally:
+        pool.close()
+    found = record.result(5, 200)
+    assert found is not None
+    assert found.to_frame().equals(
+        ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
+    )
 
 
 def test_called_off_what_is_finished_stays() -> None:
@@ -231,8 +285,6 @@ def test_of_many_rules_the_most_used_are_taken_out() -> None:
     use = RuleUse(changed + 1, changed, changed > 0)
     assert rules_to_take_out(use, 2) == ((2, 1), (3,))
     assert rules_to_take_out(use, 9) == ((2, 1, 3), ())
-    assert spans([True, True, False, True]) == [(0, 2), (3, 1)]
-    assert spans([]) == []
 
 
 def test_nothing_is_unused_that_was_switched_off_and_use_needs_steps() -> None:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,33 @@ def test_pieces_together_are_what_one_rollout_gives(pool: WorkerPool) -> None:
         for name in COLUMNS:
             assert (getattr(together, name) == getattr(whole, name)).all()
     assert len(found[1]) > 1
+
+
+def test_chosen_episodes_without_a_rule_are_what_a_rollout_without_it_gives(
+    pool: WorkerPool,
+) -> None:
+    rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
+    novice, shield = make_agent("novice", "CartPole-v1"), Shield(rules)
+    used = rollout("CartPole-v1", novice, shield=shield, episodes=45, seed=7).steps
+    assert used is not None
+    rule = int(np.bincount(used.rules[used.rules >= 0]).argmax())
+    which = (0, 3, *range(9, 40), 44)
+    tasks = [
+        Task("CartPole-v1", novice, shield, 7, 45, without=rule, which=which),
+        Task("CartPole-v1", novice, shield, 7, 45),
+        Task("CartPole-v1", novice, None, 7, 45, which=(44,)),
+    ]
+    found = gathered(pool, tasks)
+    others = replace(rules, rules=tuple(one for one in rules.rules if one is not rules.rules[rule]))
+    wholes = [
+        rollout("CartPole-v1", novice, shield=one, episodes=45, seed=7, keep_steps=False)
+        for one in (Shield(others), shield, None)
+    ]
+    assert wholes[0].returns.tolist() != wholes[1].returns.tolist()
+    for index, places in enumerate([list(which), list(range(45)), [44]]):
+        pieces = join([piece for piece in found[index] if isinstance(piece, Episodes)])
+        for name in COLUMNS:
+            assert (getattr(pieces, name) == getattr(wholes[index], name)[places]).all()
 
 
 def test_what_is_done_stays_when_the_rest_is_called_off(pool: WorkerPool) -> None:
