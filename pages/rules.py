@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -11,28 +10,13 @@ import _edits
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
-from _tree_picture import tree_picture, tree_place
-from _words import escaped
+from _rule_view import Behind, show_rule
 
-from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.evidence import feature_evidence, path_steps
-from sarl_core.explaining.evidence_words import evidence_bar, evidence_text, intervals_text
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import (
-    action_text,
-    conditions_text,
-    counted,
-    sentence,
-    share_text,
-)
-from sarl_core.explaining.path_table import path_table
-from sarl_core.explaining.rule_examples import examples_html
-from sarl_core.explaining.rule_features import features_html
-from sarl_core.mining.holding_out import lower_bound, verdict, with_lower_bound
+from sarl_core.explaining.language import action_text, conditions_text
+from sarl_core.mining.holding_out import lower_bound, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.mining.rules import Rule, RuleSet, node_of
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.rules import Rule, RuleSet
 
 TABLE_ROWS = 8
 MEASURES = """
@@ -45,7 +29,6 @@ more frequent than it is overall.
 
 **Joint support**: share of all states to which the rule applies and in which it is right.
 """
-WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
 st.title("Rules")
 _edits.notice()
@@ -60,30 +43,6 @@ def table_of(key: tuple[object, ...], _rule_set: RuleSet) -> tuple[tuple[Rule, .
     """All rules, the most support first, and the same as a data frame."""
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     return rules, frame(rules, _rule_set)
-
-
-def key_of(rule: Rule) -> tuple[object, ...]:
-    """What tells a rule from all others, those of other data included."""
-    tree = grown[rule.dimension]
-    return tree.source.digest, tree.divider, compact.digest if compact else "", rule.id
-
-
-@st.cache_resource(max_entries=96, show_spinner=False)
-def features_of(
-    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
-) -> str:
-    """A rule's intervals in HTML."""
-    found = feature_evidence(_demonstrations, _tree, _rule)
-    return features_html(found, _demonstrations.features, label_colour(_rule.action))
-
-
-@st.cache_resource(max_entries=96, show_spinner=False)
-def examples_of(
-    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
-) -> str:
-    """Some states of a rule, under a heading."""
-    heading = "Example states" if _rule.samples > 1 else "The one state it applies to"
-    return f"<h3>{heading}</h3>{examples_html(_demonstrations, _tree, _rule)}"
 
 
 def downloads(rule_set: RuleSet) -> None:
@@ -246,6 +205,26 @@ def table_and_rule(
     """The table of rules, and the chosen one: another choice runs this part alone."""
     chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
+    above, below = st.container(), st.container()
+    with below:  # the rule is what was asked for, and a large table takes its time
+        show_rule(
+            next(rule for rule in rules if rule.id == chosen_id),
+            rule_set,
+            Behind(demonstrations, grown, thresholds, compact),
+            lambda: walk(shown, rules, place),
+        )
+    with above:
+        rule_rows(rules, table, shown, rule_set, place)
+
+
+def rule_rows(
+    rules: tuple[Rule, ...],
+    table: Any,
+    shown: list[int],
+    rule_set: RuleSet,
+    place: int | None,
+) -> None:
+    """The table of the rules that match, the chosen one selected."""
     select_row(place)
     st.dataframe(
         table.iloc[shown],
@@ -262,142 +241,9 @@ def table_and_rule(
     count = f"{len(rules):,} {kind}rules" if len(rules) > 1 else f"One {kind}rule"
     st.caption(
         (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
-        + "Click a heading to sort, the box at the left of a row to see the rule below."
+        + "Click a heading to sort, the box at the left of a row to see the rule below.",
+        help=MEASURES,
     )
-    show_rule(
-        next(rule for rule in rules if rule.id == chosen_id),
-        rule_set,
-        lambda: walk(shown, rules, place),
-    )
-
-
-def show_rule(rule: Rule, rule_set: RuleSet, buttons: Callable[[], None]) -> None:
-    """One rule and everything behind it."""
-    tree = grown[rule.dimension]
-    node = node_of(rule)
-    with st.container(border=True, key="sentence"):
-        buttons()
-        reached = rule.samples > 0
-        st.markdown(f"#### {escaped(sentence(rule, rule_set, evidence=reached))}")
-        st.caption(
-            f"Rule {rule.id} · "
-            + (f"{measures(rule)} · " if reached else "")
-            + f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}"
-            + (f"  \n{sureness(rule)}" if reached and compact is None else ""),
-            help=MEASURES,
-        )
-        if compact is not None:
-            show_origin(compact.as_shipped(rule), compact.shipped)
-        elif reached:
-            st.html(evidence_bar(rule, thresholds.confidence))
-        if not reached:
-            st.info(
-                "No demonstrated state reaches this rule. It is for states that the expert never "
-                "came into by itself and was asked about.",
-                icon=":material/explore:",
-            )
-        if not rule.conditions and compact is None:
-            st.info(
-                "This rule has no conditions: over all states the expert's most frequent action "
-                "is already as frequent as the minimum confidence asks, so the tree is cut at "
-                "its root. Raise the minimum confidence to see what it depends on.",
-                icon=":material/lightbulb:",
-            )
-    left, right = st.columns([6, 7], gap="medium")
-    with left:
-        st.subheader("From the root to the rule")
-        st.html(path_table(path_steps(tree, node), tree.dimension, leaf=compact is not None))
-    with right:
-        show_tree(rule)
-    if rule.conditions:
-        show_features(rule)
-    show_examples(rule)
-
-
-def measures(rule: Rule) -> str:
-    """The numbers of a rule."""
-    return (
-        f"support {share_text(rule.support)} · confidence {share_text(rule.confidence)} · "
-        f"lift {rule.lift:.2f} · joint support {share_text(rule.joint_support)}"
-    )
-
-
-def sureness(rule: Rule) -> str:
-    """How sure the rule is, on what it was mined from and on what was held out."""
-    words = f"{evidence_text(rule)} · {intervals_text(rule)}"
-    below = rule.held_out is not None and verdict(rule, thresholds.confidence) == "below"
-    return f":red[{words}; too low]" if below else words
-
-
-def show_origin(rule: Rule, rule_set: RuleSet) -> None:
-    """The numbers of a compact rule over the pairs it was built from."""
-    built, divided = rule_set.source, ""
-    if rule_set.actions[rule.dimension].is_interval:
-        divided = f" (divider {rule_set.divider})"
-    st.caption(
-        f"Over the {built.steps:,} pairs that the compact set was built from{divided}: "
-        f"{measures(rule)}, {counted(rule.samples, 'state')}. Everything else here is of the "
-        "chosen demonstrations."
-    )
-
-
-def show_tree(rule: Rule) -> None:
-    """The path lit in the tree."""
-    tree = grown[rule.dimension]
-    st.subheader("Its place in the tree")
-    view = WHOLE_TREE
-    if rule.samples:
-        view = st.segmented_control(
-            "Tree",
-            [AROUND, WHOLE_TREE],
-            default=AROUND,
-            key="tree",
-            bind="query-params",
-            required=True,
-            label_visibility="collapsed",
-        )
-    note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
-        "Rules are full in colour, what is cut off below them is grey. "
-        if compact is None
-        else "Every leaf is a rule, full in colour. "
-    )
-    key = compact.digest if compact is not None else ""
-    leaves, dark = compact is not None, state.is_dark()
-    if view == AROUND:
-        with st.container(key="tree_figure"):
-            st.html(
-                tree_place(
-                    key, tree, thresholds, node_of(rule), note=note, leaves=leaves, dark=dark
-                )
-            )
-    else:
-        st.plotly_chart(
-            tree_picture(
-                key, tree, thresholds, node_of(rule), around=False, leaves=leaves, dark=dark
-            ),
-            key="tree_figure",
-            config={"displaylogo": False, "scrollZoom": True},
-            alt="The decision tree with the path of the rule",
-        )
-        st.caption(
-            note
-            + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
-            + "Drag or scroll to zoom, double-click to go back."
-        )
-
-
-def show_features(rule: Rule) -> None:
-    """The interval on each feature against its distribution."""
-    st.subheader("What it asks, feature by feature")
-    with st.container(key="features"):
-        st.html(features_of(key_of(rule), grown[rule.dimension], rule, demonstrations))
-
-
-def show_examples(rule: Rule) -> None:
-    """Some states to which the rule applies."""
-    if rule.samples:
-        with st.container(key="examples"):
-            st.html(examples_of(key_of(rule), grown[rule.dimension], rule, demonstrations))
 
 
 with st.spinner("Mining the rules …"):

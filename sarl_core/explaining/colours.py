@@ -63,7 +63,6 @@ def faded(colour: str, opacity: float) -> str:
         opacity: 0 to 1.
 
     Returns:
-        As "rgba(0,114,178,0.3)".
+        As "#0072B24D".
     """
-    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
-    return f"rgba({red},{green},{blue},{opacity:g})"
+    return f"{colour}{round(255 * opacity):02X}"

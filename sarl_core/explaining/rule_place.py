@@ -142,17 +142,19 @@ def _gradient(
                 boxes[-1] = begun, first + states, mix
                 continue
         boxes.append((first, first + states, {colours[node]: states}))
-    stops, at = [], "0%"
+    if not boxes:
+        return "none"
+    # A stop at 0 begins where the one before it ended.
+    stops, at = [], "0.00%"
     for begun, ended, mix in boxes:
         first_place, last_place = (
             _share(min(max(place, left), right) - left, right - left) for place in (begun, ended)
         )
         if first_place != at:
-            stops.append(f"#0000 {at} {first_place}")
-        most = max(mix, key=lambda colour: mix[colour])
-        stops.append(f"{most} {first_place} {last_place}")
+            stops.append(f"#0000 0 {first_place}")
+        stops.append(f"{max(mix, key=lambda colour: mix[colour])} 0 {last_place}")
         at = last_place
-    stops.append(f"#0000 {at} 100%")
+    stops.append("#0000 0")
     return f"linear-gradient(90deg,{','.join(stops)})"
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from html import unescape
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,13 +23,18 @@ def rules(lander_trees: tuple[PolicyTree, ...]) -> RuleSet:
 
 def rows(html: str) -> list[list[tuple[str, float, float]]]:
     """Colour, from and to of each box, row by row; in percent from the left."""
-    return [
-        [
-            (colour, float(start), float(end))
-            for colour, start, end in re.findall(r"(#0000|rgba\([^)]*\)) ([\d.]+)% ([\d.]+)%", row)
-        ]
-        for row in re.findall(r"linear-gradient\(90deg,(.*?)\)\"", html)
-    ]
+    found = []
+    for row in re.findall(r"background:(?:none|linear-gradient\(90deg,(.*?),#0000 0\))\"", html):
+        stops = [stop.split(" 0 ") for stop in row.split(",")] if row else []
+        ends = [0.0, *(float(end.removesuffix("%")) for _, end in stops)]
+        assert ends == sorted(ends)
+        found.append(
+            [
+                (colour, start, end)
+                for (colour, _), (start, end) in zip(stops, pairwise(ends), strict=True)
+            ]
+        )
+    return found
 
 
 def test_a_rule_stands_in_its_row_where_its_states_do(

@@ -1,0 +1,182 @@
+"""One rule and everything behind it: the sentence, the path, the features, example states.
+
+What changes with the rule comes as a few pieces of HTML: each element of Streamlit takes its time,
+and the next rule should be there at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import _state as state
+import streamlit as st
+from _compact import Compact
+from _tree_picture import tree_picture, tree_place
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.evidence import feature_evidence, path_steps
+from sarl_core.explaining.language import counted
+from sarl_core.explaining.path_table import path_table
+from sarl_core.explaining.rule_card import measures_text, rule_card
+from sarl_core.explaining.rule_examples import examples_html
+from sarl_core.explaining.rule_features import features_html
+from sarl_core.mining.rules import Rule, RuleSet, Thresholds, node_of
+from sarl_core.mining.tree import PolicyTree
+
+WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
+
+
+@dataclass(frozen=True, eq=False)
+class Behind:
+    """What the rules come from.
+
+    Attributes:
+        demonstrations: The chosen ones.
+        trees: One an action dimension.
+        thresholds: At which they are cut.
+        compact: The compact set whose rules they are; None for mined ones.
+    """
+
+    demonstrations: Demonstrations
+    trees: tuple[PolicyTree, ...]
+    thresholds: Thresholds
+    compact: Compact | None
+
+    @property
+    def digest(self) -> str:
+        """What tells a compact set from others; "" for mined rules."""
+        return self.compact.digest if self.compact is not None else ""
+
+    def tree(self, rule: Rule) -> PolicyTree:
+        """The tree of a rule's action dimension."""
+        return self.trees[rule.dimension]
+
+
+def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[], None]) -> None:
+    """One rule and everything behind it.
+
+    Args:
+        rule: One of the rule set.
+        rule_set: Knows the names.
+        behind: What it comes from.
+        buttons: Draws what leads to other rules.
+    """
+    tree, compact = behind.tree(rule), behind.compact
+    with st.container(border=True, key="sentence"):
+        buttons()
+        threshold = behind.thresholds.confidence if compact is None else None
+        st.html(rule_card(rule, rule_set, threshold=threshold))
+        if compact is not None:
+            show_origin(compact.as_shipped(rule), compact.shipped)
+        if not rule.samples:
+            st.info(
+                "No demonstrated state reaches this rule. It is for states that the expert never "
+                "came into by itself and was asked about.",
+                icon=":material/explore:",
+            )
+        if not rule.conditions and compact is None:
+            st.info(
+                "This rule has no conditions: over all states the expert's most frequent action "
+                "is already as frequent as the minimum confidence asks, so the tree is cut at "
+                "its root. Raise the minimum confidence to see what it depends on.",
+                icon=":material/lightbulb:",
+            )
+    left, right = st.columns([6, 7], gap="medium")
+    with left:
+        steps = path_steps(tree, node_of(rule))
+        st.html(
+            "<h3>From the root to the rule</h3>"
+            + path_table(steps, tree.dimension, leaf=compact is not None)
+        )
+    with right:
+        show_tree(rule, behind)
+    tree_digest = (tree.source.digest, tree.divider)
+    key = (*tree_digest, behind.digest, rule.id)
+    with st.container(key="features"):
+        st.html(features_of(key, tree, rule, behind.demonstrations))
+
+
+def show_origin(rule: Rule, rule_set: RuleSet) -> None:
+    """The numbers of a compact rule over the pairs it was built from."""
+    built, divided = rule_set.source, ""
+    if rule_set.actions[rule.dimension].is_interval:
+        divided = f" (divider {rule_set.divider})"
+    st.caption(
+        f"Over the {built.steps:,} pairs that the compact set was built from{divided}: "
+        f"{measures_text(rule)}, {counted(rule.samples, 'state')}. Everything else here is of the "
+        "chosen demonstrations."
+    )
+
+
+def show_tree(rule: Rule, behind: Behind) -> None:
+    """The path lit in the tree."""
+    tree, compact = behind.tree(rule), behind.compact
+    st.html("<h3>Its place in the tree</h3>")
+    view = WHOLE_TREE
+    if rule.samples:
+        view = st.segmented_control(
+            "Tree",
+            [AROUND, WHOLE_TREE],
+            default=AROUND,
+            key="tree",
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+        )
+    note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
+        "Rules are full in colour, what is cut off below them is grey. "
+        if compact is None
+        else "Every leaf is a rule, full in colour. "
+    )
+    leaves, dark = compact is not None, state.is_dark()
+    if view == AROUND:
+        with st.container(key="tree_figure"):
+            st.html(
+                tree_place(
+                    behind.digest,
+                    tree,
+                    behind.thresholds,
+                    node_of(rule),
+                    note=note,
+                    leaves=leaves,
+                    dark=dark,
+                )
+            )
+    else:
+        st.plotly_chart(
+            tree_picture(
+                behind.digest,
+                tree,
+                behind.thresholds,
+                node_of(rule),
+                around=False,
+                leaves=leaves,
+                dark=dark,
+            ),
+            key="tree_figure",
+            config={"displaylogo": False, "scrollZoom": True},
+            alt="The decision tree with the path of the rule",
+        )
+        st.caption(
+            note
+            + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
+            + "Drag or scroll to zoom, double-click to go back."
+        )
+
+
+@st.cache_resource(max_entries=96, show_spinner=False)
+def features_of(
+    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
+) -> str:
+    """The interval on each feature against its distribution, and some states of the rule."""
+    parts = []
+    if _rule.conditions:
+        found = feature_evidence(_demonstrations, _tree, _rule)
+        figures = features_html(found, _demonstrations.features, label_colour(_rule.action))
+        parts.append(f"<h3>What it asks, feature by feature</h3>{figures}")
+    if _rule.samples:
+        heading = "Example states" if _rule.samples > 1 else "The one state it applies to"
+        parts.append(f"<h3>{heading}</h3>{examples_html(_demonstrations, _tree, _rule)}")
+    return "".join(parts)
