@@ -22,6 +22,11 @@ def escaped(text: str) -> str:
     return "".join(f"\\{sign}" if sign in _SIGNS else sign for sign in broken)
 
 
+def together(text: str) -> str:
+    """A sentence in which no line ends between a number and its percent sign."""
+    return re.sub(r"(?<=\d) (?=%)", "\N{NO-BREAK SPACE}", text)
+
+
 def file_name(env_id: str) -> str:
     """An environment's id as the beginning of a file's name."""
     return re.sub(r"[^\w.-]+", "-", env_id).strip("-.") or "unnamed"

@@ -10,7 +10,7 @@ import streamlit as st
 from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, rules_for
 from _rule_table import action_column, table_height
 from _settings import offered_rule_sets
-from _words import escaped, in_full
+from _words import escaped, in_full, together
 
 from sarl_core.errors import SarlError
 from sarl_core.explaining.confusion_table import confusion_html
@@ -177,7 +177,7 @@ def show_states(
     st.markdown(
         headed(
             "Decisions",
-            f"**{escaped(decided_text(found, states=noun_of(shown)))}**",
+            f"**{escaped(together(decided_text(found, states=noun_of(shown))))}**",
             small(random) if shown is None else "",
         )
     )

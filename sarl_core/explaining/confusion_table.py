@@ -13,15 +13,17 @@ from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.difference_words import kinds_text, said_text
 from sarl_core.explaining.language import counted
 from sarl_core.explaining.report_svg import layer_colour
+from sarl_core.explaining.scrolling import WIDE_STYLE, wide_html
 from sarl_core.shielding.disagreement import Disagreement
 
 _WIDTH = 88  # percent of the table that the columns share
 
-_STYLE = """<style>
+_STYLE = (
+    WIDE_STYLE
+    + """<style>
 .sarl-confusion { margin: 0; }
 .sarl-confusion figcaption { font-size: 0.875rem; opacity: 0.75; margin-bottom: 0.7rem;
   overflow-wrap: anywhere; }
-.sarl-confusion .scroll { overflow-x: auto; }
 .sarl-confusion table { width: 100%; border-collapse: separate; border-spacing: 2px;
   font-size: 0.85rem; }
 .sarl-confusion th, .sarl-confusion td { border: 0; text-align: center; }
@@ -34,15 +36,18 @@ _STYLE = """<style>
 .sarl-confusion th.axis div { writing-mode: vertical-rl; transform: rotate(180deg);
   max-height: 14rem; margin: auto; }
 .sarl-confusion th.name { border: 0 solid transparent; line-height: 1.25; }
-.sarl-confusion th.name div { width: max-content; max-width: 9rem; overflow-wrap: break-word; }
+.sarl-confusion th.name div { width: max-content; max-width: 9rem; overflow-wrap: break-word;
+  text-wrap: balance; }
 .sarl-confusion th.name[scope=col] { border-bottom-width: 5px; vertical-align: bottom; }
 .sarl-confusion th.name[scope=col] div { margin: 0 auto 2px; }
 .sarl-confusion th.name[scope=row] { width: 1%; border-right-width: 8px; text-align: right; }
 .sarl-confusion th.name[scope=row] div { margin-left: auto; }
 @media (max-width: 640px) {
-  .sarl-confusion th.name div { width: auto; max-width: 5.5rem; }
+  .sarl-confusion th.name div { max-width: 4.8rem; }
+  .sarl-confusion th.name[scope=col] div { width: auto; }
   .sarl-confusion th.axis[scope=colgroup] { text-align: left; } }
 </style>""".replace("SAME", faded(MUTED_COLOUR, 0.28))
+)
 
 
 def confusion_html(
@@ -77,12 +82,14 @@ def confusion_html(
         rows.append(f"<tr>{axis}{_name(said[row], row, size, 'row')}{''.join(cells)}</tr>")
     columns = "".join(_name(text, column, size, "col") for column, text in enumerate(said))
     title = f"What {names[0]} says against what {names[1]} says, in numbers of states"
-    return (
-        f'{_STYLE}<figure class="sarl-confusion"><figcaption>{_caption(found, dimension, names)}'
-        f'</figcaption><div class="scroll" role="region" tabindex="0" aria-label="{escape(title)}">'
+    table = (
         f'<table aria-label="{escape(title)}"><thead><tr><td colspan="2" rowspan="2"></td>'
         f'<th class="axis" scope="colgroup" colspan="{size}">{escape(names[1])} says</th></tr>'
-        f"<tr>{columns}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></figure>"
+        f"<tr>{columns}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    )
+    return (
+        f'{_STYLE}<figure class="sarl-confusion"><figcaption>{_caption(found, dimension, names)}'
+        f"</figcaption>{wide_html(table, title)}</figure>"
     )
 
 
