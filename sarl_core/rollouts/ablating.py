@@ -98,19 +98,28 @@ class AblationRecord:
         use = use.part(0, episodes)
         chosen, _ = rules_to_take_out(use, most)
         matters = {rule: np.flatnonzero(use.matters[rule]).tolist() for rule in chosen}
+        missing: dict[int, tuple[int, ...]] = {}
+        for rule, places in matters.items():
+            known = self._known(rule)
+            if which := tuple(place for place in places if place not in known):
+                missing[rule] = which
+        owners = list(missing)
         total = episodes + sum(map(len, matters.values()))
-        done = episodes + sum(
-            episode in self._known(rule) for rule in chosen for episode in matters[rule]
-        )
+        done = total - sum(map(len, missing.values()))
         yield Step(done, total, "Taking rules out …")
-        missing = [rule for rule in chosen if not self._known(rule).keys() >= set(matters[rule])]
-        for piece in _pieces(runner([self._task(rule, use) for rule in missing])):
-            rule = missing[piece.task]
+        tasks = [self._task(episodes, rule, which) for rule, which in missing.items()]
+        for piece in _pieces(runner(tasks)):
+            rule = owners[piece.task]
             assert isinstance(piece.result, Episodes)
             self._keep(rule, piece.result)
             done += len(piece.result)
             place = chosen.index(rule) + 1
             yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+
+    def _task(self, episodes: int, rule: int, which: tuple[int, ...]) -> Task:
+        return Task(
+            self.env_id, self.agent, self.shield, self.seed, episodes, without=rule, which=which
+        )
 
     def _run_base(self, episodes: int, runner: Runner) -> Iterator[Step]:
         have = len(self._base) if self._base is not None else 0
@@ -149,22 +158,6 @@ class AblationRecord:
     def _known(self, rule: int) -> dict[int, tuple[float, bool]]:
         with self._lock:
             return dict(self._without.get(rule, {}))
-
-    def _task(self, rule: int, use: RuleUse) -> Task:
-        """The episodes to run without a rule: those in which it matters, if not known yet."""
-        known = self._known(rule)
-        which = [
-            place for place in np.flatnonzero(use.matters[rule]).tolist() if place not in known
-        ]
-        return Task(
-            self.env_id,
-            self.agent,
-            self.shield,
-            self.seed,
-            which[-1] + 1,
-            without=rule,
-            which=tuple(which),
-        )
 
     def _keep(self, rule: int, found: Episodes) -> None:
         places = (found.seeds - self.seed).tolist()

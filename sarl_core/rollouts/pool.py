@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import os
 import time
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from threading import Lock, Thread
 from typing import Any, NamedTuple
 
@@ -95,17 +95,18 @@ class _Piece(NamedTuple):
     seeds: NDArray[np.int64]
 
 
+@dataclass
 class _Pace:
     """How many episodes of an agent in an environment make a piece, as far as is known."""
 
-    size = _FIRST_PIECE
+    size: int = _FIRST_PIECE
 
 
 class _Progress:
     """How far a task is."""
 
-    def __init__(self, task: Task, pace: _Pace, shield: PackedShield | None) -> None:
-        self.task, self.pace, self.shield = task, pace, shield
+    def __init__(self, task: Task, pace: _Pace) -> None:
+        self.task, self.pace = task, pace
         self.seeds = task.seeds
         self.asked = self.given = 0  # episodes handed to a process; given to the caller
         self.early: dict[int, Episodes] = {}  # finished before those that come before them
@@ -143,7 +144,9 @@ class WorkerPool:
         Raises:
             WorkError: If a process ended in the middle of its work.
         """
-        progress = _prepare(tasks)
+        paces: defaultdict[tuple[str, int], _Pace] = defaultdict(_Pace)
+        progress = [_Progress(task, paces[task.env_id, id(task.agent)]) for task in tasks]
+        pack_once = cache(pack)  # tasks that have the same shield share what is sent of it
         waiting = deque(range(len(tasks)))
         running: dict[Any, _Piece] = {}
         try:
@@ -154,7 +157,9 @@ class WorkerPool:
                 # all at once, so that another caller's pieces come in between.
                 if waiting and len(running) <= self.workers:
                     piece = _next_piece(waiting[0], progress[waiting[0]])
-                    running[self._submit(progress[piece.task], piece)] = piece
+                    shield = tasks[piece.task].shield
+                    content = None if shield is None else pack_once(shield)
+                    running[self._submit(tasks[piece.task], content, piece)] = piece
                     continue
                 if not running:
                     return
@@ -170,13 +175,13 @@ class WorkerPool:
         if processes is not None:
             processes.shutdown(wait=True)
 
-    def _submit(self, state: _Progress, piece: _Piece) -> Any:
+    def _submit(self, task: Task, content: bytes | None, piece: _Piece) -> Any:
         from concurrent.futures import BrokenExecutor
 
         from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
-        task = state.task
-        work = (_work, task.env_id, task.agent, state.shield, piece.seeds, task.keep_steps)
+        shield = None if content is None else PackedShield(content, task.without)
+        work = (_work, task.env_id, task.agent, shield, piece.seeds, task.keep_steps)
         with self._lock:
             if self._processes is not None:
                 try:
@@ -217,22 +222,6 @@ class WorkerPool:
             while (ready := state.early.pop(state.given, None)) is not None:
                 state.given += len(ready)
                 yield Found(piece.task, ready)
-
-
-def _prepare(tasks: Sequence[Task]) -> list[_Progress]:
-    """Tasks with the same shield share its packing; with the same agent, what is known of it."""
-    contents: dict[int, bytes] = {}
-    paces: dict[tuple[str, int], _Pace] = {}
-    found = []
-    for task in tasks:
-        packed = None
-        if task.shield is not None:
-            if id(task.shield) not in contents:
-                contents[id(task.shield)] = pack(task.shield)
-            packed = PackedShield(contents[id(task.shield)], task.without)
-        pace = paces.setdefault((task.env_id, id(task.agent)), _Pace())
-        found.append(_Progress(task, pace, packed))
-    return found
 
 
 def _next_piece(task: int, state: _Progress) -> _Piece:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -198,6 +199,18 @@ def test_called_off_what_is_finished_stays() -> None:
     whole = record.result(5, 200)
     assert whole is not None
     assert whole.to_frame().equals(
+        ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
+    )
+
+
+def test_two_callers_at_the_same_ablation_get_what_one_would() -> None:
+    shield = Shield(mined())
+    record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 9)
+    for both in zip_longest(record.run(5, 200, run_here), record.run(5, 200, run_here)):
+        assert all(step is None or step.done <= step.total for step in both)
+    found = record.result(5, 200)
+    assert found is not None
+    assert found.to_frame().equals(
         ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
     )
 
