@@ -126,12 +126,12 @@ def _row(
         _part(part, ends, feature, labels)
         for part in sorted(parts, key=lambda part: part[0] - part[1])
     )
-    here = next(part for part in reversed(parts) if part[0] <= value or part is parts[0])
     now = escape(f"{feature.name} is {with_unit(number_text(value), feature)}")
+    told = f"{now}: {_told(parts, value, feature, labels)}"
     place = 100 * (value - low) / (high - low)
     under = "".join(f"<span>{escape(with_unit(number_text(end), feature))}</span>" for end in ends)
     return (
-        f'<div class="row" role="img" aria-label="{now}: {_done(here, labels)}">'
+        f'<div class="row" role="img" aria-label="{told}">'
         f'<div class="name">{escape(feature.name)}</div><div class="track"><div class="bar">{bar}'
         f'<b style="left:{place:.2f}%" title="{now}"></b></div>'
         f'<div class="ends">{under}</div></div></div>'
@@ -153,13 +153,36 @@ def _part(
         else "right:0"
     )
     colour = label_colour(label) if ruled else faded(label_colour(label), _PALE)
-    between = (
-        f"{feature.name} {number_text(start, apart_from=end)} to "
-        f"{with_unit(number_text(end, apart_from=start), feature)}"
-    )
+    between = f"{feature.name} {_between(start, end, feature)}"
     return (
         f'<span style="{side};width:{100 * (end - start) / (high - low):.2f}%;'
         f'background:{colour}" title="{escape(between)}: {_done(part, labels)}"></span>'
+    )
+
+
+def _told(
+    parts: Sequence[tuple[float, float, int, bool]],
+    value: float,
+    feature: Feature,
+    labels: LabelledDimension,
+) -> str:
+    """What a bar shows, for those who do not see it, escaped."""
+    place = max((at for at, part in enumerate(parts) if part[0] <= value), default=0)
+    here = parts[place]
+    stays = f"{_done(here, labels)}, from {escape(_between(here[0], here[1], feature))}"
+    if len(parts) == 1:
+        return f"{stays}, which is all of the bar"
+    below, above = (
+        _done(parts[side], labels) if 0 <= side < len(parts) else "the bar ends"
+        for side in (place - 1, place + 1)
+    )
+    return f"{stays}; below that: {below}; above that: {above}"
+
+
+def _between(start: float, end: float, feature: Feature) -> str:
+    return (
+        f"{number_text(start, apart_from=end)} to "
+        f"{with_unit(number_text(end, apart_from=start), feature)}"
     )
 
 

@@ -186,24 +186,47 @@ def test_the_narrowest_stretch_lies_on_top():
     assert widths == sorted(widths, reverse=True)
 
 
+LOWEST = (
+    "left, as the agent wants, from -1 to 0.125 rad; below that: the bar ends; "
+    "above that: right, by a rule"
+)
+
+
 @pytest.mark.parametrize(
     ("angle", "place", "said"),
     [
-        (-1.0, "0.00%", "pole angle is -1 rad: left, as the agent wants"),
-        (0.0, "50.00%", "pole angle is 0 rad: left, as the agent wants"),
-        (0.125, "56.25%", "pole angle is 0.125 rad: left, as the agent wants"),
-        (0.25, "62.50%", "pole angle is 0.25 rad: right, by a rule"),
-        (1.0, "100.00%", "pole angle is 1 rad: left, as the agent wants"),
+        (-1.0, "0.00%", f"is -1 rad: {LOWEST}"),
+        (0.0, "50.00%", f"is 0 rad: {LOWEST}"),
+        (0.125, "56.25%", f"is 0.125 rad: {LOWEST}"),
+        (
+            0.25,
+            "62.50%",
+            "is 0.25 rad: right, by a rule, from 0.125 to 0.5 rad; "
+            "below that: left, as the agent wants; above that: left, as the agent wants",
+        ),
+        (
+            1.0,
+            "100.00%",
+            "is 1 rad: left, as the agent wants, from 0.5 to 1 rad; "
+            "below that: right, by a rule; above that: the bar ends",
+        ),
     ],
 )
 def test_the_mark_stands_at_the_present_value_and_is_told_to_screen_readers(angle, place, said):
     state = [angle, 0.0, 0.0]
     lines = Neighbourhood(Shield(SIDES)).lines(np.array(state, dtype=np.float32), 0)
-    row = drawn(lines, (-1.0, 1.0), state)[0]
+    row, contact, _ = drawn(lines, (-1.0, 1.0), state)
     (mark,) = row.findall(".//b")
     assert style(mark) == {"left": place}
     assert row.get("role") == "img"
-    assert row.get("aria-label") == said
+    assert row.get("aria-label") == f"pole angle {said}"
+    here = said.split(": ", 1)[1].split(", from")[0]  # the contact changes nothing there
+    assert contact.get("aria-label") == (
+        f"left leg contact is 0: {here}, from -1 to 1, which is all of the bar"
+        if angle > -0.25
+        else "left leg contact is 0: left, as the agent wants, from -1 to 0.5; "
+        "below that: the bar ends; above that: left, by a rule"
+    )
 
 
 def test_every_feature_has_its_name_and_its_ends_and_none_is_markup():
