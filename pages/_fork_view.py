@@ -22,7 +22,7 @@ def fork_section(replay: Replay, order: Order, current: int) -> None:
     """
     steps = replay.shown.steps
     assert steps is not None
-    st.subheader("Without this change")
+    st.html("<h3>Without this change</h3>")
     if not steps.intervened[current]:
         st.caption(
             "Choose a step at which the rules changed the action: from there the episode can go on "

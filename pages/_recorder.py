@@ -71,7 +71,7 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
         order: Asked for it.
         current: The step that is chosen.
     """
-    st.subheader("Flight recorder")
+    st.html("<h3>Flight recorder</h3>")
     recorded = source(replay, order)
     steps = recorded.steps
     chosen, rule_id = filters(recorded)
@@ -330,5 +330,4 @@ def downloads(recorded: Recorded, rows: NDArray[np.int64], text: str) -> None:
             key=f"steps_{ending}",
             on_click="ignore",
             icon=":material/download:",
-            help=f"All {len(rows):,} steps of the table, every number in full",
         )

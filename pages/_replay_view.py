@@ -118,6 +118,7 @@ def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
     ]
     if marks:
         entries.append(swatch("changed by the rules", INTERVENTION_COLOUR))
+    entries.append('<span style="opacity:.7">Click a step to look at it.</span>')
     gap = "display:flex;flex-wrap:wrap;column-gap:1.2em;font-size:.9rem"
     st.html(f'<div style="{gap}">{"".join(entries)}</div>')
 
@@ -222,18 +223,11 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
         st.session_state["step"] = min(max(kept, 0), last)
     current = 0
     if last > 0:
-        current = int(
-            st.slider(
-                "Step",
-                0,
-                last,
-                key="step",
-                bind="query-params",
-                help="Move it, or click a step in the strip above.",
-            )
-        )
-    st.html(f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>")
-    if shielded:
+        current = int(st.slider("Step", 0, last, key="step", bind="query-params"))
+    mark = f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>"
+    if not shielded:
+        st.html(mark)
+    else:
         changes = np.flatnonzero(steps.intervened)
         before, after = changes[changes < current], changes[changes > current]
         with st.container(horizontal=True, vertical_alignment="center"):
@@ -253,8 +247,9 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
                 disabled=not len(after),
                 key="next",
             )
-            st.caption(
-                f"{len(changes):,} of {len(steps):,} steps were changed. {flips_text(replay.shown)}"
+            st.html(
+                f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changes):,} of '
+                f"{len(steps):,} steps were changed. {flips_text(replay.shown)}</span>"
             )
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")

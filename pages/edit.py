@@ -8,6 +8,7 @@ import streamlit as st
 from _choices import OWN_FILE
 from _conflicts_view import conflicts
 from _edit_view import bar, chosen_rule, numbers, table
+from _edits import Base
 from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
@@ -30,6 +31,33 @@ def choose() -> None:
     chosen = st.session_state["_edit_base"]
     if chosen:
         _edits.choose_kind(chosen)
+
+
+@st.fragment
+def editing(of: Base) -> None:
+    """The edits and all that follows from them; nothing else on the page does."""
+    try:
+        before = _edits.verdicts_of(of, ())
+        after = _edits.verdicts_of(of, _edits.history(of).edits)
+    except SarlError as problem:
+        st.error(in_full(str(problem)), icon=":material/error:")
+        return
+    bar(of)
+    numbers(of, before, after)
+    if after.rule_set.rules:
+        rule = table(of, after)
+        if rule is not None:
+            wish = chosen_rule(of, rule, after)
+            if wish:
+                _manual_form.begin(of, rule, changing=wish == "change")
+    else:
+        st.info(
+            "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "
+            "add a rule by hand.",
+            icon=":material/filter_alt_off:",
+        )
+    _manual_form.form(of, after)
+    conflicts(of, after)
 
 
 st.title("Edit")
@@ -65,25 +93,4 @@ if others:
         f":material/schedule: The edits of {counted(others, 'other rule set')} wait until "
         f"{'it is' if others == 1 else 'they are'} chosen again."
     )
-try:
-    before = _edits.verdicts_of(of, ())
-    after = _edits.verdicts_of(of, _edits.history(of).edits)
-except SarlError as problem:
-    st.error(in_full(str(problem)), icon=":material/error:")
-    st.stop()
-bar(of)
-numbers(of, before, after)
-if after.rule_set.rules:
-    rule = table(of, after)
-    if rule is not None:
-        wish = chosen_rule(of, rule, after)
-        if wish:
-            _manual_form.begin(of, rule, changing=wish == "change")
-else:
-    st.info(
-        "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "
-        "add a rule by hand.",
-        icon=":material/filter_alt_off:",
-    )
-_manual_form.form(of, after)
-conflicts(of, after)
+editing(of)

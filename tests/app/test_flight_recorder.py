@@ -92,7 +92,7 @@ def test_filters_leave_what_was_recorded(wanted: Episodes) -> None:
     assert table(app)["Step"].tolist() == of_rule[:15]
     assert set(table(app)["Rule"]) == {rules[often].id}
     assert [one.label for one in app.get("download_button")][-2:] == ["CSV", "Parquet"]
-    (flips,) = [line for line in texts(app).splitlines() if "switched on or off" in line]
+    (flips,) = [part for part in html(app).splitlines() if "switched on or off" in part]
     assert wanted.flips is not None
     assert f"{int(wanted.flips[0])} times" in flips
     assert "a second" in flips
