@@ -25,12 +25,13 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import digest_of_pairs
 from sarl_core.errors import SarlError
 from sarl_core.explaining.tables import top_rules
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.holding_out import count_held_out, with_held_out
 from sarl_core.mining.landscape import Landscape, NodeCounts, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.rule_names import renamed_trees
-from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds, mine_rules
+from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 
 SHIPPED = {

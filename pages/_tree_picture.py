@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.rule_figures import tree_figure
 from sarl_core.explaining.rule_place import place_html
-from sarl_core.mining.rules import Thresholds, cut_nodes
+from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import LEAF, PolicyTree
 
 

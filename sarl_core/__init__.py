@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.demonstrations.formats import load_demonstrations, save_demonstrations
     from sarl_core.errors import InputError, SarlError, WorkError
+    from sarl_core.mining.algorithm_1 import mine_rules
     from sarl_core.mining.classifier import RuleClassifier
     from sarl_core.mining.landscape import Landscape, threshold_landscape
-    from sarl_core.mining.rules import Rule, RuleSet, mine_rules
+    from sarl_core.mining.rules import Rule, RuleSet
     from sarl_core.mining.tree import PolicyTree, grow_policy_trees
     from sarl_core.rollouts.episodes import Episodes, rollout
     from sarl_core.rollouts.recording import record
@@ -40,7 +41,7 @@ _HOMES = {
     "WorkError": "errors",
     "grow_policy_trees": "mining.tree",
     "load_demonstrations": "demonstrations.formats",
-    "mine_rules": "mining.rules",
+    "mine_rules": "mining.algorithm_1",
     "record": "rollouts.recording",
     "rollout": "rollouts.episodes",
     "save_demonstrations": "demonstrations.formats",

@@ -188,7 +188,7 @@ def _gaps(
         raise InputError("the demonstrations name no environment; say which with --env")
     found: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
-        from sarl_core.mining.rules import mine_rules
+        from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.rollouts.gaps import gaps_so_far
 
         at = plan.thresholds

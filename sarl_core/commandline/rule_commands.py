@@ -103,7 +103,8 @@ def mine(
     with terminal.working("Mining"):
         from sarl_core.commandline.evidence_answers import Tried
         from sarl_core.mining import holding_out
-        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds, mine_rules
+        from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
 
         pair = (support or 0.0, confidence or 0.0)
         if setting is not None:

@@ -12,8 +12,9 @@ from pathlib import Path
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import counted, threshold_text
 from sarl_core.explaining.report_counts import Tally
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet, mine_rules
+from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
 from sarl_core.mining.tree import PolicyTree
 
 _PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")

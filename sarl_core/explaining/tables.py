@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sarl_core.explaining.language import action_text, conditions_text
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds, cut_nodes, rules_at
+from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
+from sarl_core.mining.rules import Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import PolicyTree
 
 

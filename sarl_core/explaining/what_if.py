@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.language import action_text, is_flag, number_text, short_condition
+from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Bounds, Rule, RuleSet, node_of, rules_at
+from sarl_core.mining.rules import Bounds, Rule, RuleSet, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.near import Change
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
-from sarl_core.mining.rules import RuleSet, Thresholds, rules_at
+from sarl_core.mining.rules import RuleSet, Thresholds
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree, structure_of
 
 MIN_RULES = 2

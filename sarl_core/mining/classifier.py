@@ -11,7 +11,7 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rules import mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.tree import grow_policy_trees
 
 

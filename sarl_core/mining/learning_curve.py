@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.holding_out import with_held_out
 from sarl_core.mining.progress import Progress
-from sarl_core.mining.rules import Thresholds, mine_rules
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tasks import run_each
 from sarl_core.mining.tree import grow_policy_trees
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import load_demonstrations
-from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet, mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.rollouts.agents import EXPERT_FOLDER
 from sarl_core.rollouts.recording import SHIPPED

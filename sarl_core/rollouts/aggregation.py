@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.rules import RuleSet, mine_rules
+from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.agents import Agent, make_agent

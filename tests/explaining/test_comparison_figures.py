@@ -9,7 +9,8 @@ from sarl_core.explaining.comparison_figures import (
     returns_figure,
     typical_figure,
 )
-from sarl_core.mining.rules import RuleSet, mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.comparison import Arm, Comparison
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.recording import record

@@ -13,8 +13,9 @@ from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Timeline, Track, intervention_strip
 from sarl_core.explaining.rule_features import features_html
 from sarl_core.explaining.rule_place import place_html
+from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import cut_nodes, node_of
+from sarl_core.mining.rules import node_of
 
 
 def test_markup_and_templates_become_text() -> None:

@@ -18,7 +18,8 @@ from sarl_core.explaining.evidence import (
 )
 from sarl_core.explaining.path_table import path_table
 from sarl_core.explaining.tables import rule_columns, top_rules
-from sarl_core.mining.rules import Thresholds, cut_nodes, node_of
+from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.rules import Thresholds, node_of
 
 AT = {"supp_min": 0.005, "conf_min": 0.9}
 

@@ -11,7 +11,8 @@ from sarl_core import PolicyTree, RuleSet, mine_rules
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.rule_figures import window_around
 from sarl_core.explaining.rule_place import place_html
-from sarl_core.mining.rules import cut_nodes, node_of
+from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.rules import node_of
 
 AT = {"supp_min": 0.005, "conf_min": 0.9}
 

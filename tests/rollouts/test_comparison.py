@@ -8,7 +8,8 @@ import pytest
 
 from sarl_core.errors import InputError
 from sarl_core.explaining.comparison_text import verdict
-from sarl_core.mining.rules import RuleSet, mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.comparison import (
     Arm,
     Comparison,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sarl_core.errors import InputError
-from sarl_core.mining.rules import mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.rollouts import episodes as episodes_module
 from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, SarlError, WorkError
-from sarl_core.mining.rules import mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.pool import Task, WorkerPool

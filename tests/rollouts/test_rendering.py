@@ -13,7 +13,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from sarl_core.errors import InputError
-from sarl_core.mining.rules import mine_rules
+from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.rollouts.canvas import INKS, OVERLAY_COLOURS, fitted, text_width, wrapped
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.overlay import BOTTOM, GAP, TOP, action_text, signed

@@ -1,0 +1,160 @@
+"""The paper's Algorithm 1: every path of a tree is cut at its first qualifying node."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.landscape import confidence_above
+from sarl_core.mining.rules import Condition, Operator, Rule, RuleSet, Thresholds
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+
+
+def cut_nodes(
+    tree: PolicyTree,
+    *,
+    supp_min: float,
+    conf_min: float,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+) -> NDArray[np.int64]:
+    """The nodes at which Algorithm 1 cuts the paths of a tree.
+
+    Args:
+        tree: With n nodes.
+        supp_min: Minimum support.
+        conf_min: Minimum confidence.
+        lift_min: Minimum lift.
+        max_depth: Nodes below this depth are ignored.
+
+    Returns:
+        Node numbers, ascending. No one lies below another.
+    """
+    qualifies = (tree.support >= supp_min) & (tree.confidence >= conf_min) & (tree.lift >= lift_min)
+    if max_depth is not None:
+        qualifies &= tree.depth <= max_depth
+    # An ancestor has at least the node's support, so only its confidence can spare it.
+    first = confidence_above(tree, lift_min=lift_min) < conf_min
+    return np.flatnonzero(qualifies & first)
+
+
+def mine_rules(
+    demonstrations_or_trees: Demonstrations | Sequence[PolicyTree],
+    *,
+    supp_min: float,
+    conf_min: float,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+    divider: int = 2,
+) -> RuleSet:
+    """Mine a rule set (the paper's Algorithm 1).
+
+    Args:
+        demonstrations_or_trees: N pairs, or trees grown from them.
+        supp_min: Minimum support of a rule, 0 to 1.
+        conf_min: Minimum confidence, 0 to 1.
+        lift_min: Minimum lift.
+        max_depth: Longest rule; needs no new tree.
+        divider: Number of intervals of continuous dimensions; trees carry their own.
+
+    Returns:
+        The rules, by action dimension and node; with their data boxes where demonstrations were
+        given, since trees alone do not hold the states.
+
+    Raises:
+        InputError: If a threshold is out of range or there is nothing to mine.
+    """
+    thresholds = Thresholds(supp_min, conf_min, lift_min, max_depth)
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        trees: Sequence[PolicyTree] = grow_policy_trees(demonstrations_or_trees, divider=divider)
+    else:
+        trees = tuple(demonstrations_or_trees)
+    if not trees:
+        raise InputError("there is no tree to mine; give demonstrations, or grow the trees first")
+    rules = []
+    for tree in trees:
+        nodes = cut_nodes(
+            tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
+        )
+        rules += rules_at(tree, nodes)
+    mined = RuleSet(
+        rules=tuple(rules),
+        actions=tuple(tree.dimension for tree in trees),
+        source=trees[0].source,
+        thresholds=thresholds,
+        divider=trees[0].divider,
+    )
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        return with_boxes(mined, demonstrations_or_trees)
+    return mined
+
+
+def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
+    """The rules that a cut at these nodes gives.
+
+    Args:
+        tree: With n nodes.
+        nodes: Node numbers, (k,), as `cut_nodes` gives them, or some of them.
+
+    Returns:
+        One rule a node, in their order.
+    """
+    numbers = zip(
+        nodes.tolist(),
+        tree.label[nodes].tolist(),
+        tree.support[nodes].tolist(),
+        tree.confidence[nodes].tolist(),
+        tree.lift[nodes].tolist(),
+        tree.samples[nodes].tolist(),
+        strict=True,
+    )
+    return [
+        Rule(
+            id=f"{tree.index}.{node}",
+            dimension=tree.index,
+            conditions=conditions,
+            action=label,
+            support=support,
+            confidence=confidence,
+            lift=lift,
+            samples=samples,
+            demonstrated_value=_demonstrated(tree, node),
+        )
+        for (node, label, support, confidence, lift, samples), conditions in zip(
+            numbers, _conditions(tree, nodes), strict=True
+        )
+    ]
+
+
+def _demonstrated(tree: PolicyTree, node: int) -> float | None:
+    if not tree.dimension.is_interval:
+        return None
+    rows = tree.rows(node)
+    return float(np.median(tree.demonstrated[rows])) if len(rows) else None
+
+
+def _conditions(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[tuple[Condition, ...]]:
+    """The queries on the way to each node; rules share the beginnings of their paths."""
+    known: dict[int, tuple[Condition, ...]] = {0: ()}
+    parent, left = tree.parent.tolist(), tree.children_left.tolist()
+    feature, threshold = tree.feature.tolist(), tree.threshold.tolist()
+    result = []
+    for node in nodes.tolist():
+        missing = []
+        at = node
+        while at not in known:
+            missing.append(at)
+            at = parent[at]
+        so_far = known[at]
+        for below in reversed(missing):
+            above = parent[below]
+            op: Operator = "<=" if left[above] == below else ">"
+            so_far = (*so_far, Condition(feature[above], op, threshold[above]))
+            known[below] = so_far
+        result.append(so_far)
+    return result
