@@ -194,66 +194,71 @@ def show_matrix(prepared: Prepared, key: str, name: str, demonstrations: Demonst
     st.html(matrix_html(matrix, matrix.page(page)))
 
 
+@st.fragment
+def export(demonstrations: Demonstrations) -> None:
+    """The settings and what comes of them; nothing else on the page does."""
+    with st.container(border=True):
+        left, middle, right = st.columns([4, 5, 3], gap="medium")
+        with left:
+            rules, digest = chosen_rules()
+        with middle:
+            form = st.pills(
+                "Format",
+                list(FORMATS),
+                default="JSON",
+                key="format",
+                bind="query-params",
+                required=True,
+                wrap=True,  # else the last ones are cut off on a telephone
+            )
+            projection: Projection = PROJECTIONS[0]
+            if rules.actions[0].is_interval and form in ("Python", "C", "ONNX"):
+                projection = projection_choice()
+        with right:
+            rounded = st.toggle(
+                "Round thresholds",
+                value=True,
+                key="rounded",
+                bind="query-params",
+                help="To the fewest digits that change no decision on the demonstrations",
+            )
+            merged = st.toggle(
+                "Merge conditions",
+                key="merged",
+                bind="query-params",
+                help="Several conditions on one feature become one interval, and each rule stands "
+                "by itself: easier to read, slower to execute",
+            )
+    everything = state.all_demonstrations()
+    assert everything is not None
+    key = repr((digest, everything.digest if rounded else "", merged))
+    try:
+        carried = prepared_for(key, rules, everything if rounded else None, merged=merged)
+    except SarlError as error:
+        more = " Or switch rounding off." if rounded and rules.rules else ""
+        st.error(f"{in_full(str(error))}{more}", icon=":material/error:")
+        return
+    say_rounding(carried, everything)
+    view = st.segmented_control(
+        "View",
+        [FILE, MATRIX],
+        default=FILE,
+        key="carry_view",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
+    )
+    stem = f"rules-{file_name(rules.source.env_id)}"
+    if view == MATRIX:
+        show_matrix(carried, key, stem, demonstrations)
+    else:
+        show_file(carried, key, form, projection, stem)
+
+
 st.title("Export")
 st.caption(
     "Carry the rules into other code, onto paper, or to somebody else, and check with test vectors "
     "that they decide there as here. The rules are learned from demonstrations: they guarantee "
     "nothing."
 )
-demonstrations = state.require_demonstrations()
-with st.container(border=True):
-    left, middle, right = st.columns([4, 5, 3], gap="medium")
-    with left:
-        rules, digest = chosen_rules()
-    with middle:
-        form = st.pills(
-            "Format",
-            list(FORMATS),
-            default="JSON",
-            key="format",
-            bind="query-params",
-            required=True,
-            wrap=True,  # else the last ones are cut off on a telephone
-        )
-        projection: Projection = PROJECTIONS[0]
-        if rules.actions[0].is_interval and form in ("Python", "C", "ONNX"):
-            projection = projection_choice()
-    with right:
-        rounded = st.toggle(
-            "Round thresholds",
-            value=True,
-            key="rounded",
-            bind="query-params",
-            help="To the fewest digits that change no decision on the demonstrations",
-        )
-        merged = st.toggle(
-            "Merge conditions",
-            key="merged",
-            bind="query-params",
-            help="Several conditions on one feature become one interval, and each rule stands by "
-            "itself: easier to read, slower to execute",
-        )
-everything = state.all_demonstrations()
-assert everything is not None
-key = repr((digest, everything.digest if rounded else "", merged))
-try:
-    carried = prepared_for(key, rules, everything if rounded else None, merged=merged)
-except SarlError as error:
-    more = " Or switch rounding off." if rounded and rules.rules else ""
-    st.error(f"{in_full(str(error))}{more}", icon=":material/error:")
-    st.stop()
-say_rounding(carried, everything)
-view = st.segmented_control(
-    "View",
-    [FILE, MATRIX],
-    default=FILE,
-    key="carry_view",
-    bind="query-params",
-    required=True,
-    label_visibility="collapsed",
-)
-stem = f"rules-{file_name(rules.source.env_id)}"
-if view == MATRIX:
-    show_matrix(carried, key, stem, demonstrations)
-else:
-    show_file(carried, key, form, projection, stem)
+export(state.require_demonstrations())

@@ -212,33 +212,39 @@ def show_states(
     )
 
 
+@st.fragment
+def comparison() -> None:
+    """Both choices and what differs; nothing else on the page does."""
+    sides, problems = [], []
+    for place, (key, label, default) in zip(st.columns(2), SIDES, strict=True):
+        with place:
+            try:
+                sides.append(side(key, label, default))
+            except SarlError as error:
+                problems.append(in_full(str(error)))
+    for problem in problems:
+        st.info(problem, icon=":material/upload_file:")
+    if problems:
+        return
+    (one, one_digest, one_name), (other, other_digest, other_name) = sides
+    if one_name == other_name:
+        one_name, other_name = f"{one_name} (first)", f"{other_name} (second)"
+    chosen = state.chosen_demonstrations()
+    if chosen is not None and not (fits(one, chosen) and fits(other, chosen)):
+        chosen = None
+    told_by = (one_digest, other_digest, chosen.digest if chosen is not None else "")
+    try:
+        result, compared_on = compared(told_by, one, other, chosen)
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+        return
+    show_states(result, told_by, compared_on, (one_name, other_name), chosen)
+    show_rules(result, told_by)
+
+
 st.title("Difference")
 st.caption(
     "Two rule sets side by side: which rules differ, and on how many of the same states the two "
     "decide differently."
 )
-sides, problems = [], []
-for place, (key, label, default) in zip(st.columns(2), SIDES, strict=True):
-    with place:
-        try:
-            sides.append(side(key, label, default))
-        except SarlError as error:
-            problems.append(in_full(str(error)))
-for problem in problems:
-    st.info(problem, icon=":material/upload_file:")
-if problems:
-    st.stop()
-(one, one_digest, one_name), (other, other_digest, other_name) = sides
-if one_name == other_name:
-    one_name, other_name = f"{one_name} (first)", f"{other_name} (second)"
-chosen = state.chosen_demonstrations()
-if chosen is not None and not (fits(one, chosen) and fits(other, chosen)):
-    chosen = None
-told_by = (one_digest, other_digest, chosen.digest if chosen is not None else "")
-try:
-    result, compared_on = compared(told_by, one, other, chosen)
-except SarlError as error:
-    st.error(in_full(str(error)), icon=":material/error:")
-    st.stop()
-show_states(result, told_by, compared_on, (one_name, other_name), chosen)
-show_rules(result, told_by)
+comparison()
