@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import streamlit as st
+from _flips import flips_rate, flips_title
 from _replays import EPISODES, WITH, Order, compare, compared, kept_comparisons, with_progress
 
 from sarl_core.explaining.fork_text import ending_text
@@ -76,7 +77,7 @@ def comparison(order: Order) -> None:
                 "Changed": share_text(float(run.interventions.sum()) / float(run.lengths.sum()))
                 if name == WITH
                 else "–",
-                flips_title(run): flips_of(run) if name == WITH else "–",
+                flips_title(run.env_id): f"{flips_rate(run):.2f}" if name == WITH else "–",
             }
         )
     st.plotly_chart(
@@ -94,18 +95,6 @@ def comparison(order: Order) -> None:
     every_episode(runs[0][1], shielded=runs[0][0] == WITH)
 
 
-def flips_title(episodes: Episodes) -> str:
-    """What the column of the flips is called."""
-    return f"Flips {pace_of(episodes.env_id).each}"
-
-
-def flips_of(episodes: Episodes) -> str:
-    """Flips of all episodes together."""
-    assert episodes.flips is not None
-    rate = pace_of(episodes.env_id).rate(int(episodes.flips.sum()), int(episodes.lengths.sum()))
-    return f"{rate:.2f}"
-
-
 def every_episode(episodes: Episodes, *, shielded: bool) -> None:
     """A row an episode."""
     pace = pace_of(episodes.env_id)
@@ -117,7 +106,7 @@ def every_episode(episodes: Episodes, *, shielded: bool) -> None:
     }
     if shielded and episodes.flips is not None:
         columns["Changed"] = episodes.interventions
-        columns[flips_title(episodes)] = [
+        columns[flips_title(episodes.env_id)] = [
             pace.rate(*pair)
             for pair in zip(episodes.flips.tolist(), episodes.lengths.tolist(), strict=True)
         ]
@@ -129,6 +118,6 @@ def every_episode(episodes: Episodes, *, shielded: bool) -> None:
             column_config={
                 "Seed": st.column_config.NumberColumn(format="%d"),
                 "Return": st.column_config.NumberColumn(format="%.1f"),
-                flips_title(episodes): st.column_config.NumberColumn(format="%.2f"),
+                flips_title(episodes.env_id): st.column_config.NumberColumn(format="%.2f"),
             },
         )

@@ -9,10 +9,11 @@ from typing import Any
 import streamlit as st
 from _choices import AGENTS
 from _comparisons import Row
+from _flips import flips_rate, flips_title
 from _words import escaped
 
 from sarl_core.explaining.comparison_figures import ArmStyle, returns_figure, typical_figure
-from sarl_core.explaining.comparison_text import clear_change, verdict
+from sarl_core.explaining.comparison_text import verdict_on_all
 from sarl_core.explaining.language import share_text
 from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate, failure_known
 from sarl_core.rollouts.episodes import Episodes
@@ -96,7 +97,7 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
         [table_row(line, episodes) for line, episodes in found],
         hide_index=True,
         height="content",
-        column_config=column_config(),
+        column_config=column_config(env_id),
         key="comparison_table",
     )
     if not at_work:
@@ -113,7 +114,7 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
 
 
 def verdicts(found: Found) -> list[str]:
-    """For each agent, what the shield did that served it best, and the one that harmed it most."""
+    """For each agent, what every shield did to it."""
     sentences = []
     for agent in dict.fromkeys(line.agent for line, _ in found):
         own = [(line, episodes) for line, episodes in found if line.agent == agent]
@@ -121,18 +122,12 @@ def verdicts(found: Found) -> list[str]:
         if alone is None:
             continue
         shielded = [
-            (line, episodes)
+            (f"the {rules_name(line.shield)}", episodes)
             for line, episodes in own
             if line.arm.rules is not None and len(episodes) == len(alone)
         ]
-        shielded.sort(key=lambda pair: pair[1].statistics.iqm, reverse=True)
-        told = shielded[:1] + [
-            pair for pair in shielded[1:][-1:] if clear_change(alone, pair[1]) < 0
-        ]
-        sentences += [
-            verdict(agent_name(agent), f"the {rules_name(line.shield)}", alone, episodes)
-            for line, episodes in told
-        ]
+        if shielded:
+            sentences.append(verdict_on_all(agent_name(agent), alone, shielded))
     return sentences
 
 
@@ -148,7 +143,7 @@ def rules_name(shield: str) -> str:
     return f"rules {shield}" if shield.startswith("at ") else f"{shield} rules"
 
 
-def column_config() -> dict[str, Any]:
+def column_config(env_id: str) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
     return {
@@ -174,10 +169,8 @@ def column_config() -> dict[str, Any]:
         "Covered": column.TextColumn(
             alignment="right", help="Share of the steps at which some rule applied"
         ),
-        "Flips": column.TextColumn(
-            alignment="right",
-            help="How often the shield switches on or off: in a second of the environment, or, "
-            "where it does not say how many steps a second has, in 100 steps",
+        flips_title(env_id): column.TextColumn(
+            alignment="right", help="How often the shield switches on or off"
         ),
         "Crashes": column.TextColumn(
             alignment="right",
@@ -205,20 +198,13 @@ def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
         if rules is not None and any(rule.box is not None for rule in rules.rules)
         else "–",
         "Covered": share_text(summary["coverage"]) if rules is not None else "–",
-        "Flips": flips_text(episodes) if rules is not None else "–",
+        flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
+        if rules is not None and episodes.flips is not None
+        else "–",
         "Crashes": share_text(crash_rate(episodes, episodes.env_id))
         if failure_known(episodes.env_id)
         else "–",
     }
-
-
-def flips_text(episodes: Episodes) -> str:
-    """How often the shield switches on and off, over all episodes."""
-    if episodes.flips is None:
-        return "–"
-    pace = pace_of(episodes.env_id)
-    rate = pace.rate(int(episodes.flips.sum()), int(episodes.lengths.sum()))
-    return f"{rate:.2f} / {'s' if pace.unit == 'second' else pace.unit}"
 
 
 def csv(comparison: Comparison) -> bytes:
@@ -228,6 +214,11 @@ def csv(comparison: Comparison) -> bytes:
     frame.insert(2, "projection", projections)
     ways = [arm.outside if arm.rules is not None else "" for arm in comparison.arms]
     frame.insert(3, "outside", ways)
+    unit = pace_of(comparison.env_id).unit.replace(" ", "_")
+    frame[f"flips_per_{unit}"] = [
+        flips_rate(episodes) if arm.rules is not None and episodes.flips is not None else None
+        for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True)
+    ]
     frame.insert(0, "seed", comparison.seed)
     frame.insert(0, "environment", comparison.env_id)
     return str(frame.to_csv(index=False)).encode()

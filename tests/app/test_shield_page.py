@@ -75,9 +75,15 @@ def test_every_agent_with_every_shield_is_what_the_library_gives() -> None:
         assert row["Mean return"] == pytest.approx(episodes.returns.mean())
         assert row["Typical return"] == pytest.approx(episodes.statistics.iqm)
         assert (row["Changed"] == "–") == (arm.rules is None)
+        flips = f"{50 * episodes.flips.sum() / episodes.lengths.sum():.2f}"  # 50 steps a second
+        assert row["Flips a second"] == ("–" if arm.rules is None else flips)
     assert shown["novice, unfiltered"]["Rules"] == f"{len(unfiltered):,}"
     assert shown["novice, no shield"]["Crashes"] == "100 %"
     assert "the typical return of the novice rises" in texts(app)
+    for agent in ("novice", "expert"):
+        (told,) = (line for line in texts(app).splitlines() if f"return of the {agent} " in line)
+        assert "the filtered rules" in told
+        assert "the unfiltered rules" in told
     assert len(app.get("plotly_chart")) == 2
     assert [button.label for button in app.get("download_button")] == ["Download CSV"]
 

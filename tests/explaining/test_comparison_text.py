@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sarl_core.explaining.comparison_text import clear_change, verdict
+from sarl_core.explaining.comparison_text import clear_change, verdict, verdict_on_all
 from sarl_core.rollouts.episodes import Episodes, rollout
 
 
@@ -40,3 +40,23 @@ def test_a_rise_a_fall_and_neither(alone: Episodes) -> None:
 def test_where_nothing_crashes_nothing_is_said_of_it(alone: Episodes) -> None:
     safe = with_returns(alone, [500.0] * 8, 0)
     assert "crash" not in verdict("expert", "the rules", safe, safe)
+
+
+def test_every_shield_is_told_the_best_one_first(alone: Episodes) -> None:
+    alone = with_returns(alone, [20.0, 21.0, 22.0, 23.0, 20.0, 21.0, 22.0, 23.0], 8)
+    shielded = [
+        ("the coarse rules", with_returns(alone, [9.0] * 8, 8)),
+        ("the filtered rules", with_returns(alone, [305.0] * 8, 6)),
+        ("the unfiltered rules", with_returns(alone, [500.0] * 8, 0)),
+        ("the compact rules", with_returns(alone, [18.0, 21.0, 22.0, 26.0] * 2, 8)),
+    ]
+    assert verdict_on_all("novice", alone, shielded) == (
+        "With the unfiltered rules the typical return of the novice rises from 22 to 500, and 0 % "
+        "instead of 100 % of its episodes end in a crash; with the filtered rules it rises to 305 "
+        "(75 % crashes); with the compact rules it does not clearly change (22, 100 % crashes); "
+        "with the coarse rules it falls to 9 (100 % crashes)."
+    )
+    safe = with_returns(alone, [500.0] * 8, 0)
+    told = verdict_on_all("expert", safe, [("the rules", safe), ("the filtered rules", safe)])
+    assert "crash" not in told
+    assert told.endswith("with the filtered rules it does not clearly change (500).")
