@@ -255,7 +255,7 @@ def ablate(
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     record = AblationRecord(env_id, actor, shield, seed)
-    pool = WorkerPool(jobs) if jobs > 1 else None
+    pool = WorkerPool(jobs, gives_way=False) if jobs > 1 else None
     try:
         for done, total, _ in record.run(episodes, most, run_here if pool is None else pool.run):
             report(progress, done, total)

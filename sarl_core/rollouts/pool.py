@@ -120,13 +120,16 @@ class _Progress:
 class WorkerPool:
     """Processes that run episodes; they start when first needed."""
 
-    def __init__(self, workers: int | None = None) -> None:
+    def __init__(self, workers: int | None = None, *, gives_way: bool = True) -> None:
         """Start nothing yet.
 
         Args:
             workers: Processes; as many as there are processors where not given, at most 8.
+            gives_way: Whether other programs go first, as where pages are served meanwhile. On a
+                busy machine the work then takes long; where somebody waits for it, it should not.
         """
         self.workers = workers or min(os.cpu_count() or 1, 8)
+        self._gives_way = gives_way
         self._lock = Lock()
         self._processes: Any = None
 
@@ -192,6 +195,7 @@ class WorkerPool:
                 self.workers,
                 timeout=_IDLE_SECONDS,
                 initializer=begin_process,
+                initargs=(self._gives_way,),
                 env={"OMP_NUM_THREADS": "1"},
             )
             return self._processes.submit(*work)
@@ -231,9 +235,13 @@ def _next_piece(task: int, state: _Progress) -> _Piece:
     return piece
 
 
-def begin_process() -> None:
-    """Let other processes go first, and end with the one that asks; for a new process."""
-    if hasattr(os, "nice"):
+def begin_process(gives_way: bool = True) -> None:
+    """End with the process that asks, and let others go first; for a new process.
+
+    Args:
+        gives_way: Whether others go first.
+    """
+    if gives_way and hasattr(os, "nice"):
         os.nice(_NICENESS)
     Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.pool import Task, WorkerPool
 from sarl_core.rollouts.recording import record
@@ -29,8 +31,6 @@ class Misbehaving:
 
     def act(self, observations: NDArray[np.float32], uniforms: Any) -> NDArray[np.int64]:
         if self.deadly:
-            import os
-
             os._exit(1)
         raise RuntimeError("this is\nnot an action")
 
@@ -141,6 +141,34 @@ def test_after_a_process_has_died_there_are_new_ones() -> None:
         gathered(pool, [deadly])
     assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3  # type: ignore[arg-type]
     pool.close()
+
+
+@dataclass(frozen=True)
+class Telling:
+    """An agent that writes down how far its process gives way to others."""
+
+    inner: Agent
+    file: Path
+    n_uniforms: int
+    name: str = "telling"
+
+    def act(self, observations: NDArray[np.float32], uniforms: Any) -> NDArray[Any]:
+        self.file.write_text(str(os.nice(0)))
+        return self.inner.act(observations, uniforms)
+
+
+def test_processes_give_way_to_those_who_serve_pages_and_not_where_a_caller_waits(
+    tmp_path: Path,
+) -> None:
+    novice = make_agent("novice", "CartPole-v1")
+    agent = Telling(novice, tmp_path / "nice", novice.n_uniforms)
+    told = []
+    for gives_way in (True, False):
+        pool = WorkerPool(1, gives_way=gives_way)
+        gathered(pool, [Task("CartPole-v1", agent, None, 0, 1)])
+        pool.close()
+        told.append(int(agent.file.read_text()))
+    assert told[0] > told[1] == os.nice(0)
 
 
 @pytest.mark.parametrize(("episodes", "seed"), [(0, 0), (-1, 0), (1, -1)])
