@@ -73,7 +73,7 @@ def interval_text(effect: RuleEffect) -> str:
         effect: Of the rule.
 
     Returns:
-        As "−50.1 to −18.4".
+        As "-50.1 to -18.4".
     """
     return f"{signed(effect.difference.low)} to {signed(effect.difference.high)}"
 
@@ -85,12 +85,10 @@ def signed(value: float) -> str:
         value: The difference.
 
     Returns:
-        As "+1.2" or "−3.4"; "0" for none.
+        As "+1.2" or "-3.4", the sign that numbers have in tables; "0" for none.
     """
-    text = f"{abs(value):,.1f}"
-    if float(text.replace(",", "")) == 0:
-        return "0"
-    return f"{'−' if value < 0 else '+'}{text}"
+    text = f"{value:+,.1f}"
+    return "0" if text in ("+0.0", "-0.0") else text
 
 
 def ablation_text(ablation: Ablation) -> tuple[str, ...]:

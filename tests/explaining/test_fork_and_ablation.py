@@ -80,7 +80,7 @@ def test_the_sentences_count(found: Ablation) -> None:
 def test_differences_have_their_signs() -> None:
     assert [signed(value) for value in (1234.56, -3.41, 0.0, -0.04)] == [
         "+1,234.6",
-        "−3.4",
+        "-3.4",
         "0",
         "0",
     ]
