@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import _state as state
 import streamlit as st
 from _compact import Compact
-from _tree_picture import tree_picture, tree_place
+from _tree_picture import show_tree
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
@@ -24,8 +23,6 @@ from sarl_core.explaining.rule_examples import examples_html
 from sarl_core.explaining.rule_features import features_html
 from sarl_core.mining.rules import Rule, RuleSet, Thresholds, node_of
 from sarl_core.mining.tree import PolicyTree
-
-WHOLE_TREE, AROUND = "Whole tree", "Around this rule"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[
             + path_table(steps, tree.dimension, leaf=compact is not None)
         )
     with right:
-        show_tree(rule, behind)
+        place(rule, behind)
     tree_digest = (tree.source.digest, tree.divider)
     key = (*tree_digest, behind.digest, rule.id)
     with st.container(key="features"):
@@ -110,60 +107,25 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
     )
 
 
-def show_tree(rule: Rule, behind: Behind) -> None:
+def place(rule: Rule, behind: Behind) -> None:
     """The path lit in the tree."""
     tree, compact = behind.tree(rule), behind.compact
     st.html("<h3>Its place in the tree</h3>")
-    view = WHOLE_TREE
-    if rule.samples:
-        view = st.segmented_control(
-            "Tree",
-            [AROUND, WHOLE_TREE],
-            default=AROUND,
-            key="tree",
-            bind="query-params",
-            required=True,
-            label_visibility="collapsed",
-        )
     note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
-        "Rules are full in colour, what is cut off below them is grey. "
+        "Rules are full in colour, what is cut off below them is grey."
         if compact is None
-        else "Every leaf is a rule, full in colour. "
+        else "Every leaf is a rule, full in colour."
     )
-    leaves, dark = compact is not None, state.is_dark()
-    if view == AROUND:
-        with st.container(key="tree_figure"):
-            st.html(
-                tree_place(
-                    behind.digest,
-                    tree,
-                    behind.thresholds,
-                    node_of(rule),
-                    note=note,
-                    leaves=leaves,
-                    dark=dark,
-                )
-            )
-    else:
-        st.plotly_chart(
-            tree_picture(
-                behind.digest,
-                tree,
-                behind.thresholds,
-                node_of(rule),
-                around=False,
-                leaves=leaves,
-                dark=dark,
-            ),
-            key="tree_figure",
-            config={"displaylogo": False, "scrollZoom": True},
-            alt="The decision tree with the path of the rule",
-        )
-        st.caption(
-            note
-            + ("" if rule.samples else "No state reaches this rule, so its box has no width. ")
-            + "Drag or scroll to zoom, double-click to go back."
-        )
+    show_tree(
+        behind.digest,
+        tree,
+        behind.thresholds,
+        node_of(rule),
+        around="Around this rule",
+        widget="tree",
+        note=note,
+        leaves=compact is not None,
+    )
 
 
 @st.cache_resource(max_entries=96, show_spinner=False)

@@ -1,9 +1,10 @@
-"""The decision tree with a path lit, drawn once for each choice; two pages show it."""
+"""The decision tree with a path lit, as two pages show it; drawn once for each choice."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import _state as state
 import numpy as np
 import streamlit as st
 from numpy.typing import NDArray
@@ -14,77 +15,74 @@ from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import LEAF, PolicyTree
 
+WHOLE_TREE = "Whole tree"
 
-def tree_picture(
+
+def show_tree(
     key: object,
     tree: PolicyTree,
     thresholds: Thresholds,
     node: int,
     *,
-    around: bool,
+    around: str,
+    widget: str,
+    note: str,
     leaves: bool,
-    dark: bool,
-) -> Any:
-    """The tree with the path to a node.
+) -> None:
+    """The tree with the path to a node lit: what lies around the node, or all of it.
+
+    What lies around is HTML and there at once; the whole is a chart that can be zoomed.
 
     Args:
         key: Tells the rules from all others.
         tree: One action dimension's.
         thresholds: At which it is cut.
         node: At the end of the path.
-        around: Whether to show the neighbourhood of the node only.
+        around: What the first view is called.
+        widget: Name of the choice between them, in the URL.
+        note: Said below.
         leaves: Whether every leaf is a rule, whatever the thresholds.
-        dark: Whether the theme is.
-
-    Returns:
-        The figure; shared between sessions.
     """
-    return _picture(_told(key, tree, thresholds), node, around, leaves, dark, tree, thresholds)
-
-
-def tree_place(
-    key: object,
-    tree: PolicyTree,
-    thresholds: Thresholds,
-    node: int,
-    *,
-    note: str,
-    leaves: bool,
-    dark: bool,
-) -> str:
-    """The neighbourhood of a node in the tree, in HTML without script.
-
-    Args:
-        key: As those that follow, see `tree_picture`.
-        tree: One action dimension's.
-        thresholds: At which it is cut.
-        node: At the end of the path.
-        note: Said below it.
-        leaves: Whether every leaf is a rule, whatever the thresholds.
-        dark: Whether the theme is.
-
-    Returns:
-        Made once for each choice.
-    """
-    return _place(_told(key, tree, thresholds), node, note, leaves, dark, tree, thresholds)
-
-
-def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
-    return repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
+    view, reached, dark = WHOLE_TREE, int(tree.samples[node]) > 0, state.is_dark()
+    if reached:
+        view = st.segmented_control(
+            "Tree",
+            [around, WHOLE_TREE],
+            default=around,
+            key=widget,
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+        )
+    told = repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
+    with st.container(key="tree_figure"):
+        if view == WHOLE_TREE:
+            st.plotly_chart(
+                _picture(told, node, leaves, dark, tree, thresholds),
+                key="tree_chart",
+                config={"displaylogo": False, "scrollZoom": True},
+                alt="The decision tree with the path lit",
+            )
+            st.caption(
+                note
+                + ("" if reached else " No state reaches its end, so the box has no width.")
+                + " Drag or scroll to zoom, double-click to go back."
+            )
+        else:
+            st.html(_place(told, node, note, leaves, dark, tree, thresholds))
 
 
 @st.cache_resource(max_entries=48, show_spinner=False)
 def _picture(
     told: str,
     node: int,
-    around: bool,
     leaves: bool,
     dark: bool,
     _tree: PolicyTree,
     _thresholds: Thresholds,
 ) -> Any:
     cut = _cut(told, leaves, _tree, _thresholds)
-    return tree_figure(_tree, cut, node, around=around, dark=dark)
+    return tree_figure(_tree, cut, node, dark=dark)
 
 
 @st.cache_resource(max_entries=96, show_spinner=False)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import streamlit as st
-from _tree_picture import tree_picture
+from _tree_picture import show_tree
 from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
@@ -27,7 +27,6 @@ from sarl_core.shielding.near import DecisionChange, Line, Neighbourhood, decisi
 from sarl_core.shielding.sampling import Span
 
 MISSES, PAIRS = 8, 4  # near misses that lack one feature, and two
-WHOLE_TREE, AROUND = "Whole tree", "Around it"
 
 
 def show(
@@ -42,7 +41,6 @@ def show(
     trees: tuple[PolicyTree, ...],
     leaves: bool,
     finder: Callable[[], PathFinder],
-    dark: bool,
     key: str,
 ) -> None:
     """What the shield does in a state, and what lies near it.
@@ -58,7 +56,6 @@ def show(
         trees: Of each action dimension, grown from the chosen data.
         leaves: Whether every leaf of them is a rule.
         finder: Follows a state through the rules, which may be of other trees.
-        dark: Whether the theme is.
         key: Tells the rules from all others.
     """
     rule_set = neighbourhood.shield.rule_set
@@ -97,7 +94,7 @@ def show(
         way = finder().path(dimension, state, -1 if found is None else found)
         st.html(way_html(lit_path_table(way, rule_set, dimension), rule))
     else:
-        show_tree(rule, node, trees[dimension], rule_set, leaves=leaves, dark=dark, key=key)
+        way_through(rule, node, trees[dimension], rule_set, leaves=leaves, key=key)
 
 
 def chosen_dimension(rule_set: RuleSet) -> int:
@@ -128,40 +125,22 @@ def least_changes(
     )
 
 
-def show_tree(
-    rule: Rule | None,
-    node: int,
-    tree: PolicyTree,
-    rule_set: RuleSet,
-    *,
-    leaves: bool,
-    dark: bool,
-    key: str,
+def way_through(
+    rule: Rule | None, node: int, tree: PolicyTree, rule_set: RuleSet, *, leaves: bool, key: str
 ) -> None:
     """The way of the state through the tree."""
-    st.subheader("Its way through the tree")
-    if rule is not None and rule.placed:
-        st.caption(PLACED)
-    view = st.segmented_control(
-        "Tree",
-        [AROUND, WHOLE_TREE],
-        default=AROUND,
-        key="whole_tree",
-        bind="query-params",
-        required=True,
-        label_visibility="collapsed",
-    )
-    mined = rule is not None and rule.origin == "mined"
-    around = view == AROUND and int(tree.samples[node]) > 0
-    st.plotly_chart(
-        tree_picture(key, tree, rule_set.thresholds, node, around=around, leaves=leaves, dark=dark),
-        key="tree_figure",
-        config={"displaylogo": False, "scrollZoom": True},
-        alt="The decision tree with the way of the state",
-    )
-    st.caption(
-        "The lit path is the state's: it ends at the rule that applies."
-        if mined
+    heading = "<h3>Its way through the tree</h3>"
+    st.html(heading + (f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""))
+    show_tree(
+        key,
+        tree,
+        rule_set.thresholds,
+        node,
+        around="Around it",
+        widget="whole_tree",
+        note="The lit path is the state's: it ends at the rule that applies."
+        if rule is not None and rule.origin == "mined"
         else "The lit path is the state's: it ends at a leaf, and no part of it is a mined rule "
-        "that applies."
+        "that applies.",
+        leaves=leaves,
     )

@@ -282,7 +282,6 @@ def body() -> None:
         trees=compact.trees if compact is not None else grown,
         leaves=compact is not None,
         finder=lambda: finder_of(rules_key, rule_set),
-        dark=state.is_dark(),
         key=rules_key,
     )
 

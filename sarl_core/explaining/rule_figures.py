@@ -19,7 +19,6 @@ from sarl_core.mining.tree import LEAF, PolicyTree
 MAX_BOXES = 2000  # more take a browser the better part of a second
 _HOVERS = 400
 WIDTH = 620  # pixels that the boxes have on a wide screen
-_THINNEST = 0.5  # pixels: what is narrower is not seen
 HIT = 6.0  # pixels: what is narrower is not met by the pointer
 _NEIGHBOURHOOD = 30  # "around" a rule is what is at most so many times as wide
 
@@ -29,7 +28,6 @@ def tree_figure(
     cut: NDArray[np.int64],
     node: int,
     *,
-    around: bool = False,
     dark: bool = False,
     height: int = 420,
 ) -> go.Figure:
@@ -42,20 +40,17 @@ def tree_figure(
         tree: With n nodes.
         cut: Nodes that are rules, (k,).
         node: The rule whose path is lit.
-        around: Whether to show the neighbourhood of the rule only.
         dark: Whether it stands on dark ground.
         height: In pixels.
 
     Returns:
         Zoom by dragging, back by a double click.
     """
-    total = int(tree.samples[0])
     below = below_rules(tree, cut)
     rules = np.zeros(tree.n_nodes, dtype=np.bool_)
     rules[cut] = True
     path = np.array(tree.path(node), dtype=np.int64)
-    window = window_around(tree, node) if around else (0, total, 0, int(tree.depth.max()) + 1)
-    shown = _shown(tree, window, keep=np.concatenate([cut, path]), thin=not around)
+    shown = _shown(tree, keep=np.concatenate([cut, path]))
     kinds = []
     for label in range(tree.dimension.n_labels):
         name = plain(label_text(label, tree.dimension))
@@ -68,14 +63,12 @@ def tree_figure(
     grey = faded(MUTED_COLOUR, 0.22 if dark else 0.16)
     kinds.append((shown[below[shown]], grey, "cut off below a rule"))
     figure = go.Figure()
-    _add_hover(figure, tree, shown, window)
+    _add_hover(figure, tree, shown)
     _add_path(figure, tree, path, dark=dark)
-    if around:
-        _add_conditions(figure, tree, path, window, dark=dark)
-    left, right, top, bottom = window
+    bottom = int(tree.depth.max()) + 1
     figure.update_layout(
         height=height,
-        shapes=[_boxes(tree, nodes, window, *look) for nodes, *look in kinds if len(nodes)],
+        shapes=[_boxes(tree, nodes, *look) for nodes, *look in kinds if len(nodes)],
         margin={"l": 50, "r": 10, "t": 8, "b": 44},
         showlegend=False,
         hovermode="closest",
@@ -85,19 +78,19 @@ def tree_figure(
         plot_bgcolor="rgba(0,0,0,0)",
     )
     figure.update_xaxes(
-        range=[left / total, right / total],
+        range=[0, 1],
         title={"text": "Share of the states"},
-        tickformat="~%" if right - left > total / 50 else ".2~%",
+        tickformat="~%",
         showgrid=False,
         zeroline=False,
         nticks=6,
     )
     figure.update_yaxes(
-        range=[bottom + 0.05, top - 0.05],
+        range=[bottom + 0.05, -0.05],
         title={"text": "Conditions so far"},
         showgrid=False,
         zeroline=False,
-        nticks=min(bottom - top + 1, 9),
+        nticks=min(bottom + 1, 9),
         tickformat="d",
     )
     return figure
@@ -189,30 +182,19 @@ def window_around(tree: PolicyTree, node: int) -> tuple[int, int, int, int]:
     return left, left + width, int(tree.depth[top]), min(depth + 4, int(tree.depth.max()) + 1)
 
 
-def _shown(
-    tree: PolicyTree,
-    window: tuple[int, int, int, int],
-    keep: NDArray[np.int64],
-    *,
-    thin: bool,
-) -> NDArray[np.int64]:
-    """Nodes of a window; those too thin to be seen only if asked for, since one can zoom."""
-    left, right, top, bottom = window
-    start, end = tree.sample_start, tree.sample_start + tree.samples
-    inside = (end > left) & (start < right) & (tree.depth >= top) & (tree.depth < bottom)
-    seen = inside if thin else inside & (tree.samples >= (right - left) * _THINNEST / WIDTH)
-    nodes = np.flatnonzero(seen)
+def _shown(tree: PolicyTree, keep: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The nodes that are drawn, and those to keep."""
+    nodes = np.flatnonzero(tree.samples > 0)
     if len(nodes) > MAX_BOXES:
         # The narrowest are less than a hair wide; those that matter stay.
         by_size = nodes[np.argsort(-tree.samples[nodes], kind="stable")]
         nodes = by_size[:MAX_BOXES]
-    return np.union1d(nodes, keep[inside[keep]])
+    return np.union1d(nodes, keep[tree.samples[keep] > 0])
 
 
 def _boxes(
     tree: PolicyTree,
     nodes: NDArray[np.int64],
-    window: tuple[int, int, int, int],
     colour: str,
     name: str,
 ) -> dict[str, Any]:
@@ -224,10 +206,8 @@ def _boxes(
     apart = (start[1:] != end[:-1]) | (depth[1:] != depth[:-1])
     first = np.flatnonzero(np.concatenate([[True], apart]))
     last = np.flatnonzero(np.concatenate([apart, [True]]))
-    # As many digits as tell the hundredth part of a pixel, for whoever zooms in.
-    digits = max(3 + len(str(int(total / (window[1] - window[0])))), 6)
     path = "".join(
-        f"M{left:.{digits}g},{top}H{right:.{digits}g}V{top + 0.92:.2f}H{left:.{digits}g}Z"
+        f"M{left:.6g},{top}H{right:.6g}V{top + 0.92:.2f}H{left:.6g}Z"
         for left, right, top in zip(
             (start[first] / total).tolist(),
             (end[last] / total).tolist(),
@@ -241,22 +221,14 @@ def _boxes(
     }
 
 
-def _add_hover(
-    figure: go.Figure,
-    tree: PolicyTree,
-    nodes: NDArray[np.int64],
-    window: tuple[int, int, int, int],
-) -> None:
+def _add_hover(figure: go.Figure, tree: PolicyTree, nodes: NDArray[np.int64]) -> None:
     """Invisible points that say what a box is; the widest boxes are enough."""
-    left, right, _, _ = window
-    wide = nodes[tree.samples[nodes] >= (right - left) * HIT / WIDTH]
-    some = wide[np.argsort(-tree.samples[wide], kind="stable")][:_HOVERS]
     total = float(tree.samples[0])
-    start = np.maximum(tree.sample_start[some], left)
-    end = np.minimum(tree.sample_start[some] + tree.samples[some], right)
+    wide = nodes[tree.samples[nodes] >= total * HIT / WIDTH]
+    some = wide[np.argsort(-tree.samples[wide], kind="stable")][:_HOVERS]
     texts = ["<br>".join(map(plain, node_lines(tree, node))) for node in some.tolist()]
     figure.add_scatter(
-        x=(start + end) / 2 / total,
+        x=(tree.sample_start[some] + tree.samples[some] / 2) / total,
         y=tree.depth[some] + 0.46,
         mode="none",  # a marker would be an element of the page for each
         name="boxes",
@@ -288,35 +260,3 @@ def _add_path(figure: go.Figure, tree: PolicyTree, path: NDArray[np.int64], *, d
         line={"color": MARKER_COLOUR, "width": 3},
         marker={"color": MARKER_COLOUR, "size": sizes, "line": {"color": halo, "width": 1.5}},
     )
-
-
-def _add_conditions(
-    figure: go.Figure,
-    tree: PolicyTree,
-    path: NDArray[np.int64],
-    window: tuple[int, int, int, int],
-    *,
-    dark: bool,
-) -> None:
-    """The conditions of the path, written beside it."""
-    total = float(tree.samples[0])
-    left, right, top, bottom = window
-    ink = "#f1f5f7" if dark else "#1d2730"
-    notes: list[dict[str, Any]] = []
-    for here, query in zip(path[1:].tolist(), path_queries(tree, path.tolist()), strict=True):
-        if not top <= tree.depth[here] < bottom:
-            continue
-        middle = (tree.sample_start[here] + tree.samples[here] / 2) / total
-        rightwards = middle * total < (left + right) / 2
-        note: dict[str, Any] = {
-            "x": middle,
-            "y": float(tree.depth[here]) + 0.46,
-            "showarrow": False,
-            "text": plain(query),
-            "xanchor": "left" if rightwards else "right",
-            "xshift": 12 if rightwards else -12,
-            "font": {"size": 11, "color": ink},
-            "bgcolor": "rgba(18,24,29,0.6)" if dark else "rgba(255,255,255,0.7)",
-        }
-        notes.append(note)
-    figure.layout.annotations = notes  # at once: one by one, Plotly copies them all each time

@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.explaining.badges import badge
+from sarl_core.explaining.badges import BADGE_STYLE, badge
 from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.language import action_text, counted, number_text, sentence
 from sarl_core.explaining.what_if import (
@@ -40,6 +40,7 @@ _STYLE = (
 .sarl-state .quiet { opacity: 0.65; font-size: 0.875rem; }
 </style>"""
     + TABLE_STYLE
+    + BADGE_STYLE
 )
 
 _WIDTH = "interquartile range, the width of the middle half of its demonstrated values"

@@ -89,7 +89,8 @@ def test_many_features_and_dimensions_stay_usable() -> None:
     assert len([slider for slider in app.slider if slider.key.startswith("a")]) == 4
     app.selectbox(key="dimension").select_index(2).run()
     assert not app.exception
-    assert html(app).count('role="img"') == 24
+    assert html(app).count('<div class="row" role="img"') == 24
+    assert html(app).count('aria-label="The tree around the rule: ') == 1
 
 
 @pytest.mark.parametrize("take", [UNCOVERED, "a step of the replay"])
@@ -142,7 +143,7 @@ def test_edited_rules_of_a_file_are_followed_in_a_table_and_light_no_foreign_pat
     app.button(key="edit_pin").click().run()
     app.switch_page("what_if.py").run()
     app.selectbox(key="take").set_value(COVERED).run()
-    assert "Its way through the tree" in texts(app)
+    assert "Its way through the tree" in html(app)
     app.button_group(key="edits").set_value("edited").run()
     assert not app.exception, app.exception
     assert "Its way through the rules" in said(app)
@@ -153,7 +154,7 @@ def test_edited_rules_of_a_file_are_followed_in_a_table_and_light_no_foreign_pat
     app.run()
     assert not app.exception, app.exception
     assert "speak of other features or actions" in texts(app)
-    assert "Its way through the tree" in texts(app)
+    assert "Its way through the tree" in html(app)
 
 
 def test_compact_rules_abstain_where_the_shield_does() -> None:

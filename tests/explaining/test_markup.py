@@ -36,14 +36,14 @@ def test_names_from_files_are_no_markup_in_the_figures_of_a_rule(
     limits = {"supp_min": 0.005, "conf_min": 0.9}
     rule = mine_rules((tree,), **limits).rules[0]
     cut = cut_nodes(tree, **limits)
-    around = rule_figures.tree_figure(tree, cut, node_of(rule), around=True).to_json()
-    around += place_html(tree, cut, node_of(rule))
+    drawn = rule_figures.tree_figure(tree, cut, node_of(rule)).to_json()
+    drawn += place_html(tree, cut, node_of(rule))
     found = feature_evidence(harmful, tree, rule)
     units = [replace(feature, unit="<b>m</b>") for feature in harmful.features]
     for features in (harmful.features, units):
-        around += features_html(found, features, "#0072B2")
+        drawn += features_html(found, features, "#0072B2")
     for raw in ("<b>", "<i>", r"\u003cb\u003e", r"\u003ci\u003e"):
-        assert raw not in around
+        assert raw not in drawn
 
 
 def test_names_from_files_are_no_markup_in_other_figures() -> None:

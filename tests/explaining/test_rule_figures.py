@@ -82,20 +82,18 @@ def test_examples_of_continuous_actions_are_values(two_torques: Demonstrations) 
     assert all(-2.0 <= float(str(value)) <= 2.0 for value in columns["Expert did"])
 
 
-@pytest.mark.parametrize("around", [False, True])
 @pytest.mark.parametrize("dark", [False, True])
 def test_the_path_is_lit_in_the_tree(
-    lander_trees: tuple[PolicyTree, ...], rules: RuleSet, around: bool, dark: bool
+    lander_trees: tuple[PolicyTree, ...], rules: RuleSet, dark: bool
 ) -> None:
     tree = lander_trees[0]
     node = node_of(rules.rules[-1])
-    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node, around=around, dark=dark)
+    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node, dark=dark)
     lit = next(trace for trace in figure.data if trace.name == "path")
     assert len(lit.x) == len(tree.path(node))
     assert list(np.floor(lit.y)) == tree.depth[list(tree.path(node))].tolist()
     low, high = figure.layout.xaxis.range
     assert low <= lit.x[-1] <= high
-    assert bool(figure.layout.annotations) == around
     json.loads(figure.to_json())
 
 
@@ -118,11 +116,11 @@ def test_boxes_cover_every_level_of_the_tree(
         assert drawn == pytest.approx(tree.support[tree.depth == depth].sum(), abs=1e-4)
 
 
-def test_boxes_around_a_rule_stand_where_its_states_do(
+def test_the_box_of_a_rule_stands_where_its_states_do(
     lander_trees: tuple[PolicyTree, ...], rules: RuleSet
 ) -> None:
-    tree, node = lander_trees[0], node_of(rules.rules[-1])
-    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node, around=True)
+    tree, node = lander_trees[0], node_of(max(rules.rules, key=lambda one: one.samples))
+    figure = figures.tree_figure(tree, cut_nodes(tree, **AT), node)
     start, end = tree.sample_start[node], tree.sample_start[node] + tree.samples[node]
     assert any(
         left <= start / len(tree.demonstrated) + 1e-5
@@ -148,8 +146,7 @@ def test_a_large_tree_keeps_its_rules_when_boxes_are_left_out(
 def test_a_rule_at_the_root_has_a_figure(lander_trees: tuple[PolicyTree, ...]) -> None:
     cut = cut_nodes(lander_trees[0], supp_min=0.0, conf_min=0.1)
     assert cut.tolist() == [0]
-    for around in (False, True):
-        assert figures.tree_figure(lander_trees[0], cut, 0, around=around).data
+    assert figures.tree_figure(lander_trees[0], cut, 0).data
 
 
 def test_the_path_table_escapes_names_from_files(

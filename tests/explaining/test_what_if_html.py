@@ -18,6 +18,8 @@ from sarl_core.shielding.near import Neighbourhood, decision_changes
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Shield
 
+PLAIN = "sarl-plain"  # the ground that is none
+
 FEATURES = (Feature("<b>angle", "rad"), Feature("speed", ""))
 PUSH = LabelledDimension("push", ("left", "<i>right"))
 BOX = DataBox((0.2, -1.0), (0.0, 0.0), (0.0, 0.0), (0.4, 1.0))
@@ -100,8 +102,12 @@ def decided(state, action, outside="act", rule_set=RULES):
 )
 def test_how_the_rules_met_the_action_and_what_is_executed(state, action, outside, badges, heading):
     root = element(decided(state, action, outside))
-    shown = [one.text for one in root.iter("span") if "badge" in one.get("class")]
-    assert shown == badges
+    shown = [one for one in root.iter("span") if "badge" in one.get("class")]
+    assert [one.text for one in shown] == badges
+    # Each ground is told apart: what is not described in the piece itself looks like plain text.
+    looks = "".join(style.text for style in root.iter("style"))
+    for one in shown:
+        assert all(f".{name} {{" in looks for name in one.get("class").split() if name != PLAIN)
     (title,) = root.iter("h4")
     assert title.text == heading
 
