@@ -390,7 +390,7 @@ def _show_contradictions(evidence: Evidence, found: Contradictions) -> None:
             column_config={
                 "Episode": st.column_config.NumberColumn(width=68, format="%d"),
                 "Share": st.column_config.NumberColumn(
-                    width=62, format="percent", help="Of its steps, those that contradict another"
+                    width=66, format="%.1f %%", help="Of its steps, those that contradict another"
                 ),
                 "Contradicting": st.column_config.NumberColumn(width=100),
                 "Identical": st.column_config.NumberColumn(

@@ -193,8 +193,8 @@ def show_rounds(
                 "Round": point.number,
                 "Mean return": point.mean,
                 "Deviation": point.std,
-                "Coverage": point.coverage,
-                "Expert disagrees": point.disagreement,
+                "Coverage": 100 * point.coverage,
+                "Expert disagrees": 100 * point.disagreement,
                 "Rules": point.rules,
                 "Demonstrations": point.pairs,
                 "Chosen": point.number == chosen,
@@ -210,10 +210,10 @@ def show_rounds(
                 format="%.1f", help="Standard deviation of the returns of its episodes"
             ),
             "Coverage": st.column_config.NumberColumn(
-                format="percent", help="Share of the states met in which some rule applied"
+                format="%.1f %%", help="Share of the states met in which some rule applied"
             ),
             "Expert disagrees": st.column_config.NumberColumn(
-                format="percent",
+                format="%.1f %%",
                 help="Share of the rules' decisions in which the expert would do otherwise",
             ),
             "Rules": st.column_config.NumberColumn(format="localized"),

@@ -129,6 +129,8 @@ def aggregate(
     if as_json:
         terminal.print_json(card)
         return
+    from sarl_core.explaining.language import share_text
+
     terminal.print_table(
         ("Round", "Demonstrations", "Rules", "Mean return", "Coverage", "Expert disagrees"),
         [
@@ -137,8 +139,8 @@ def aggregate(
                 f"{one.pairs:,}",
                 str(one.rules),
                 f"{one.mean_return:.1f}",
-                f"{one.coverage:.1%}",
-                f"{one.disagreement:.1%}",
+                share_text(one.coverage, decimals=1),
+                share_text(one.disagreement, decimals=1),
             )
             for one in found.rounds
         ],
@@ -222,10 +224,12 @@ def _gaps(
     if as_json:
         terminal.print_json(document)
         return
+    from sarl_core.explaining.language import share_text
+
     terminal.print_lines(
         [
             f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
-            f"({found.share:.1%}) have no rule and need a demonstration."
+            f"({share_text(found.share, decimals=1)}) have no rule and need a demonstration."
         ]
     )
 

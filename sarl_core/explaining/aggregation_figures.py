@@ -12,6 +12,8 @@ from plotly.subplots import make_subplots
 
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR, faded
+from sarl_core.explaining.language import share_text
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.rollouts.aggregation import Round
 
 _BLUE, _GREEN = LABEL_COLOURS[0], LABEL_COLOURS[2]
@@ -193,12 +195,12 @@ def rounds_figure(
         row=1,
         col=1,
     )
-    for row, (values, shown) in enumerate(
+    shares = [[getattr(point, name) for point in points] for name in ("coverage", "disagreement")]
+    for row, (values, said) in enumerate(
         (
-            (means, ",.1f"),
-            ([point.coverage for point in points], ".1%"),
-            ([point.disagreement for point in points], ".1%"),
-            ([point.rules for point in points], ",d"),
+            (means, [f"{value:,.1f}" for value in means.tolist()]),
+            *((one, [share_text(share, decimals=1) for share in one]) for one in shares),
+            ([point.rules for point in points], [f"{point.rules:,}" for point in points]),
         ),
         start=1,
     ):
@@ -209,10 +211,11 @@ def rounds_figure(
             mode="lines+markers",
             name=_PANELS[row - 1],
             customdata=np.round(spreads, 3) if row == 1 else None,
+            hovertext=said,
             line={"color": _BLUE, "width": 2.2 if row == 1 else 1.6},
             marker={"color": _BLUE, "size": 7 if row == 1 else 5},
             hovertemplate=(
-                f"round %{{x}}, {_PANELS[row - 1].lower()}: <b>%{{y:{shown}}}</b>{extra}"
+                f"round %{{x}}, {_PANELS[row - 1].lower()}: <b>%{{hovertext}}</b>{extra}"
                 "<extra></extra>"
             ),
             row=row,
@@ -290,9 +293,10 @@ def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int, h
     figure.update_xaxes(title={"text": "round", "standoff": 2}, row=len(_PANELS), col=1)
     figure.update_yaxes(fixedrange=True, zeroline=False, nticks=4)
     figure.update_yaxes(nticks=6, row=1, col=1)
-    figure.update_yaxes(range=[0, 1.08], tickformat=".0%", row=2, col=1)
+    figure.update_yaxes(range=[0, 1.08], **share_ticks(0, 1, 3), row=2, col=1)
     most = max(point.disagreement for point in points)
-    figure.update_yaxes(range=[0, max(1.15 * most, 0.05)], tickformat=".0%", row=3, col=1)
+    highest = max(1.15 * most, 0.05)
+    figure.update_yaxes(range=[0, highest], **share_ticks(0, highest, 3), row=3, col=1)
     rules = max(point.rules for point in points)
     figure.update_yaxes(range=[0, 1.2 * rules], tickformat=",d", row=4, col=1)
     for row, title in enumerate(_PANELS, start=1):

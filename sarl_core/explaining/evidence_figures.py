@@ -13,7 +13,8 @@ from sarl_core.explaining.colours import (
     LABEL_COLOURS,
     faded,
 )
-from sarl_core.explaining.language import counted
+from sarl_core.explaining.language import counted, share_text
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.mining.contradictions import EpisodeContradictions
 from sarl_core.mining.learning_curve import LearningCurve
 
@@ -47,7 +48,6 @@ def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
         np.nanmax(values, axis=0).tolist(),
     )
     share = layer in ("coverage", "fidelity")
-    number = ":.1%" if share else ":,.1f"
     figure = go.Figure()
     figure.add_scatter(
         x=[*episodes, *episodes[::-1]],
@@ -63,10 +63,13 @@ def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
         y=mean,
         mode="lines+markers",
         line={"color": _LINE, "width": 2.5},
-        customdata=np.stack([low, high], axis=1) if episodes else [],
+        customdata=[
+            [share_text(value, decimals=1) if share else f"{value:,.1f}" for value in values]
+            for values in zip(mean, low, high, strict=True)
+        ],
         hovertemplate=(
-            f"%{{x:,}} episodes: %{{y{number}}}<br>%{{customdata[0]{number}}} to "
-            f"%{{customdata[1]{number}}}<extra></extra>"
+            "%{x:,} episodes: %{customdata[0]}<br>%{customdata[1]} to %{customdata[2]}"
+            "<extra></extra>"
         ),
     )
     _plain(figure, 230)
@@ -75,9 +78,9 @@ def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
         range=[0, float(curve.episodes[-1]) * 1.03],
         tickformat=",d",
     )
-    figure.update_yaxes(tickformat=".0%" if share else "", rangemode="tozero")
-    if layer == "fidelity":
-        figure.update_yaxes(rangemode="normal")
+    figure.update_yaxes(rangemode="normal" if layer == "fidelity" else "tozero")
+    if share and episodes:
+        figure.update_yaxes(**share_ticks(min(low) if layer == "fidelity" else 0.0, max(high)))
     return figure
 
 
@@ -97,15 +100,20 @@ def contradictions_figure(episodes: Sequence[EpisodeContradictions]) -> go.Figur
         y=[one.share for one in some],
         marker={"color": INTERVENTION_COLOUR, "opacity": 0.85},
         customdata=[[one.contradicting, counted(one.steps, "step"), one.identical] for one in some],
+        hovertext=[share_text(one.share, decimals=1) for one in some],
         hovertemplate=(
-            "episode %{x}: %{y:.1%}<br>%{customdata[0]:,} of %{customdata[1]}, "
+            "episode %{x}: %{hovertext}<br>%{customdata[0]:,} of %{customdata[1]}, "
             "%{customdata[2]:,} with an identical state<extra></extra>"
         ),
     )
     _plain(figure, 260)
     figure.update_layout(bargap=0.25)
     figure.update_xaxes(title={"text": "Episode"}, type="category", nticks=20, showgrid=False)
-    figure.update_yaxes(title={"text": "Contradicting steps"}, tickformat=".0%", rangemode="tozero")
+    figure.update_yaxes(
+        title={"text": "Contradicting steps"},
+        rangemode="tozero",
+        **share_ticks(0.0, max((one.share for one in some), default=1.0)),
+    )
     return figure
 
 

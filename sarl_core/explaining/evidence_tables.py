@@ -104,11 +104,11 @@ def episode_columns(episodes: Sequence[EpisodeContradictions]) -> Columns:
         episodes: In their order.
 
     Returns:
-        Column name to one value an episode.
+        Column name to one value an episode; the share in percent.
     """
     return {
         "Episode": [one.episode for one in episodes],
-        "Share": [one.share for one in episodes],
+        "Share": [100 * one.share for one in episodes],
         "Contradicting": [one.contradicting for one in episodes],
         "Identical": [one.identical for one in episodes],
         "Near": [one.near for one in episodes],

@@ -9,6 +9,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR
+from sarl_core.explaining.language import share_text
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.explaining.threshold_figures import layer_scale
 from sarl_core.mining.pareto import ParetoPoint
 
@@ -61,27 +63,36 @@ def front_figure(
         carries its thresholds as `customdata`.
     """
     figure = go.Figure()
+    fidelities = [point.fidelity for point in points]
     figure.add_scatter(
         x=[point.rules for point in points],
         y=[point.coverage for point in points],
         mode="markers",
-        customdata=[[point.support, point.confidence, f"{point.fidelity:.2%}"] for point in points],
+        customdata=[
+            [
+                point.support,
+                point.confidence,
+                share_text(point.fidelity, decimals=2),
+                share_text(point.coverage, decimals=1),
+            ]
+            for point in points
+        ],
         marker={
             "size": 9,
-            "color": [point.fidelity for point in points],
+            "color": fidelities,
             "colorscale": layer_scale(dark=dark),
             "showscale": True,
             "line": {"width": 0.5, "color": MUTED_COLOUR},
             "colorbar": {
                 "thickness": 10,
                 "outlinewidth": 0,
-                "tickformat": ".0%",
+                **share_ticks(min(fidelities, default=0.0), max(fidelities, default=1.0)),
                 "x": 1.01,
                 "title": {"text": "Fidelity", "side": "right"},
             },
         },
         hovertemplate=(
-            "rules %{x:,}, coverage %{y:.1%}, fidelity %{customdata[2]}<br>"
+            "rules %{x:,}, coverage %{customdata[3]}, fidelity %{customdata[2]}<br>"
             "at support %{customdata[0]:.4~g}, confidence %{customdata[1]:.4~g}<extra></extra>"
         ),
         unselected={"marker": {"opacity": 1}},
@@ -114,6 +125,6 @@ def front_figure(
         title={"text": "Number of rules"}, type="log", dtick=1, tickformat=",d", fixedrange=True
     )
     figure.update_yaxes(
-        title={"text": "Coverage"}, tickformat=".0%", range=[-0.03, 1.05], fixedrange=True
+        title={"text": "Coverage"}, **share_ticks(0, 1), range=[-0.03, 1.05], fixedrange=True
     )
     return figure

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
-from sarl_core.explaining.language import number_text
+from sarl_core.explaining.language import number_text, share_text
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.rollouts.gaps import Gaps
 
 _TAIL = 0.002  # of the states at either end, kept from flattening the rest of a histogram
@@ -103,8 +104,9 @@ def gap_figure(histogram: GapHistogram, feature: Feature, *, height: int = _HEIG
             width=np.diff(edges),
             name=name,
             customdata=ranges,
+            hovertext=[share_text(share) for share in shares.tolist()],
             marker={"color": fill, "line": {"width": 0}},
-            hovertemplate=f"%{{customdata}}<br>%{{y:.1%}} of the {name}<extra></extra>",
+            hovertemplate=f"%{{customdata}}<br>%{{hovertext}} of the {name}<extra></extra>",
         )
     figure.update_layout(
         height=height,
@@ -125,5 +127,6 @@ def gap_figure(histogram: GapHistogram, feature: Feature, *, height: int = _HEIG
         nticks=6,
         title={"text": plain(feature.unit), "standoff": 4},
     )
-    figure.update_yaxes(tickformat=".0%", fixedrange=True, nticks=4, zeroline=False)
+    most = float(max(histogram.shown.max(), histogram.missing.max()))
+    figure.update_yaxes(**share_ticks(0.0, 1.05 * most, 4), fixedrange=True, zeroline=False)
     return figure

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
+from sarl_core.explaining.language import share_text
 from sarl_core.explaining.learning_words import value_text
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.files import whole_file
 from sarl_core.rollouts.learning_arms import LearningArm
 from sarl_core.rollouts.learning_files import LearningRun, LearningStudy
@@ -100,7 +102,7 @@ def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
             col=1,
         )
     figure.update_yaxes(rangemode="tozero", row=2, col=1)
-    figure.update_yaxes(tickformat=".0%", range=[0, 1], row=3, col=1)
+    figure.update_yaxes(**share_ticks(0, 1), range=[0, 1], row=3, col=1)
     return figure
 
 
@@ -340,16 +342,16 @@ def _line(
             col=1,
             **common,
         )
+    means = np.nanmean(values, axis=0)
+    said = [share_text(mean) if row == 3 else f"{mean:,.0f}" for mean in means.tolist()]
     figure.add_scatter(
         x=x,
-        y=np.nanmean(values, axis=0),
+        y=means,
+        hovertext=said,
         mode="lines",
         name=arm.title,
         line={"color": colour, "width": 2.2, "dash": "dot" if arm.replay else "solid"},
-        hovertemplate=(
-            f"{arm.title}<br>%{{x:,.0f}} steps: <b>%{{y:{'.0%' if row == 3 else ',.0f'}}}</b>"
-            "<extra></extra>"
-        ),
+        hovertemplate=f"{arm.title}<br>%{{x:,.0f}} steps: <b>%{{hovertext}}</b><extra></extra>",
         row=row,
         col=1,
         **(common | {"showlegend": row == 1}),

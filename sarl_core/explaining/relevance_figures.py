@@ -9,7 +9,9 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
+from sarl_core.explaining.language import share_text
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.rollouts.relevance import Relevance
 from sarl_core.rollouts.statistics import mean_interval
 
@@ -85,7 +87,13 @@ def learner_figure(found: Relevance) -> go.Figure:
     """
     figure = go.Figure()
     _add_line(
-        figure, found.learned_steps, found.returns, "mean return", LABEL_COLOURS[0], "solid", ".1f"
+        figure,
+        found.learned_steps,
+        found.returns,
+        "mean return",
+        LABEL_COLOURS[0],
+        "solid",
+        share=False,
     )
     _finish(figure, "mean return", 300, share=False)
     figure.update_layout(showlegend=False)
@@ -99,13 +107,16 @@ def _add_line(
     name: str,
     colour: str,
     dash: str,
-    shown: str = ".1%",
+    *,
+    share: bool = True,
 ) -> None:
     """A mean over learners, (K, P + 1) values, and the band of its interval."""
     intervals = [mean_interval(column) for column in values.T]
+    means = [interval.mean for interval in intervals]
+    said = _shares if share else _numbers
     low = np.array([interval.low for interval in intervals])
     high = np.array([interval.high for interval in intervals])
-    if shown.endswith("%"):
+    if share:
         low, high = np.clip(low, 0.0, 1.0), np.clip(high, 0.0, 1.0)
     figure.add_scatter(
         x=np.concatenate([steps, steps[::-1]]),
@@ -120,17 +131,25 @@ def _add_line(
     )
     figure.add_scatter(
         x=steps,
-        y=np.round([interval.mean for interval in intervals], 5),
+        y=np.round(means, 5),
         mode="lines",
         name=plain(name),
         legendgroup=name,
         line={"color": colour, "width": 2.2, "dash": dash},
-        customdata=np.stack([low, high], axis=1).round(5),
+        customdata=np.stack([said(np.array(means)), said(low), said(high)], axis=1),
         hovertemplate=(
-            f"{plain(name)}, after %{{x:,}} steps: <b>%{{y:{shown}}}</b><br>95 % interval "
-            f"%{{customdata[0]:{shown}}} to %{{customdata[1]:{shown}}}<extra></extra>"
+            f"{plain(name)}, after %{{x:,}} steps: <b>%{{customdata[0]}}</b><br>95 % interval "
+            "%{customdata[1]} to %{customdata[2]}<extra></extra>"
         ),
     )
+
+
+def _shares(values: Floats) -> NDArray[np.str_]:
+    return np.array([share_text(value) for value in values.tolist()])
+
+
+def _numbers(values: Floats) -> NDArray[np.str_]:
+    return np.array([f"{value:,.1f}" for value in values.tolist()])
 
 
 def _finish(figure: go.Figure, title: str, height: int, *, share: bool) -> None:
@@ -150,7 +169,7 @@ def _finish(figure: go.Figure, title: str, height: int, *, share: bool) -> None:
         tickformat=",d",
         zeroline=False,
     )
-    shares: dict[str, Any] = {"range": [0, 1.03], "tickformat": ".0%"} if share else {}
+    shares: dict[str, Any] = {"range": [0, 1.03], **share_ticks(0, 1)} if share else {}
     figure.update_yaxes(
         title={"text": title, "standoff": 4}, fixedrange=True, nticks=6, zeroline=False, **shares
     )

@@ -10,6 +10,7 @@ from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.comparison_figures import arm_style
 from sarl_core.explaining.language import share_text
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.share_axis import share_ticks
 
 SETTING_COLOURS = {
     "filtered": arm_style(0, 0).colour,
@@ -80,7 +81,7 @@ def settings_figure(
         },
     )
     axis = (
-        {"range": [-0.03, 1.06], "tickformat": ".0%"}
+        {"range": [-0.03, 1.06], **share_ticks(0, 1)}
         if share
         else {"type": "log", "dtick": 1, "tickformat": ",d"}
     )

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.language import number_text
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.mining.landscape import Landscape
 
 Layer = Literal["rule_count", "mean_length", "coverage", "fidelity", "held_out_fidelity"]
@@ -80,8 +81,10 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         "x": 1.01,
         "tickfont": {"size": 11},
         "nticks": 6,
-        "tickformat": ".0%" if style.share else "",
     }
+    least = (_least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0) or 0
+    if style.share:
+        bar |= share_ticks(least, 1)
     shown = values
     if layer == "rule_count":
         # From one rule to thousands: by powers of ten.
@@ -100,7 +103,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         xgap=1,
         ygap=1,
         hoverongaps=False,
-        zmin=_least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0,
+        zmin=least,
         zmax=1 if style.share else None,
     )
     columns, rows = np.meshgrid(
@@ -236,7 +239,7 @@ def surface(
                 "title": {"text": style.unit or layer},
                 "rangemode": "tozero",
                 **plain,
-                **({"tickformat": ".0%"} if style.share else {}),
+                **(share_ticks(0, 1) if style.share else {}),
             },
             "camera": {"eye": {"x": 1.75, "y": -1.85, "z": 1.1}, "center": {"z": -0.12}},
             "aspectmode": "manual",
@@ -322,8 +325,8 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
                 confidence,
                 count,
                 f"{length:.1f}",
-                f"{share:.1%}",
-                f"{truth:.1%}" if truth == truth else "–",
+                f"{100 * share:.1f} %",
+                f"{100 * truth:.1f} %" if truth == truth else "–",
                 other,
             ]
             for confidence, count, length, share, truth, other in zip(
@@ -338,7 +341,7 @@ def _held_out_words(landscape: Landscape) -> list[list[str]]:
     if landscape.held_out_fidelity is None:
         return [[""] * len(landscape.confidences)] * len(landscape.supports)
     return [
-        [f", held out {value:.1%}" if value == value else ", held out –" for value in row]
+        [f", held out {100 * value:.1f} %" if value == value else ", held out –" for value in row]
         for row in landscape.held_out_fidelity.tolist()
     ]
 

@@ -127,7 +127,7 @@ def test_a_run_is_what_the_library_gives_and_goes_on_from_there(expected: Aggreg
     table = app.dataframe[0].value
     assert table["Round"].tolist() == [1, 2]
     assert table["Mean return"].tolist() == [one.mean_return for one in expected.rounds]
-    assert table["Expert disagrees"].tolist() == [one.disagreement for one in expected.rounds]
+    assert table["Expert disagrees"].tolist() == [100 * one.disagreement for one in expected.rounds]
     assert table["Demonstrations"].tolist() == [one.pairs for one in expected.rounds]
     assert expected.reported is not None
     spread = expected.reported.statistics
@@ -187,7 +187,7 @@ def test_an_own_expert_and_rules_cut_at_thresholds() -> None:
     wanted = aggregate(CARTPOLE, plan).rounds[0]
     (row,) = app.dataframe[0].value.to_dict("records")
     assert row["Rules"] == wanted.rules
-    assert row["Coverage"] == wanted.coverage < 1.0
+    assert row["Coverage"] == 100 * wanted.coverage < 100
     assert row["Mean return"] == wanted.mean_return
 
 
