@@ -7,6 +7,7 @@ from _replays import Order, Replay, kept_forks, run_fork, with_progress
 from _words import escaped
 
 from sarl_core.explaining.fork_text import REST_TEXT, fork_text
+from sarl_core.explaining.headings import heading
 from sarl_core.rollouts.forking import Fork, Rest
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
@@ -22,7 +23,7 @@ def fork_section(replay: Replay, order: Order, current: int) -> None:
     """
     steps = replay.shown.steps
     assert steps is not None
-    st.html("<h3>Without this change</h3>")
+    st.html(heading("Without this change"))
     if not steps.intervened[current]:
         st.caption(
             "Choose a step at which the rules changed the action: from there the episode can go on "

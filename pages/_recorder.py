@@ -15,6 +15,7 @@ from _replays import Order, Replay, compared, kept_comparisons
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.headings import heading
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.recorder import (
     PAGE,
@@ -71,7 +72,7 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
         order: Asked for it.
         current: The step that is chosen.
     """
-    st.html("<h3>Flight recorder</h3>")
+    st.html(heading("Flight recorder"))
     recorded = source(replay, order)
     steps = recorded.steps
     chosen, rule_id = filters(recorded)

@@ -16,6 +16,7 @@ from _tree_picture import show_tree
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import feature_evidence, path_steps
+from sarl_core.explaining.headings import heading
 from sarl_core.explaining.language import counted
 from sarl_core.explaining.path_table import path_table
 from sarl_core.explaining.rule_card import measures_text, rule_card
@@ -84,7 +85,7 @@ def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[
     with left:
         steps = path_steps(tree, node_of(rule))
         st.html(
-            "<h3>From the root to the rule</h3>"
+            heading("From the root to the rule")
             + path_table(steps, tree.dimension, leaf=compact is not None)
         )
     with right:
@@ -110,7 +111,7 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
 def place(rule: Rule, behind: Behind) -> None:
     """The path lit in the tree."""
     tree, compact = behind.tree(rule), behind.compact
-    st.html("<h3>Its place in the tree</h3>")
+    st.html(heading("Its place in the tree"))
     note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
         "Rules are full in colour, what is cut off below them is grey."
         if compact is None
@@ -137,8 +138,8 @@ def features_of(
     if _rule.conditions:
         found = feature_evidence(_demonstrations, _tree, _rule)
         figures = features_html(found, _demonstrations.features, label_colour(_rule.action))
-        parts.append(f"<h3>What it asks, feature by feature</h3>{figures}")
+        parts.append(heading("What it asks, feature by feature") + figures)
     if _rule.samples:
-        heading = "Example states" if _rule.samples > 1 else "The one state it applies to"
-        parts.append(f"<h3>{heading}</h3>{examples_html(_demonstrations, _tree, _rule)}")
+        title = "Example states" if _rule.samples > 1 else "The one state it applies to"
+        parts.append(heading(title) + examples_html(_demonstrations, _tree, _rule))
     return "".join(parts)

@@ -11,6 +11,7 @@ from _tree_picture import show_tree
 from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
+from sarl_core.explaining.headings import heading
 from sarl_core.explaining.lit_path import PathFinder, lit_path_table
 from sarl_core.explaining.what_if import node_of_way
 from sarl_core.explaining.what_if_figures import lines_html
@@ -129,8 +130,8 @@ def way_through(
     rule: Rule | None, node: int, tree: PolicyTree, rule_set: RuleSet, *, leaves: bool, key: str
 ) -> None:
     """The way of the state through the tree."""
-    heading = "<h3>Its way through the tree</h3>"
-    st.html(heading + (f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""))
+    placed = f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""
+    st.html(heading("Its way through the tree") + placed)
     show_tree(
         key,
         tree,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.explaining.badges import BADGE_STYLE, badge
+from sarl_core.explaining.headings import heading
 from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.language import action_text, counted, number_text, sentence
 from sarl_core.explaining.what_if import (
@@ -31,8 +32,6 @@ _SHOWN = 3  # features beyond the data that are named
 _STYLE = (
     """<style>
 .sarl-state { font-size: 1rem; line-height: 1.55; }
-.sarl-state h3 { font-size: 1.1rem; font-weight: 600; line-height: 1.2;
-  letter-spacing: -0.005em; margin: 0; padding: 0.75rem 0 0.8rem 0; }
 .sarl-state h4 { font-size: 1rem; font-weight: 600; line-height: 1.4; margin: 0;
   padding: 0.4rem 0; }
 .sarl-state p { margin: 0 0 0.5rem 0; }
@@ -109,13 +108,13 @@ def decision_html(
         executed_text(tuple(np.asarray(values, dtype=float).reshape(-1).tolist()), rule_set.actions)
         for values in (decision.proposed, decision.executed)
     )
-    heading = (
+    said = (
         f"The agent wants {proposed}; executed is {executed}"
         if decision.intervened
         else f"{executed[:1].upper()}{executed[1:]} is executed, as the agent wants"
     )
     return _section(
-        f"<div>{badges}</div><h4>{escape(heading)}</h4>{_rule_html(rule, state, rule_set)}"
+        f"<div>{badges}</div><h4>{escape(said)}</h4>{_rule_html(rule, state, rule_set)}"
     )
 
 
@@ -165,15 +164,15 @@ def changes_html(
     Returns:
         HTML without script: the first as a sentence, and all in a table.
     """
-    heading = "<h3>The least change that changes the decision</h3>"
+    title = heading("The least change that changes the decision")
     if not changes:
         none = "No change of a single feature changes what is executed."
-        return _section(f"{heading}<p>{none}</p>")
+        return _section(f"{title}<p>{none}</p>")
     rows = [_change_row(change, spans, rule_set) for change in changes]
     condition, does, *_ = rows[0]
     said = f"<p>Executed would be <b>{escape(does)}</b> if {escape(condition)}.</p>"
     return _section(
-        f"{heading}{said}{table_html(_CHANGES, rows, 'The least changes that change the decision')}"
+        f"{title}{said}{table_html(_CHANGES, rows, 'The least changes that change the decision')}"
     )
 
 
@@ -203,16 +202,16 @@ def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
     Returns:
         HTML without script, in a table.
     """
-    heading = "<h3>Rules that nearly apply</h3>"
+    title = heading("Rules that nearly apply")
     if not misses:
         none = "No rule would apply if one or two features were different."
-        return _section(f"{heading}<p>{none}</p>")
+        return _section(f"{title}<p>{none}</p>")
     note = _note(
         "First those that lack one feature, then those that lack two; each with the least change "
         "that lets it apply."
     )
     rows = [_miss_row(miss, rule_set) for miss in misses]
-    return _section(f"{heading}{table_html(_MISSES, rows, 'Rules that nearly apply')}{note}")
+    return _section(f"{title}{table_html(_MISSES, rows, 'Rules that nearly apply')}{note}")
 
 
 def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
@@ -244,7 +243,7 @@ def way_html(table: str, rule: Rule | None) -> str:
     note = _note(
         "These rules were not cut from the tree of the chosen demonstrations, so it is not drawn."
     )
-    return _section(f"<h3>Its way through the rules</h3>{placed}{table}{note}")
+    return _section(f"{heading('Its way through the rules')}{placed}{table}{note}")
 
 
 # --- the parts ---------------------------------------------------------------------------------
