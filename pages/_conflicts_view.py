@@ -25,7 +25,7 @@ def conflicts(of: Base, found: Verdicts) -> None:
     if not found.conflicts:
         st.caption("No placed rule takes a state from another rule that says something else.")
         return
-    rule_set, noun = found.rule_set, _edits.basis(of).noun
+    rule_set, noun = found.rule_set, of.basis.noun
     lines = [conflict_text(one, rule_set, states=noun) for one in found.conflicts]
     st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:CONFLICTS_SHOWN]))
     if len(lines) > CONFLICTS_SHOWN:
@@ -47,7 +47,7 @@ def conflicts(of: Base, found: Verdicts) -> None:
 
 
 def _conflict_rows(of: Base, found: Verdicts) -> dict[str, list[Any]]:
-    rule_set, basis = found.rule_set, _edits.basis(of)
+    rule_set, basis = found.rule_set, of.basis
     rows: dict[str, list[Any]] = {"Rule": [], "Says": [], "Takes from": [], "Which says": []}
     rows["States"] = [one.states for one in found.conflicts]
     for one in found.conflicts:

@@ -80,7 +80,7 @@ def _short(text: str, most: int = 44) -> str:
 
 def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
     """What the edits change at once, against the unedited set."""
-    found, noun = change(before, after), _edits.basis(of).noun
+    found, noun = change(before, after), of.basis.noun
     in_force = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
     shown = (
         ("Rules in force", f"{in_force[1]:,}", f"{in_force[0]:,}"),
@@ -115,7 +115,7 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
 
 def where(of: Base) -> str:
     """Which states these are, where they are not the demonstrated ones."""
-    if _edits.basis(of).expert is not None:
+    if of.basis.expert is not None:
         return ""
     return (
         " The chosen demonstrations are of something else, so this is counted on random states "
@@ -303,7 +303,7 @@ def chosen_rule(of: Base, rule: Rule, found: Verdicts) -> str | None:
     with st.container(border=True, key="chosen_rule"):
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
-        decides = f"decides {counted(int(found.decided[at]), _edits.basis(of).noun)}"
+        decides = f"decides {counted(int(found.decided[at]), of.basis.noun)}"
         st.caption(f"Rule {escaped(rule.id)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             on = rule.enabled

@@ -7,6 +7,7 @@ compact ones, or those of a file. They stay in the session, and an error loses n
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import _compact
@@ -46,6 +47,11 @@ class Base:
     rule_set: RuleSet
     name: str = ""
 
+    @cached_property
+    def basis(self) -> Basis:
+        """The states on which edits are counted; looked up once, since much asks for them."""
+        return basis_of(self.rule_set, self.digest)
+
 
 @dataclass(frozen=True, eq=False)
 class Basis:
@@ -55,11 +61,13 @@ class Basis:
         ground: The states, walked.
         expert: What the expert did there, None where that is not known.
         noun: What one of them is called.
+        digest: Tells these states from others.
     """
 
     ground: Ground
     expert: NDArray[np.int64] | None
     noun: str
+    digest: str
 
 
 # --- which rules are edited --------------------------------------------------------------------
@@ -237,11 +245,6 @@ def demonstrations_for(rule_set: RuleSet) -> Demonstrations | None:
     return demonstrations if demonstrations and fits(rule_set, demonstrations) else None
 
 
-def basis(of: Base) -> Basis:
-    """The states on which the edits of some rules are counted."""
-    return basis_of(of.rule_set, of.digest)
-
-
 def basis_of(rule_set: RuleSet, digest: str) -> Basis:
     """The states on which a rule set is counted: demonstrated ones, where they are its own kind."""
     demonstrations = demonstrations_for(rule_set)
@@ -254,18 +257,16 @@ def _basis(
     digest: str, told: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None
 ) -> Basis:
     if _demonstrations is None:
-        return Basis(ground_of(_rule_set, sampled_states([_rule_set])), None, "random state")
+        ground = ground_of(_rule_set, sampled_states([_rule_set]))
+        return Basis(ground, None, "random state", f"{len(ground.states)} random")
     ground = ground_of(_rule_set, _demonstrations.observations)
-    return Basis(ground, expert_labels(_rule_set, _demonstrations), "demonstrated state")
+    return Basis(ground, expert_labels(_rule_set, _demonstrations), "demonstrated state", told)
 
 
 def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
     """What the rules with some edits say of the states."""
-    found = basis(of)
-    told = f"{len(found.ground.states)} {found.noun} {_told(edits)}"
-    if found.noun == "demonstrated state":
-        told += cast(Demonstrations, state.chosen_demonstrations()).digest
-    return _verdicts(of.digest, told + state.held_out_digest(), _with(of, edits), found)
+    told = f"{of.basis.digest} {_told(edits)} {state.held_out_digest()}"
+    return _verdicts(of.digest, told, _with(of, edits), of.basis)
 
 
 @st.cache_resource(max_entries=32, show_spinner=False)

@@ -162,7 +162,7 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             label_visibility="collapsed",
             width=110,
         )
-        values = _edits.basis(of).ground.states[:, feature]
+        values = of.basis.ground.states[:, feature]
         low, high = number_text(float(values.min())), number_text(float(values.max()))
         threshold = st.number_input(
             "Number",
@@ -238,7 +238,7 @@ def preview(of: Base, now: Verdicts, rule: Rule, *, changing: bool) -> None:
     """What the rule would change, before it is there."""
     edit = Change(rule) if changing else Add(rule)
     then = _edits.verdicts_of(of, (*_edits.history(of).edits, edit))
-    noun = _edits.basis(of).noun
+    noun = of.basis.noun
     st.markdown(f"**{escaped(sentence(rule, then.rule_set, evidence=False))}**")
     if not rule.conditions:
         st.warning(

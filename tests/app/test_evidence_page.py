@@ -8,11 +8,16 @@ from functools import cache
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.evidence_words import evidence_text, more_text, verdict_counts
+from sarl_core.explaining.evidence_words import (
+    VERDICT_COLOURS,
+    evidence_text,
+    more_text,
+    verdict_counts,
+)
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.contradictions import by_episode, find_contradictions
 from sarl_core.mining.holding_out import Split, hold_out, lower_bound, more_episodes, with_held_out
-from tests.app.screens import ROUTER, metrics, open_page, texts
+from tests.app.screens import ROUTER, html, metrics, open_page, texts
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 HELD = {"data": "cartpole", "holdout": "0.2", "holdout_seed": "3"}
@@ -86,7 +91,7 @@ def test_junk_in_a_link_holds_nothing_out() -> None:
 def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() -> None:
     app = open_page("rules", **HELD)
     rules = sorted(tried().rules, key=lambda rule: -rule.samples)
-    assert evidence_text(rules[0]) in texts(app)
+    assert evidence_text(rules[0]) in html(app)
     table = app.dataframe[0].value
     assert [f"held out {text}" for text in table["Held out"]] == [
         evidence_text(rule).split(", ")[1] for rule in rules
@@ -97,7 +102,9 @@ def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() 
     app.number_input(key="lower").set_value(0.9).run()
     kept = [rule for rule in rules if lower_bound(rule) >= 0.9]
     assert 0 < len(app.dataframe[0].value) == len(kept) < len(rules)
-    assert f":red[{evidence_text(low)}" in texts(open_page("rules", **HELD, rule=low.id))
+    red = VERDICT_COLOURS["below"]
+    told = html(open_page("rules", **HELD, rule=low.id))
+    assert f'<p style="color:{red}">{evidence_text(low)}' in told
 
 
 def test_the_maps_have_a_held_out_layer() -> None:

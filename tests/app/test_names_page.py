@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from html import escape
 from typing import Any
 
 from streamlit.testing.v1 import AppTest
@@ -44,7 +45,9 @@ def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
     assert {tuple(action) for action in table["Action"]} == {("shove west",), ("push right",)}
     mined = mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95)
     largest = max(mined.rules, key=lambda rule: rule.samples)
-    assert f"Rule {largest.id} ·" in texts(app)
+    assert f"Rule {largest.id} ·" in html(app)
+    assert "lean &lt;b&gt;*of*&lt;/b&gt; the pole" in html(app)
+    assert "<b>*of*" not in html(app)
     assert table["States"].tolist() == sorted((r.samples for r in mined.rules), reverse=True)
 
     app.switch_page("carry.py").run()
@@ -58,7 +61,7 @@ def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
     assert "pole angle" in list(app.data_editor[0].value["Name"])
     assert app.button(key="names_back").disabled
     app.switch_page("rules.py").run()
-    assert sentence(largest, mined) in texts(app)
+    assert escape(sentence(largest, mined)) in html(app)
 
 
 def test_an_empty_or_doubled_name_is_refused_and_nothing_is_lost() -> None:
