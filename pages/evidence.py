@@ -6,9 +6,9 @@ import _compact
 import _hold_out
 import _state as state
 import streamlit as st
+from _contradictions_view import show_contradictions
 from _evidence_view import (
     Evidence,
-    show_contradictions,
     show_curve,
     show_enough,
     show_overview,
@@ -111,7 +111,7 @@ elif stability.open:
         show_stability(evidence)
 elif contradictions.open:
     with contradictions:
-        show_contradictions(evidence)
+        show_contradictions(evidence.parts.remaining, evidence.rule_set)
 elif left_out.open:
     with left_out:
         st.caption(
