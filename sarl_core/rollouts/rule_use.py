@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.rule_tree import tree_of
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.shielding.shield import Shield
 
@@ -93,7 +92,7 @@ def rule_use(episodes: Episodes, shield: Shield) -> RuleUse:
             cells = rules[rows] * shape[1] + steps.episode[rows]
             counts += np.bincount(cells, minlength=counts.size).reshape(shape)
     matters = changed > 0
-    for index in _with_successors(shield):
+    for index in shield.scanned:
         matters[index] = _decides_otherwise(episodes, shield, index)
     return RuleUse(matched, changed, matters)
 
@@ -112,20 +111,6 @@ def without_rule(shield: Shield, index: int) -> Shield:
     rules[index] = replace(rules[index], enabled=False)
     rule_set = replace(shield.rule_set, rules=tuple(rules))
     return Shield(rule_set, projection=shield.projection, outside=shield.outside)
-
-
-def _with_successors(shield: Shield) -> list[int]:
-    """The rules in whose place another may apply when they are taken out.
-
-    Rules mined from one tree never overlap, so where one is taken out, none applies.
-    """
-    found = []
-    numbered = [entry for entry in enumerate(shield.rule_set.rules) if entry[1].enabled]
-    for dimension in range(len(shield.rule_set.actions)):
-        own = [entry for entry in numbered if entry[1].dimension == dimension]
-        one_tree = tree_of([entry for entry in own if not entry[1].placed]) is not None
-        found += [index for index, rule in own if rule.placed or not one_tree]
-    return found
 
 
 def _decides_otherwise(episodes: Episodes, shield: Shield, index: int) -> NDArray[np.bool_]:

@@ -70,6 +70,14 @@ class Matcher:
         # A file whose mined rules are not of one tree: what its order says, holds.
         return cls([*placed, *others], [NOTHING])
 
+    @property
+    def scanned(self) -> tuple[int, ...]:
+        """Indices of the rules that are tried one by one, in their order.
+
+        Where one of them is taken out, another may apply; where a rule of the tree is, none does.
+        """
+        return tuple(index for index, _ in self._scanned)
+
     def match(self, state: list[float]) -> tuple[int | None, float]:
         """The rule that applies to one state.
 

@@ -238,6 +238,14 @@ class Shield:
         )
 
     @property
+    def scanned(self) -> tuple[int, ...]:
+        """The rules in whose place another may apply when they are taken out.
+
+        Rules mined from one tree never overlap, so where one is taken out, none applies.
+        """
+        return tuple(index for matcher in self._matchers for index in matcher.scanned)
+
+    @property
     def keeps_boxes(self) -> bool:
         """Whether any of the rules says where its pairs lay; else none is ever outside."""
         return self._boxes.count > 0
