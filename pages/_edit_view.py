@@ -6,6 +6,7 @@ from typing import Any
 
 import _edits
 import _state as state
+import numpy as np
 import streamlit as st
 from _edits import Base
 from _rule_table import action_column, table_height
@@ -139,10 +140,12 @@ def _text(rule: Rule, rule_set: RuleSet) -> tuple[str, str]:
 def in_order(rule_set: RuleSet) -> list[int]:
     """Places of the rules, the placed ones in their order, then the largest first."""
     rules = rule_set.rules
-    return sorted(
-        range(len(rules)),
-        key=lambda at: (0, at) if rules[at].placed else (1, -rules[at].samples),
-    )
+    placed = [at for at, rule in enumerate(rules) if rule.placed]
+    samples = np.array([rule.samples for rule in rules])
+    samples[placed] = 0
+    largest = np.argsort(-samples, kind="stable").tolist()
+    first = set(placed)
+    return placed + [at for at in largest if at not in first] if placed else largest
 
 
 def table(of: Base, found: Verdicts) -> Rule | None:
