@@ -186,13 +186,12 @@ def _counted(rule_set: RuleSet, rule: Rule, demonstrations: Demonstrations) -> R
     samples = int(holds.sum())
     if not samples:
         return rule
-    confidence = float(carries[holds].mean())
-    share = float(carries.mean())
+    correct, labelled = int(carries[holds].sum()), int(carries.sum())
     return replace(
         rule,
         support=samples / len(demonstrations),
-        confidence=confidence,
-        lift=confidence / share if share else 0.0,
+        confidence=correct / samples,
+        lift=correct * len(demonstrations) / (samples * labelled) if labelled else 0.0,
         samples=samples,
         demonstrated_value=float(np.median(values[holds])) if dimension.is_interval else None,
         box=box_of(rule, demonstrations.observations),

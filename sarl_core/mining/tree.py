@@ -137,11 +137,12 @@ class PolicyTree:
 
     @cached_property
     def lift(self) -> NDArray[np.float64]:
-        """Confidence over the label's share of all pairs, (n,)."""
-        shares = self.counts[0] / self.samples[0]
-        of_label = shares[self.label]
+        """Confidence over the label's share of all pairs, 0 where no pair carries it, (n,)."""
+        # One quotient of whole numbers, and so the float nearest to it: with two, a lift of 11/10
+        # may come out below 1.1.
+        expected = self.samples * self.counts[0][self.label]
         lift = np.zeros(self.n_nodes)
-        np.divide(self.confidence, of_label, out=lift, where=of_label > 0)
+        np.divide(self.correct * self.samples[0], expected, out=lift, where=expected > 0)
         return lift
 
     @cached_property

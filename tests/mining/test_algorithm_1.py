@@ -242,3 +242,14 @@ def test_a_root_that_qualifies_is_one_rule_without_condition():
     assert (rules[0].conditions, rules[0].action, rules[0].samples) == ((), 1, 10)
     assert rules[0].confidence == 0.9
     assert rules[0].joint_support == pytest.approx(0.9)
+
+
+def test_a_lift_of_exactly_the_minimum_is_enough() -> None:
+    """3 of 5 against 3 of 8 is 1.6; the quotient of the two shares is a float below it."""
+    assert (3 / 5) / (3 / 8) < 1.6
+    values = np.repeat(np.float32([0, 1]), [5, 3])
+    pairs = Demonstrations(values[:, None], np.repeat([1, 0], [3, 5]), np.zeros(8, dtype=np.int64))
+    (rule,) = mine_rules(pairs, supp_min=0.5, conf_min=0.6, lift_min=1.6).rules
+    assert (rule.samples, rule.correct, rule.lift) == (5, 3, 1.6)
+    trees = grow_policy_trees(pairs)
+    assert threshold_landscape(trees, [0.5], [0.6], lift_min=1.6).rule_count.tolist() == [[1]]
