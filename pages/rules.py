@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import _compact
@@ -19,6 +20,7 @@ from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet
 
 TABLE_ROWS = 8
+EVERY = "every action"
 MEASURES = """
 **Support**: share of all states to which the rule applies.
 
@@ -38,14 +40,38 @@ thresholds = state.chosen_thresholds()
 grown = state.trees(demonstrations, state.chosen_divider()) if compact is None else compact.trees
 
 
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """The rules of the table.
+
+    Attributes:
+        rules: The most support first.
+        table: The same as an Arrow table, which takes no time to send.
+        does: What each says.
+        lower: The lower bound of each.
+    """
+
+    rules: tuple[Rule, ...]
+    table: Any
+    does: tuple[str, ...]
+    lower: tuple[float, ...]
+
+
 @st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
-def table_of(key: tuple[object, ...], _rule_set: RuleSet) -> tuple[tuple[Rule, ...], Any]:
-    """All rules, the most support first, and the same as a data frame."""
+def listed_of(key: tuple[object, ...], _rule_set: RuleSet) -> Listed:
+    """All rules, ready to be filtered."""
+    import pyarrow as pa
+
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
-    return rules, frame(rules, _rule_set)
+    return Listed(
+        rules,
+        pa.Table.from_pandas(frame(rules, _rule_set), preserve_index=False),
+        tuple(action_text(rule.action, _rule_set.actions[rule.dimension]) for rule in rules),
+        tuple(map(lower_bound, rules)),
+    )
 
 
-def downloads(rule_set: RuleSet) -> None:
+def downloads(count: int, make_set: Callable[[], RuleSet]) -> None:
     """The whole rule set as files, made when asked for."""
     name = f"rules-{demonstrations.env_id.replace('/', '-') or 'unnamed'}"
     for kind, mime, make in (
@@ -56,13 +82,13 @@ def downloads(rule_set: RuleSet) -> None:
         suffix = "txt" if kind == "Text" else kind.lower()
         st.download_button(
             kind,
-            data=partial(make, rule_set),
+            data=lambda make=make: make(make_set()),  # type: ignore[misc]
             mime=mime,
             file_name=f"{name}.{suffix}",
             on_click="ignore",
             icon=":material/download:",
             key=f"download_{suffix}",
-            help=f"All {len(rule_set):,} rules" if len(rule_set) != 1 else "The one rule",
+            help=f"All {count:,} rules" if count != 1 else "The one rule",
         )
 
 
@@ -113,7 +139,7 @@ def walk(shown: list[int], rules: tuple[Rule, ...], place: int | None) -> None:
             )
 
 
-def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
+def matching(listed: Listed, rule_set: RuleSet) -> list[int]:
     """Places of the rules that the search and the choice of action let through."""
     names = list(
         dict.fromkeys(
@@ -134,31 +160,28 @@ def matching(rules: tuple[Rule, ...], rule_set: RuleSet) -> list[int]:
         )
         action = st.selectbox(
             "Action",
-            ["every action", *names],
+            [EVERY, *names],
             key="action",
             bind="query-params",
             width=220,
             label_visibility="collapsed",
         )
         least = lower_bound_choice() if compact is None else 0.0
+        sure = [at for at, low in enumerate(listed.lower) if low >= least]
         if compact is not None:
-            downloads(compact.shipped)
+            downloads(len(compact.shipped), lambda: compact.shipped)
         else:
-            downloads(with_lower_bound(rule_set, least) if least else rule_set)
+            downloads(len(sure), lambda: with_lower_bound(rule_set, least) if least else rule_set)
     wanted = (words or "").lower().split()
-    places = []
-    for place, rule in enumerate(rules):
-        does = action_text(rule.action, rule_set.actions[rule.dimension])
-        if action not in ("every action", does):
-            continue
-        if least and lower_bound(rule) < least:
-            continue
-        if wanted:
-            text = f"{conditions_text(rule, rule_set)} {does} {rule.id}".lower()
-            if not all(word in text for word in wanted):
-                continue
-        places.append(place)
-    return places
+    places = sure if action == EVERY else [at for at in sure if listed.does[at] == action]
+    return [at for at in places if has(listed, at, rule_set, wanted)] if wanted else places
+
+
+def has(listed: Listed, at: int, rule_set: RuleSet, wanted: list[str]) -> bool:
+    """Whether a rule has all words of a search."""
+    rule = listed.rules[at]
+    text = f"{conditions_text(rule, rule_set)} {listed.does[at]} {rule.id}".lower()
+    return all(word in text for word in wanted)
 
 
 def lower_bound_choice() -> float:
@@ -186,12 +209,12 @@ def search_and_rules(rule_set: RuleSet) -> None:
         if compact is None
         else (compact.digest,)
     )
-    rules, table = table_of(key, rule_set)
-    shown = matching(rules, rule_set)
+    listed = listed_of(key, rule_set)
+    shown = matching(listed, rule_set)
     if shown:
-        table_and_rule(rules, table, shown, rule_set)
+        table_and_rule(listed, shown, rule_set)
     else:
-        state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
+        state.url_choice("rule", [rule.id for rule in listed.rules], listed.rules[0].id)
         st.info(
             "No rule matches the search; clear it, and the lower bound, to see all.",
             icon=":material/search_off:",
@@ -199,10 +222,9 @@ def search_and_rules(rule_set: RuleSet) -> None:
 
 
 @st.fragment
-def table_and_rule(
-    rules: tuple[Rule, ...], table: Any, shown: list[int], rule_set: RuleSet
-) -> None:
+def table_and_rule(listed: Listed, shown: list[int], rule_set: RuleSet) -> None:
     """The table of rules, and the chosen one: another choice runs this part alone."""
+    rules = listed.rules
     chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
     above, below = st.container(), st.container()
@@ -214,20 +236,15 @@ def table_and_rule(
             lambda: walk(shown, rules, place),
         )
     with above:
-        rule_rows(rules, table, shown, rule_set, place)
+        rule_rows(listed, shown, rule_set, place)
 
 
-def rule_rows(
-    rules: tuple[Rule, ...],
-    table: Any,
-    shown: list[int],
-    rule_set: RuleSet,
-    place: int | None,
-) -> None:
+def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | None) -> None:
     """The table of the rules that match, the chosen one selected."""
+    rules = listed.rules
     select_row(place)
     st.dataframe(
-        table.iloc[shown],
+        listed.table if len(shown) == len(rules) else listed.table.take(shown),
         hide_index=True,
         column_config=column_config(rule_set),
         height=table_height(len(shown), TABLE_ROWS),
