@@ -74,7 +74,7 @@ def edit(quick: bool) -> Iterable[Row]:
                 f"Edit, switch a rule off or on, {rules}",
                 f"edit?{query}",
                 partial(_button, selector=".st-key-edit_switch button"),
-                ("[data-testid=stMetric]", ".st-key-chosen_rule", TABLES),
+                (".st-key-numbers", ".st-key-chosen_rule", TABLES),
             ),
         )
 
@@ -116,7 +116,7 @@ def evidence(quick: bool) -> Iterable[Row]:
             "Evidence, another share held out",
             "evidence?holdout=0.2",
             partial(_arrow, name="Share of the episodes held out"),
-            (".st-key-verdicts", ".st-key-overview", ".st-key-enough", TABLES),
+            (".st-key-overview", ".st-key-enough", TABLES),
         ),
     )
 

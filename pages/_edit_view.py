@@ -21,6 +21,8 @@ from sarl_core.explaining.language import (
     sentence,
     share_text,
 )
+from sarl_core.explaining.number_cards import Number, number_cards
+from sarl_core.explaining.prose import note
 from sarl_core.mining.editing import Move, Pin, Remove, Switch, Unpin, peers_of
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet
@@ -90,28 +92,24 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
         ("Decided differently", f"{found.different:,}", ""),
         ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
     )
-    hints = (
+    meanings = (
         "Rules that are switched on",
         "Share of the states in which some rule applies",
         "Share of the covered states in which the expert did as the rule in force says",
         "States of which the edited set says something else than the unedited one",
         "States in which a placed rule overrules another that says something else",
     )
-    with st.container(horizontal=True, gap="small"):
-        for (label, value, was), hint in zip(shown, hints, strict=True):
-            st.metric(
-                label,
-                value,
-                delta=f"was {was}" if was and was != value else None,
-                delta_color="off",
-                delta_arrow="off",
-                border=True,
-                height="stretch",
-                width=176,
-                help=hint,
-            )
     told = change_text(found, before, after, states=noun)
-    st.caption(f"Against the unedited set: {escaped(told[:1].lower() + told[1:])}{where(of)}")
+    cards = [
+        Number(label, value, meaning, was if was != value else "")
+        for (label, value, was), meaning in zip(shown, meanings, strict=True)
+    ]
+    with st.container(key="numbers"):
+        st.html(
+            number_cards(cards, framed=True)
+            + '<div style="height:0.8rem"></div>'
+            + note(f"Against the unedited set: {told[:1].lower() + told[1:]}{where(of)}")
+        )
 
 
 def where(of: Base) -> str:

@@ -20,7 +20,9 @@ from sarl_core.explaining.evidence_tables import (
 )
 from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS, verdict_counts
 from sarl_core.explaining.language import counted, share_text
-from sarl_core.mining.holding_out import more_episodes
+from sarl_core.explaining.number_cards import Number, number_cards
+from sarl_core.explaining.prose import note
+from sarl_core.mining.holding_out import Verdict, more_episodes
 from sarl_core.mining.learning_curve import LearningCurve, learning_curve
 from sarl_core.mining.progress import Progress
 from sarl_core.mining.rules import Rule, RuleSet
@@ -87,51 +89,53 @@ def show_overview(evidence: Evidence) -> None:
     """All rules with their intervals, and how many of them reach the minimum confidence."""
     found, held_out = evidence.found, evidence.parts.held_out
     counts = verdict_counts(found.rules, found.threshold)
-    with st.container(horizontal=True, key="verdicts"):
-        st.metric("Rules", f"{len(found.rules):,}")
-        if held_out is not None:
-            tried = [rule.held_out for rule in found.rules if rule.held_out is not None]
-            samples = sum(one.samples for one in tried)
-            right = sum(one.correct for one in tried) / samples if samples else float("nan")
-            st.metric(
-                "Held-out fidelity",
-                share_text(right, decimals=1),
-                help="Share of the held-out states with a rule in which the expert did what it "
-                "says",
-            )
-        for name, hint in (
-            ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
-            ("open", "The minimum confidence lies within the interval: not enough is known"),
-            ("below", "The whole interval lies below the minimum confidence"),
-        ):
-            st.metric(VERDICTS[name].capitalize(), f"{counts[name]:,}", help=hint)
+    numbers = [Number("Rules", f"{len(found.rules):,}")]
+    if held_out is not None:
+        tried = [rule.held_out for rule in found.rules if rule.held_out is not None]
+        samples = sum(one.samples for one in tried)
+        right = sum(one.correct for one in tried) / samples if samples else float("nan")
+        meaning = "Share of the held-out states with a rule in which the expert did what it says"
+        numbers.append(Number("Held-out fidelity", share_text(right, decimals=1), meaning))
+    meanings: tuple[tuple[Verdict, str], ...] = (
+        ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
+        ("open", "The minimum confidence lies within the interval: not enough is known"),
+        ("below", "The whole interval lies below the minimum confidence"),
+    )
+    numbers += [
+        Number(VERDICTS[name].capitalize(), f"{counts[name]:,}", meaning)
+        for name, meaning in meanings
+    ]
     ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
     words = (
         f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
         + ("grey: on what it was mined from &ensp; " if held_out is not None else "")
         + f"dotted: minimum confidence {found.threshold:g}"
     )
-    with st.container(key="overview"):
-        st.html(
-            _overview(evidence.key, found, evidence.rule_set)
-            + f"<div style='font-size:0.85rem;opacity:0.9;margin-top:0.6rem'>{words}</div>"
-        )
-    st.caption(
+    told = (
         "The intervals count every state for itself. Steps of one episode are alike, so what is "
         "known is a little less than they say."
     )
     if len(found.rules) > MOST_DRAWN:
-        st.caption(f"The {MOST_DRAWN} rules with the most support, of {len(found.rules):,}.")
+        told += f" Drawn: the {MOST_DRAWN} rules with the most support, of {len(found.rules):,}."
+    with st.container(key="overview"):  # one piece: each element of its own takes its time
+        st.html(
+            f"{number_cards(numbers)}<div style='height:1.2rem'></div>"
+            + _overview(evidence.key, found, evidence.rule_set)
+            + f"<div style='font-size:0.85rem;opacity:0.9;margin:0.6rem 0 0.9rem'>{words}</div>"
+            + note(told)
+        )
 
 
 def show_enough(evidence: Evidence) -> None:
     """How many more episodes each rule would take."""
     found = evidence.found
-    st.caption(
-        "How many more episodes until the lower end of a rule's interval would reach the minimum "
-        "confidence, if every further episode brought as many states of it as one did so far, as "
-        "often right. Where the confidence itself does not lie above the minimum, no number is "
-        "enough."
+    st.html(
+        note(
+            "How many more episodes until the lower end of a rule's interval would reach the "
+            "minimum confidence, if every further episode brought as many states of it as one did "
+            "so far, as often right. Where the confidence itself does not lie above the minimum, "
+            "no number is enough."
+        )
     )
     left, right = st.columns([2, 3], gap="medium")
     with left, st.container(key="enough"):

@@ -7,7 +7,7 @@ from _replays import Order, Replay, kept_forks, run_fork, with_progress
 from _words import escaped
 
 from sarl_core.explaining.fork_text import REST_TEXT, fork_text
-from sarl_core.explaining.headings import heading
+from sarl_core.explaining.prose import heading
 from sarl_core.rollouts.forking import Fork, Rest
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}

@@ -15,8 +15,8 @@ from _replays import Order, Replay, compared, kept_comparisons
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.headings import heading
 from sarl_core.explaining.language import action_text
+from sarl_core.explaining.prose import heading
 from sarl_core.explaining.recorder import (
     PAGE,
     filter_text,

@@ -16,9 +16,9 @@ from _tree_picture import show_tree
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.evidence import feature_evidence, path_steps
-from sarl_core.explaining.headings import heading
 from sarl_core.explaining.language import counted
 from sarl_core.explaining.path_table import path_table
+from sarl_core.explaining.prose import heading
 from sarl_core.explaining.rule_card import measures_text, rule_card
 from sarl_core.explaining.rule_examples import examples_html
 from sarl_core.explaining.rule_features import features_html

@@ -11,8 +11,8 @@ from _tree_picture import show_tree
 from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
-from sarl_core.explaining.headings import heading
 from sarl_core.explaining.lit_path import PathFinder, lit_path_table
+from sarl_core.explaining.prose import heading
 from sarl_core.explaining.what_if import node_of_way
 from sarl_core.explaining.what_if_figures import lines_html
 from sarl_core.explaining.what_if_html import (

@@ -26,7 +26,7 @@ from sarl_core.explaining.rule_figures import (
 )
 from sarl_core.mining.tree import PolicyTree
 
-_THINNEST = 1.0  # pixels: boxes that are narrower are drawn together
+_THINNEST = 1.5  # pixels: boxes that are narrower are drawn together
 _BOX = 0.92  # of a row's height
 _LEVELS = 9  # numbered at most
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.explaining.badges import BADGE_STYLE, badge
-from sarl_core.explaining.headings import heading
 from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
 from sarl_core.explaining.language import action_text, counted, number_text, sentence
+from sarl_core.explaining.prose import heading
 from sarl_core.explaining.what_if import (
     change_text,
     condition_views,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from html import unescape
 from pathlib import Path
 
 from streamlit.testing.v1 import AppTest
@@ -38,5 +40,8 @@ def errors(app: AppTest) -> list[str]:
 
 
 def metrics(app: AppTest) -> dict[str, str]:
-    """Every metric by its label."""
-    return {metric.label: metric.value for metric in app.metric}
+    """Every number on a card by its label."""
+    cards = re.findall(r"<dt>(.*?)</dt><dd>(.*?)(?:<small>.*?</small>)?</dd>", html(app))
+    return {metric.label: metric.value for metric in app.metric} | {
+        unescape(label): unescape(value) for label, value in cards
+    }

@@ -14,7 +14,7 @@ from sarl_core.mining.holding_out import hold_out
 from sarl_core.mining.manual_rules import Ask, manual_rule
 from sarl_core.mining.rule_files import rules_from_json, rules_to_json
 from sarl_core.mining.rules import RuleSet
-from tests.app.screens import ROUTER, errors, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -76,7 +76,7 @@ def test_each_edit_says_what_it_changes_and_every_step_is_undone() -> None:
     assert metrics(app)["Decided differently"] == f"{rule.samples:,}"
     assert metrics(app)["Rules in force"] == str(len(FILTERED) - 1)
     assert f"Undo: switch off {rule.id}" in labels(app)
-    assert f"{rule.samples:,} had a rule and now have none" in texts(app)
+    assert f"{rule.samples:,} had a rule and now have none" in html(app)
     click(app, "edit_pin")
     assert table(app)["Kind"].tolist()[0] == "pinned"
     assert "Unpin" in labels(app)
@@ -220,7 +220,7 @@ def test_rules_of_something_else_are_counted_on_random_states() -> None:
     app.file_uploader(key="edit_rule_file").set_value(("cart.json", content, "application/json"))
     app.run()
     assert not app.exception
-    assert "counted on random states" in texts(app)
+    assert "counted on random states" in html(app)
     assert metrics(app)["Fidelity"] == "–"
     click(app, "edit_switch")
     assert int(metrics(app)["Decided differently"].replace(",", "")) > 0

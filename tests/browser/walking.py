@@ -41,8 +41,11 @@ def settle(screen: Page) -> None:
 
 def metric(screen: Page, label: str) -> str:
     """The value of a metric."""
-    found = screen.get_by_test_id("stMetric").filter(has=screen.get_by_text(label, exact=True))
-    return found.first.get_by_test_id("stMetricValue").inner_text().strip()
+    own = screen.get_by_text(label, exact=True)
+    found = screen.get_by_test_id("stMetric").filter(has=own)
+    value = found.get_by_test_id("stMetricValue")
+    card = screen.locator(".sarl-numbers div").filter(has=own).locator("dd")
+    return value.or_(card).first.inner_text().strip()
 
 
 def parameters(screen: Page) -> dict[str, str]:
