@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import _tree_picture
 import streamlit as st
 from _compact import Compact
-from _tree_picture import show_tree
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
@@ -90,10 +90,28 @@ def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[
         )
     with right:
         place(rule, behind)
-    tree_digest = (tree.source.digest, tree.divider)
-    key = (*tree_digest, behind.digest, rule.id)
     with st.container(key="features"):
-        st.html(features_of(key, tree, rule, behind.demonstrations))
+        st.html(features_of(key_of(rule, behind), tree, rule, behind.demonstrations))
+
+
+def make_ready(rule: Rule, behind: Behind) -> None:
+    """Make what takes longest to make of a rule that may be looked at next."""
+    tree = behind.tree(rule)
+    features_of(key_of(rule, behind), tree, rule, behind.demonstrations)
+    _tree_picture.make_ready(
+        behind.digest,
+        tree,
+        behind.thresholds,
+        node_of(rule),
+        note=note_of(tree, behind),
+        leaves=behind.compact is not None,
+    )
+
+
+def key_of(rule: Rule, behind: Behind) -> tuple[object, ...]:
+    """What tells a rule from all others, those of other data included."""
+    tree = behind.tree(rule)
+    return tree.source.digest, tree.divider, behind.digest, rule.id
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
@@ -110,22 +128,26 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
 
 def place(rule: Rule, behind: Behind) -> None:
     """The path lit in the tree."""
-    tree, compact = behind.tree(rule), behind.compact
+    tree = behind.tree(rule)
     st.html(heading("Its place in the tree"))
-    note = f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
-        "Rules are full in colour, what is cut off below them is grey."
-        if compact is None
-        else "Every leaf is a rule, full in colour."
-    )
-    show_tree(
+    _tree_picture.show_tree(
         behind.digest,
         tree,
         behind.thresholds,
         node_of(rule),
         around="Around this rule",
         widget="tree",
-        note=note,
-        leaves=compact is not None,
+        note=note_of(tree, behind),
+        leaves=behind.compact is not None,
+    )
+
+
+def note_of(tree: PolicyTree, behind: Behind) -> str:
+    """What the boxes of a tree are."""
+    return f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
+        "Rules are full in colour, what is cut off below them is grey."
+        if behind.compact is None
+        else "Every leaf is a rule, full in colour."
     )
 
 

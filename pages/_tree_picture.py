@@ -54,7 +54,7 @@ def show_tree(
             required=True,
             label_visibility="collapsed",
         )
-    told = repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
+    told = _told(key, tree, thresholds)
     with st.container(key="tree_figure"):
         if view == WHOLE_TREE:
             st.plotly_chart(
@@ -70,6 +70,25 @@ def show_tree(
             )
         else:
             st.html(_place(told, node, note, leaves, dark, tree, thresholds))
+
+
+def make_ready(
+    key: object,
+    tree: PolicyTree,
+    thresholds: Thresholds,
+    node: int,
+    *,
+    note: str,
+    leaves: bool,
+) -> None:
+    """Make what `show_tree` shows first, for when it is asked for; its arguments are the same."""
+    if tree.samples[node]:
+        told = _told(key, tree, thresholds)
+        _place(told, node, note, leaves, state.is_dark(), tree, thresholds)
+
+
+def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
+    return repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
 
 
 @st.cache_resource(max_entries=48, show_spinner=False)

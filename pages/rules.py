@@ -11,7 +11,7 @@ import _edits
 import _state as state
 import streamlit as st
 from _rule_table import column_config, frame, table_height
-from _rule_view import Behind, show_rule
+from _rule_view import Behind, make_ready, show_rule
 
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import action_text, conditions_text
@@ -227,16 +227,21 @@ def table_and_rule(listed: Listed, shown: list[int], rule_set: RuleSet) -> None:
     rules = listed.rules
     chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
+    behind = Behind(demonstrations, grown, thresholds, compact)
     above, below = st.container(), st.container()
     with below:  # the rule is what was asked for, and a large table takes its time
         show_rule(
             next(rule for rule in rules if rule.id == chosen_id),
             rule_set,
-            Behind(demonstrations, grown, thresholds, compact),
+            behind,
             lambda: walk(shown, rules, place),
         )
     with above:
         rule_rows(listed, shown, rule_set, place)
+    # What the buttons lead to is made while nobody waits for it.
+    for other in (1, -1) if place is not None else ():
+        if 0 <= place + other < len(shown):
+            make_ready(rules[shown[place + other]], behind)
 
 
 def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | None) -> None:
