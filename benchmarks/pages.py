@@ -128,7 +128,6 @@ def rules(quick: bool) -> Iterable[Row]:
         ".sarl-path",
         ".st-key-tree_figure",
         ".st-key-features",
-        ".st-key-examples",
         TABLES,
     )
     yield from _rows(

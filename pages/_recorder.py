@@ -230,8 +230,8 @@ def coloured(recorded: Recorded) -> bool:
 
 
 def frame(recorded: Recorded, rows: NDArray[np.int64]) -> Any:
-    """Some rows as a data frame."""
-    import pandas as pd
+    """Some rows as an Arrow table, which is what the browser is sent."""
+    import pyarrow as pa
 
     replay = recorded.replay
     columns = recorder_columns(
@@ -246,7 +246,7 @@ def frame(recorded: Recorded, rows: NDArray[np.int64]) -> Any:
         for name in columns:
             if name.lower().endswith(("wanted", "done")):
                 columns[name] = [[action] for action in columns[name]]  # shown in its colour
-    return pd.DataFrame(columns)
+    return pa.table(columns)
 
 
 def column_config(recorded: Recorded) -> dict[str, Any]:

@@ -254,7 +254,7 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
-        seen = picture(replay.film.png(current), f"The environment at step {current}")
+        seen = picture(replay.png(current), f"The environment at step {current}")
         if replay.finder is not None:
             tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
             many = len(tables) > 1
@@ -270,6 +270,10 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
     if shielded:
         fork_section(replay, order, current)
     flight_recorder(replay, order, current)
+    # The pictures beside it are made while nobody waits for them.
+    for step in (current + 1, current - 1):
+        if 0 <= step <= last:
+            replay.png(step)
 
 
 def flips_text(episodes: Episodes) -> str:

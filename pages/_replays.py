@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -36,6 +36,7 @@ from sarl_core.shielding.shield import Outside, Projection, Shield
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
+KEPT_PICTURES = 64  # of a replay, some 30 kB each
 
 Told = Callable[[float, str], None]
 
@@ -79,6 +80,11 @@ class Replay:
     def shown(self) -> Episodes:
         """The episode that is gone through step by step."""
         return self.film.episodes[0]
+
+    @cached_property
+    def png(self) -> Callable[[int], bytes]:
+        """Gives the picture of a step as a file; the latest are kept."""
+        return lru_cache(KEPT_PICTURES)(self.film.png)
 
     @cached_property
     def finder(self) -> PathFinder | None:

@@ -89,7 +89,7 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
 
 
 def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
-    """Rules as a data frame, its index their place in the order given."""
+    """Rules as a data frame, in the order given."""
     import pandas as pd
 
     columns = rule_columns(rules, rule_set)

@@ -21,16 +21,6 @@ from sarl_core.mining.rules import Rule, RuleSet
 
 TABLE_ROWS = 8
 EVERY = "every action"
-MEASURES = """
-**Support**: share of all states to which the rule applies.
-
-**Confidence**: share of those in which the expert did what the rule says.
-
-**Lift**: confidence over the action's share of all states; above 1, the conditions make the action
-more frequent than it is overall.
-
-**Joint support**: share of all states to which the rule applies and in which it is right.
-"""
 
 st.title("Rules")
 _edits.notice()
@@ -263,8 +253,7 @@ def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | 
     count = f"{len(rules):,} {kind}rules" if len(rules) > 1 else f"One {kind}rule"
     st.caption(
         (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
-        + "Click a heading to sort, the box at the left of a row to see the rule below.",
-        help=MEASURES,
+        + "Click a heading to sort, the box at the left of a row to see the rule below."
     )
 
 

@@ -63,6 +63,6 @@ def faded(colour: str, opacity: float) -> str:
         opacity: 0 to 1.
 
     Returns:
-        As "#0072B24D".
+        As "#0072B24C".
     """
     return f"{colour}{round(255 * opacity):02X}"

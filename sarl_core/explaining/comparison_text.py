@@ -57,7 +57,7 @@ def verdict_on_all(agent: str, alone: Episodes, shielded: Sequence[tuple[str, Ep
     Returns:
         As "With the unfiltered rules the typical return of the novice rises from 22 to 500, and
         0 % instead of 100 % of its episodes end in a crash; with the filtered rules it rises to
-        305 (75 % crashes)."
+        305 (75 % of its episodes crash)."
     """
     best, *others = sorted(shielded, key=lambda pair: pair[1].statistics.iqm, reverse=True)
     first = verdict(agent, best[0], alone, best[1]).removesuffix(".")
@@ -70,10 +70,10 @@ def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     notes = []
     if failure_known(alone.env_id):
         rates = [crash_rate(episodes, episodes.env_id) for episodes in (alone, shielded)]
-        notes = [f"{share_text(rates[1])} crashes"] if any(rates) else []
+        notes = [f"{share_text(rates[1])} of its episodes crash"] if any(rates) else []
     change = clear_change(alone, shielded)
     if not change:
-        return f"with {shield} it does not clearly change ({', '.join([after, *notes])})"
+        return f"with {shield} it does not clearly change ({'; '.join([after, *notes])})"
     note = f" ({notes[0]})" if notes else ""
     return f"with {shield} it {'rises' if change > 0 else 'falls'} to {after}{note}"
 

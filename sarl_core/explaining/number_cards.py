@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import NamedTuple
 
@@ -16,6 +16,8 @@ _STYLE = """<style>
 .sarl-numbers dd { font-size: 1.6rem; line-height: 1.35; margin: 0; white-space: nowrap;
   font-variant-numeric: tabular-nums; }
 .sarl-numbers small { display: block; font-size: 0.8rem; line-height: 1.4; opacity: 0.7; }
+</style>"""
+_MEANINGS_STYLE = """<style>
 .sarl-meanings { font-size: 0.875rem; margin: 0.6rem 0 0; }
 .sarl-meanings summary { cursor: pointer; opacity: 0.7; width: fit-content; }
 .sarl-meanings p { margin: 0.25rem 0 0; }
@@ -54,19 +56,29 @@ def number_cards(numbers: Sequence[Number], *, framed: bool = False) -> str:
         + "</dd></div>"
         for one in numbers
     )
-    meanings = "".join(
-        f"<p><b>{escape(one.label)}</b>: {escape(one.meaning)}.</p>"
-        for one in numbers
-        if one.meaning
-    )
-    told = (
-        f'<details class="sarl-meanings"><summary>What these numbers mean</summary>{meanings}'
-        "</details>"
-        if meanings
-        else ""
-    )
     look = "sarl-numbers framed" if framed else "sarl-numbers"
+    told = meanings({one.label: one.meaning for one in numbers if one.meaning})
     return f'{_STYLE}<dl class="{look}">{cards}</dl>{told}'
+
+
+def meanings(found: Mapping[str, str]) -> str:
+    """What numbers mean, one click away.
+
+    Args:
+        found: What each number is called, and what it counts.
+
+    Returns:
+        HTML without script; "" where there is nothing to say.
+    """
+    if not found:
+        return ""
+    told = "".join(
+        f"<p><b>{escape(label)}</b>: {escape(meaning)}.</p>" for label, meaning in found.items()
+    )
+    return (
+        f'{_MEANINGS_STYLE}<details class="sarl-meanings">'
+        f"<summary>What these numbers mean</summary>{told}</details>"
+    )
 
 
 def _tip(meaning: str) -> str:

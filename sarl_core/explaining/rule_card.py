@@ -11,6 +11,7 @@ from sarl_core.explaining.evidence_words import (
     intervals_text,
 )
 from sarl_core.explaining.language import counted, sentence, share_text
+from sarl_core.explaining.number_cards import meanings
 from sarl_core.mining.holding_out import verdict
 from sarl_core.mining.rules import Rule, RuleSet
 
@@ -20,6 +21,15 @@ _STYLE = """<style>
 .sarl-rule p { font-size: 0.875rem; line-height: 1.5; margin: 0 0 0.35rem; }
 .sarl-rule .quiet { opacity: 0.7; }
 </style>"""
+_MEANINGS = meanings(
+    {
+        "Support": "Share of all states to which the rule applies",
+        "Confidence": "Share of those in which the expert did what the rule says",
+        "Lift": "Confidence over the action's share of all states; above 1, the conditions make "
+        "the action more frequent than it is overall",
+        "Joint support": "Share of all states to which the rule applies and in which it is right",
+    }
+)
 
 
 def measures_text(rule: Rule) -> str:
@@ -61,6 +71,8 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> str:
     ]
     if reached and threshold is not None:
         parts += [_sureness(rule, threshold), evidence_bar(rule, threshold)]
+    if reached:
+        parts.append(_MEANINGS)
     return f'{_STYLE}<div class="sarl-rule">{"".join(parts)}</div>'
 
 
@@ -68,5 +80,7 @@ def _sureness(rule: Rule, threshold: float) -> str:
     """How sure the rule is, on what it was mined from and on what was held out."""
     words = escape(f"{evidence_text(rule)} · {intervals_text(rule)}")
     if rule.held_out is not None and verdict(rule, threshold) == "below":
-        return f'<p style="color:{VERDICT_COLOURS["below"]}">{words}; too low</p>'
+        # Mixed with the ink of the page, so that it can be read on white and on black.
+        ink = f"color-mix(in srgb, {VERDICT_COLOURS['below']} 75%, currentColor)"
+        return f'<p style="color:{ink}">{words}; too low</p>'
     return f'<p class="quiet">{words}</p>'

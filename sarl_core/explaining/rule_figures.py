@@ -19,7 +19,7 @@ from sarl_core.mining.tree import LEAF, PolicyTree
 MAX_BOXES = 2000  # more take a browser the better part of a second
 _HOVERS = 400
 WIDTH = 620  # pixels that the boxes have on a wide screen
-HIT = 8.0  # pixels: what is narrower is not met by the pointer
+HIT = 4.0  # pixels: what is narrower is not met by the pointer
 _NEIGHBOURHOOD = 30  # "around" a rule is what is at most so many times as wide
 
 

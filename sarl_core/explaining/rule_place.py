@@ -17,7 +17,6 @@ from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, lab
 from sarl_core.explaining.html_plot import round_ticks, tick_text
 from sarl_core.explaining.language import counted, label_text
 from sarl_core.explaining.rule_figures import (
-    HIT,
     WIDTH,
     below_rules,
     node_lines,
@@ -26,6 +25,7 @@ from sarl_core.explaining.rule_figures import (
 )
 from sarl_core.mining.tree import PolicyTree
 
+_HIT = 8.0  # pixels: what is narrower is not met by the pointer
 _THINNEST = 1.5  # pixels: boxes that are narrower are drawn together
 _BOX = 0.92  # of a row's height
 _LEVELS = 9  # numbered at most
@@ -200,7 +200,7 @@ def _line(points: Sequence[tuple[float, float]], half: float, css: str) -> str:
 def _hits(tree: PolicyTree, nodes: NDArray[np.int64], window: tuple[int, int, int, int]) -> str:
     """What is said of the boxes that are wide enough to point at."""
     left, right, top, bottom = window
-    wide = nodes[tree.samples[nodes] >= (right - left) * HIT / WIDTH]
+    wide = nodes[tree.samples[nodes] >= (right - left) * _HIT / WIDTH]
     parts = []
     for node in wide.tolist():
         start = max(int(tree.sample_start[node]), left)

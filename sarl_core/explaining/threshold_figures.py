@@ -14,7 +14,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
-from sarl_core.explaining.language import number_text
+from sarl_core.explaining.language import number_text, share_text
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.mining.landscape import Landscape
@@ -82,7 +82,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         "tickfont": {"size": 11},
         "nticks": 6,
     }
-    least = (_least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0) or 0
+    least = _least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0.0
     if style.share:
         bar |= share_ticks(least, 1)
     shown = values
@@ -297,12 +297,13 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
     return figure
 
 
-def _least(landscape: Landscape) -> float | None:
-    """Where the colours of both fidelities begin, so that they can be compared; None: anywhere."""
-    if landscape.held_out_fidelity is None:
-        return None
-    both = np.stack([landscape.fidelity, landscape.held_out_fidelity])
-    return float(np.nanmin(both)) if np.isfinite(both).any() else None
+def _least(landscape: Landscape) -> float:
+    """Where the colours of a fidelity begin, and of both where there are two, to compare them."""
+    both = [landscape.fidelity]
+    if landscape.held_out_fidelity is not None:
+        both.append(landscape.held_out_fidelity)
+    values = np.stack(both)
+    return float(np.nanmin(values)) if np.isfinite(values).any() else 0.0
 
 
 def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
@@ -325,8 +326,8 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
                 confidence,
                 count,
                 f"{length:.1f}",
-                f"{100 * share:.1f} %",
-                f"{100 * truth:.1f} %" if truth == truth else "–",
+                share_text(share, decimals=1),
+                share_text(truth, decimals=1),
                 other,
             ]
             for confidence, count, length, share, truth, other in zip(
@@ -341,7 +342,7 @@ def _held_out_words(landscape: Landscape) -> list[list[str]]:
     if landscape.held_out_fidelity is None:
         return [[""] * len(landscape.confidences)] * len(landscape.supports)
     return [
-        [f", held out {100 * value:.1f} %" if value == value else ", held out –" for value in row]
+        [f", held out {share_text(value, decimals=1)}" for value in row]
         for row in landscape.held_out_fidelity.tolist()
     ]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
@@ -22,6 +22,8 @@ from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rul
 from sarl_core.shielding.shield import Shield
 
 LEAST_EPISODES = 2  # a difference that was seen once says nothing about the next
+
+_TOGETHER = 32  # rules whose episodes are handed over at once: the processes wait between
 
 Runner = Callable[[Sequence[Task]], Iterator[Found]]
 """Runs tasks, as `WorkerPool.run` does."""
@@ -98,23 +100,33 @@ class AblationRecord:
         use = use.part(0, episodes)
         chosen, _ = rules_to_take_out(use, most)
         matters = {rule: np.flatnonzero(use.matters[rule]).tolist() for rule in chosen}
-        missing: dict[int, tuple[int, ...]] = {}
+        total = episodes + sum(map(len, matters.values()))
+        yield Step(total - self._open(matters), total, "Taking rules out …")
+        for first in range(0, len(chosen), _TOGETHER):
+            # What another caller has found meanwhile is not run again.
+            missing = self._missing({rule: matters[rule] for rule in chosen[first:][:_TOGETHER]})
+            owners = list(missing)
+            tasks = [self._task(episodes, rule, which) for rule, which in missing.items()]
+            for piece in _pieces(runner(tasks)):
+                rule = owners[piece.task]
+                assert isinstance(piece.result, Episodes)
+                self._keep(rule, piece.result)
+                place = chosen.index(rule) + 1
+                done = total - self._open(matters)
+                yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+
+    def _missing(self, matters: Mapping[int, Sequence[int]]) -> dict[int, tuple[int, ...]]:
+        """The episodes that are to be run without each rule, where there are any."""
+        missing = {}
         for rule, places in matters.items():
             known = self._known(rule)
             if which := tuple(place for place in places if place not in known):
                 missing[rule] = which
-        owners = list(missing)
-        total = episodes + sum(map(len, matters.values()))
-        done = total - sum(map(len, missing.values()))
-        yield Step(done, total, "Taking rules out …")
-        tasks = [self._task(episodes, rule, which) for rule, which in missing.items()]
-        for piece in _pieces(runner(tasks)):
-            rule = owners[piece.task]
-            assert isinstance(piece.result, Episodes)
-            self._keep(rule, piece.result)
-            done += len(piece.result)
-            place = chosen.index(rule) + 1
-            yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+        return missing
+
+    def _open(self, matters: Mapping[int, Sequence[int]]) -> int:
+        """How many episodes are still to be run."""
+        return sum(map(len, self._missing(matters).values()))
 
     def _task(self, episodes: int, rule: int, which: tuple[int, ...]) -> Task:
         return Task(

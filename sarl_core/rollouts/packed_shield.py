@@ -7,14 +7,13 @@ shield and say which rule is out, and a process keeps what it has unpacked.
 
 from __future__ import annotations
 
-import pickle
 from functools import lru_cache
 from typing import NamedTuple
 
 from sarl_core.rollouts.rule_use import without_rule
 from sarl_core.shielding.shield import Shield
 
-_MOST_KEPT = 4  # callers whose work alternates in a process
+_MOST_KEPT = 4  # callers whose work alternates in a process, and rules that are out by turns
 
 
 class PackedShield(NamedTuple):
@@ -61,7 +60,9 @@ def unpack(packed: PackedShield) -> Shield:
 
 @lru_cache(_MOST_KEPT)
 def _whole(content: bytes) -> Shield:
-    shield: Shield = pickle.loads(content)
+    from joblib.externals.loky.backend.reduction import loads
+
+    shield: Shield = loads(content)
     return shield
 
 

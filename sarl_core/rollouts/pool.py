@@ -68,6 +68,10 @@ class Task:
                 f"{self.episodes} episodes from seed {self.seed} cannot be run; give at least "
                 "one episode, and a seed of 0 or more"
             )
+        if self.which is not None and not set(self.which) <= set(range(self.episodes)):
+            raise InputError(
+                f"episodes {self.which} are not among the {self.episodes} there are; choose of them"
+            )
 
     @cached_property
     def seeds(self) -> NDArray[np.int64]:
@@ -261,9 +265,9 @@ def _work(
     keep_steps: bool,
 ) -> tuple[Episodes, float]:
     """Run one piece and say how long it took; in a process."""
-    in_force = None if shield is None else unpack(shield)
     start = time.perf_counter()
     try:
+        in_force = None if shield is None else unpack(shield)
         episodes = run_seeds(env_id, agent, in_force, seeds, keep_steps=keep_steps)
     except SarlError:
         raise

@@ -102,9 +102,9 @@ def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() 
     app.number_input(key="lower").set_value(0.9).run()
     kept = [rule for rule in rules if lower_bound(rule) >= 0.9]
     assert 0 < len(app.dataframe[0].value) == len(kept) < len(rules)
-    red = VERDICT_COLOURS["below"]
     told = html(open_page("rules", **HELD, rule=low.id))
-    assert f'<p style="color:{red}">{evidence_text(low)}' in told
+    red = f"{VERDICT_COLOURS['below']} 75%, currentColor"
+    assert f'{red})">{evidence_text(low)}' in told
 
 
 def test_the_maps_have_a_held_out_layer() -> None:

@@ -53,8 +53,9 @@ def test_every_shield_is_told_the_best_one_first(alone: Episodes) -> None:
     assert verdict_on_all("novice", alone, shielded) == (
         "With the unfiltered rules the typical return of the novice rises from 22 to 500, and 0 % "
         "instead of 100 % of its episodes end in a crash; with the filtered rules it rises to 305 "
-        "(75 % crashes); with the compact rules it does not clearly change (22, 100 % crashes); "
-        "with the coarse rules it falls to 9 (100 % crashes)."
+        "(75 % of its episodes crash); with the compact rules it does not clearly change (22; "
+        "100 % of its episodes crash); "
+        "with the coarse rules it falls to 9 (100 % of its episodes crash)."
     )
     safe = with_returns(alone, [500.0] * 8, 0)
     told = verdict_on_all("expert", safe, [("the rules", safe), ("the filtered rules", safe)])

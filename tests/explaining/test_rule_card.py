@@ -40,7 +40,7 @@ def test_a_card_says_the_rule_and_its_numbers_with_names_escaped(pushed: RuleSet
 
 def test_a_rule_that_held_out_episodes_refute_is_told_in_red(pushed: RuleSet) -> None:
     rule = max(pushed.rules, key=lambda one: one.samples)
-    red = f'<p style="color:{VERDICT_COLOURS["below"]}">'
+    red = f'<p style="color:color-mix(in srgb, {VERDICT_COLOURS["below"]} '
     refuted = replace(rule, held_out=HeldOut(100, 40))
     card = rule_card(refuted, pushed, threshold=0.8)
     assert red in card
