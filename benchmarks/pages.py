@@ -134,10 +134,17 @@ def rules(quick: bool) -> Iterable[Row]:
         quick,
         Control("Rules, next rule", "rules", _there_and_back, watched),
         Control(
-            "Rules, next rule, never seen before, unfiltered",
+            "Rules, next rule for the first time (made ready before), unfiltered",
             f"rules?{UNFILTERED}",
             partial(_button, selector="button:has-text('Next rule')"),
             watched,
+        ),
+        Control(
+            "Rules, a rule far down the table for the first time, unfiltered (sent 150 ms later)",
+            f"rules?{UNFILTERED}",
+            partial(_far_row, selector=".st-key-rule_table"),
+            watched,
+            reach=TABLE_WAIT + REACH,
         ),
         Control(
             "Rules, another rule, a row of the table (which waits 150 ms before it sends it)",
@@ -285,6 +292,16 @@ def _table_row(page: Page, move: int, *, selector: str) -> Release:
     table = page.locator(f"{selector} [data-testid=stDataFrameResizable]").first
     table.scroll_into_view_if_needed()
     _point(page, table, 15, 1 + move % 5)
+    return lambda: _press(page)
+
+
+def _far_row(page: Page, _: int, *, selector: str) -> Release:
+    """The box of a row that is thirty rows further down every time."""
+    table = page.locator(f"{selector} [data-testid=stDataFrameResizable]").first
+    table.scroll_into_view_if_needed()
+    _point(page, table, 15, 3)
+    page.mouse.wheel(0, 30 * ROW)
+    page.wait_for_timeout(600)
     return lambda: _press(page)
 
 

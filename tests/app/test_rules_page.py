@@ -1,13 +1,19 @@
 from __future__ import annotations
 
 import json
+import sys
 from html import escape
+from typing import Any
 
 import pytest
+import streamlit as st
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import RuleSet, load_demonstrations, mine_rules
+from sarl_core import Demonstrations, PolicyTree, RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.language import sentence
+from sarl_core.explaining.rule_examples import examples_html
+from sarl_core.explaining.rule_place import place_html
+from sarl_core.mining.rules import Rule
 from tests.app.screens import ROUTER, html, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
@@ -118,6 +124,37 @@ def test_buttons_go_from_rule_to_rule_in_the_order_of_the_table() -> None:
         assert chosen_row(app) == [place]
     assert app.button(key="previous").disabled
     assert "rule" not in app.query_params
+
+
+def test_what_the_buttons_lead_to_is_made_before_they_are_pressed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: dict[str, list[object]] = {"around": [], "examples": []}
+
+    def place(tree: PolicyTree, cut: object, node: int, **rest: Any) -> str:
+        made["around"].append(node)
+        return place_html(tree, cut, node, **rest)  # type: ignore[arg-type]
+
+    def examples(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) -> str:
+        made["examples"].append(rule.id)
+        return examples_html(demonstrations, tree, rule)
+
+    monkeypatch.setattr("sarl_core.explaining.rule_place.place_html", place)
+    monkeypatch.setattr("sarl_core.explaining.rule_examples.examples_html", examples)
+    for name in ("_tree_picture", "_rule_view"):  # they are imported anew, and see the above
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    st.cache_resource.clear()
+    rules = mined("cartpole", 0.005, 0.95)
+    ordered = [rule.id for rule in sorted(rules.rules, key=lambda one: -one.samples)]
+    app = open_page("rules", data="cartpole")
+    assert made["examples"] == ordered[:2]
+    for place_in_table in (1, 2):
+        app.button(key="next").click().run()
+        # It was there already, and now the one behind it is.
+        assert made["examples"] == ordered[: place_in_table + 2]
+    app.button(key="previous").click().run()
+    assert made["examples"] == ordered[:4]
+    assert len(made["around"]) == len(set(made["around"])) == 4
 
 
 def test_buttons_and_the_selected_row_follow_the_search() -> None:

@@ -58,3 +58,21 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     screen.get_by_role("link", name="See the edited set").click()
     expect(screen.get_by_role("button", name="Undo: add manual.1")).to_be_visible()
     no_trace(screen)
+
+
+def test_another_second_set_is_compared_and_a_link_shows_the_same(screen: Page) -> None:
+    visit(screen, "/difference?data=cartpole", "Difference")
+    table = screen.locator(".st-key-confusion table")
+    expect(table).to_be_visible()
+    before = table.inner_text()
+    screen.get_by_role("combobox", name="Second set").click()
+    screen.get_by_role("option", name="compact", exact=True).click()
+    expect(table).not_to_have_text(before)
+    settle(screen)
+    now = table.inner_text()
+    assert now != before
+    assert parameters(screen)["second"] == "compact"
+    visit(screen, screen.url, "Difference")
+    expect(table).to_be_visible()
+    assert table.inner_text() == now
+    no_trace(screen)

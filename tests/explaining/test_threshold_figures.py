@@ -36,6 +36,16 @@ def test_a_map_has_a_cell_and_a_point_for_every_pair(
     json.loads(figure.to_json())
 
 
+def test_the_colours_of_fidelity_are_spread_over_what_is_there(paper: Landscape) -> None:
+    cells = figures.heatmap(paper, "fidelity").data[0]
+    assert cells.zmin == pytest.approx(np.nanmin(paper.fidelity))
+    assert cells.zmin > 0.3
+    ticks = np.array(cells.colorbar.tickvals)
+    assert len(ticks) > 1
+    assert ((ticks >= cells.zmin) & (ticks <= 1)).all()
+    assert figures.heatmap(paper, "coverage").data[0].zmin == 0
+
+
 def test_counts_are_coloured_by_powers_of_ten(paper: Landscape) -> None:
     cells = figures.heatmap(paper, "rule_count").data[0]
     assert np.allclose(10 ** np.asarray(cells.z).T - 1, paper.rule_count, rtol=1e-3, atol=1e-3)
