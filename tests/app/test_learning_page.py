@@ -184,7 +184,7 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
 
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
-    app = own("none", learn_steps="4000")
+    app = own("none", learn_steps="20000")  # so many that it cannot have ended when it is stopped
     app.button(key="learn_start").click().run()
     job = app.session_state["_learning"]
     for _ in range(600):
