@@ -57,9 +57,9 @@ def what_if(quick: bool) -> Iterable[Row]:
                 f"What if, a feature's slider, {rules}",
                 f"what_if?{query}",
                 partial(_arrow, name="angle (rad)"),
-                tuple(
-                    f".st-key-{part}"
-                    for part in ("decision", "lines", "changes", "misses", "tree_figure")
+                (
+                    *(f".st-key-{part}" for part in ("decision", "lines", "changes", "misses")),
+                    ".sarl-place",
                 ),
             ),
         )
@@ -124,10 +124,10 @@ def evidence(quick: bool) -> Iterable[Row]:
 def rules(quick: bool) -> Iterable[Row]:
     """Another rule, by its row and by a button, and a filter by the lower bound."""
     watched = (
-        ".st-key-sentence",
+        ".sarl-rule",
         ".sarl-path",
-        ".st-key-tree_figure",
-        ".st-key-features",
+        ".sarl-place",
+        ".sarl-features",
         TABLES,
     )
     yield from _rows(

@@ -90,8 +90,7 @@ def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[
         )
     with right:
         place(rule, behind)
-    with st.container(key="features"):
-        st.html(features_of(key_of(rule, behind), tree, rule, behind.demonstrations))
+    st.html(features_of(key_of(rule, behind), tree, rule, behind.demonstrations))
 
 
 def make_ready(rule: Rule, behind: Behind) -> None:

@@ -55,21 +55,20 @@ def show_tree(
             label_visibility="collapsed",
         )
     told = _told(key, tree, thresholds)
-    with st.container(key="tree_figure"):
-        if view == WHOLE_TREE:
-            st.plotly_chart(
-                _picture(told, node, leaves, dark, tree, thresholds),
-                key="tree_chart",
-                config={"displaylogo": False, "scrollZoom": True},
-                alt="The decision tree with the path lit",
-            )
-            st.caption(
-                note
-                + ("" if reached else " No state reaches its end, so the box has no width.")
-                + " Drag or scroll to zoom, double-click to go back."
-            )
-        else:
-            st.html(_place(told, node, note, leaves, dark, tree, thresholds))
+    if view == WHOLE_TREE:
+        st.plotly_chart(
+            _picture(told, node, leaves, dark, tree, thresholds),
+            key="tree_figure",
+            config={"displaylogo": False, "scrollZoom": True},
+            alt="The decision tree with the path lit",
+        )
+        st.caption(
+            note
+            + ("" if reached else " No state reaches its end, so the box has no width.")
+            + " Drag or scroll to zoom, double-click to go back."
+        )
+    else:
+        st.html(_place(told, node, note, leaves, dark, tree, thresholds))
 
 
 def make_ready(

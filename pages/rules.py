@@ -125,7 +125,6 @@ def walk(shown: list[int], rules: tuple[Rule, ...], place: int | None) -> None:
                 on_click=state.set_url_choice,
                 args=("rule", rule_id),
                 disabled=rule_id is None,
-                help="In the order of support, the most first",
             )
 
 
@@ -253,7 +252,8 @@ def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | 
     count = f"{len(rules):,} {kind}rules" if len(rules) > 1 else f"One {kind}rule"
     st.caption(
         (f"{len(shown):,} of {count.lower()} match. " if len(shown) < len(rules) else f"{count}. ")
-        + "Click a heading to sort, the box at the left of a row to see the rule below."
+        + "The most support first. Click a heading to sort, the box at the left of a row to see "
+        "the rule below."
     )
 
 
