@@ -139,10 +139,9 @@ def test_what_the_buttons_lead_to_is_made_before_they_are_pressed(
         made["examples"].append(rule.id)
         return examples_html(demonstrations, tree, rule)
 
-    monkeypatch.setattr("sarl_core.explaining.rule_place.place_html", place)
-    monkeypatch.setattr("sarl_core.explaining.rule_examples.examples_html", examples)
-    for name in ("_tree_picture", "_rule_view"):  # they are imported anew, and see the above
-        monkeypatch.delitem(sys.modules, name, raising=False)
+    open_page("rules", data="cartpole")  # the page's modules are there from now on
+    monkeypatch.setattr(sys.modules["_tree_picture"], "place_html", place)
+    monkeypatch.setattr(sys.modules["_rule_view"], "examples_html", examples)
     st.cache_resource.clear()
     rules = mined("cartpole", 0.005, 0.95)
     ordered = [rule.id for rule in sorted(rules.rules, key=lambda one: -one.samples)]
@@ -168,9 +167,8 @@ def test_buttons_and_the_selected_row_follow_the_search() -> None:
     assert escape(sentence(right[0], rules)) in html(app)
     assert app.button(key="previous").disabled
     app.selectbox(key="action").select("push left").run()
-    assert escape(sentence(right[0], rules)) in html(
-        app
-    )  # stays, though the table has no row for it
+    # It stays, though the table has no row for it.
+    assert escape(sentence(right[0], rules)) in html(app)
     assert chosen_row(app) == []
     assert app.button(key="previous").disabled
     app.button(key="next").click().run()
