@@ -6,6 +6,7 @@ policy by validation episodes is kept, and the card reports episodes never used 
 
 from __future__ import annotations
 
+import copy
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -229,7 +230,8 @@ def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm
     env: VecEnv = make_vec_env(env_id, n_envs=recipe.n_envs, seed=seed)
     if recipe.normalise:
         env = VecNormalize(env, gamma=recipe.gamma)
-    parameters = dict(recipe.parameters)
+    # A copy: the learner fills in what it was not told.
+    parameters = copy.deepcopy(dict(recipe.parameters))
     rate = parameters.get("learning_rate")
     if isinstance(rate, str):
         start = float(rate.removeprefix("linear:"))
@@ -310,7 +312,7 @@ def _card(
     return {
         "what": f"expert for {env_id}",
         "command": f"python -m sarl_core train-expert --env {env_id} --seed {seed} --steps {steps}"
-        f" --out data/experts/{out.name}",
+        f" --out {out.as_posix()}",
         "algorithm": recipe.algorithm,
         "policy": "MlpPolicy",
         "seed": seed,

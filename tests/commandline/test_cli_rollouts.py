@@ -158,7 +158,10 @@ def test_train_expert_writes_a_policy_that_evaluate_takes(run, tmp_path):
     text = run("train-expert", "--env", "CartPole-v1", "--steps", 1024, "--out", path)
     assert "mean return" in text
     assert MlpPolicy.load(path).env_id == "CartPole-v1"
-    assert json.loads(path.with_suffix(".json").read_text())["steps"] == 1024
+    card = json.loads(path.with_suffix(".json").read_text())
+    assert card["steps"] == 1024
+    # The command makes this file again, wherever it lies.
+    assert card["command"].endswith(f"--seed 0 --steps 1024 --out {path.as_posix()}")
     run("evaluate", "--env", "CartPole-v1", "--agent", path, "--episodes", 1)
 
 
