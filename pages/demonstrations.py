@@ -185,6 +185,23 @@ def overview(demonstrations: Demonstrations, found: Contents) -> None:
                 st.caption(f"… and {len(remarks) - 8} more.")
 
 
+def columns_section(demonstrations: Demonstrations) -> None:
+    """What each column of the file was taken for."""
+    if not demonstrations.columns:
+        return
+    with st.expander("What each column was taken for", icon=":material/view_column:"):
+        st.dataframe(
+            {
+                "Column": [one.column for one in demonstrations.columns],
+                "Taken for": [one.use for one in demonstrations.columns],
+                "Why": [one.why for one in demonstrations.columns],
+            },
+            hide_index=True,
+            height="content" if len(demonstrations.columns) <= 24 else 480,
+        )
+        st.caption("If one is wrong, open “Use your own demonstrations” above and map the columns.")
+
+
 def actions_section(demonstrations: Demonstrations, divider: int) -> None:
     """Which actions were taken, and how the episodes went."""
     returns, lengths = episode_figures(demonstrations.digest, demonstrations)
@@ -333,6 +350,7 @@ if chosen is None:
 numbers = contents(chosen.digest, chosen)
 intervals = state.chosen_divider()
 overview(chosen, numbers)
+columns_section(chosen)
 episodes_section()
 actions_section(chosen, intervals)
 features_section(chosen, numbers, intervals)

@@ -59,11 +59,41 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[
                 demonstrations.action_dimensions, demonstrations.action_columns.T, strict=True
             )
         ],
+        "columns": [
+            {"column": one.column, "use": one.use, "why": one.why} for one in demonstrations.columns
+        ],
         "contradictions": int(identical_contradictions(demonstrations).any(axis=1).sum()),
-        "notes": list(demonstrations.notes),
-        "warnings": list(find_warnings(demonstrations)),
+        **describe_oddities(demonstrations),
         "digest": demonstrations.digest,
     }
+
+
+def describe_oddities(demonstrations: Demonstrations) -> dict[str, Any]:
+    """How demonstrations were read, and what is odd about them.
+
+    Args:
+        demonstrations: N pairs.
+
+    Returns:
+        A document for JSON; notes on reading stand among the warnings too.
+    """
+    return {
+        "notes": list(demonstrations.notes),
+        "warnings": list(find_warnings(demonstrations)),
+    }
+
+
+def print_oddities(document: dict[str, Any]) -> None:
+    """Print what `describe_oddities` found, if it found anything.
+
+    Args:
+        document: What it gave.
+    """
+    notes = document["notes"]
+    terminal.print_lines([f"note: {note}" for note in notes])
+    terminal.print_lines(
+        [f"warning: {warning}" for warning in document["warnings"] if warning not in notes]
+    )
 
 
 def _describe_action(dimension: ActionDimension, values: NDArray[Any]) -> dict[str, Any]:
@@ -129,9 +159,14 @@ def print_demonstrations(document: dict[str, Any]) -> None:
         ],
     )
     _print_actions(document["actions"])
-    sentences = [f"note: {note}" for note in document["notes"]]
-    sentences += [f"warning: {warning}" for warning in document["warnings"]]
-    terminal.print_lines(sentences or ["No warnings."])
+    if document["columns"]:
+        terminal.print_table(
+            ("column", "taken for", "why"),
+            [(one["column"], one["use"], one["why"]) for one in document["columns"]],
+        )
+    print_oddities(document)
+    if not document["warnings"]:
+        terminal.print_lines(["No warnings."])
 
 
 def _print_actions(actions: list[dict[str, Any]]) -> None:

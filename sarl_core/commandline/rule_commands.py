@@ -100,6 +100,13 @@ def mine(
     given = [value is not None for value in (support, confidence, setting)]
     if given not in ([True, True, False], [False, False, True]):
         raise InputError("give both --support and --confidence, or --setting instead of them")
+    from sarl_core.commandline.answers import (
+        describe_oddities,
+        describe_rules,
+        print_oddities,
+        print_rules,
+    )
+
     with terminal.working("Mining"):
         from sarl_core.commandline.evidence_answers import Tried
         from sarl_core.mining import holding_out
@@ -111,6 +118,7 @@ def mine(
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
         demonstrations = read_demonstrations(file, env)
+        oddities = describe_oddities(demonstrations)
         tried = None
         if hold_out is not None:
             tried = Tried(hold_out, seed, holding_out.hold_out(demonstrations, hold_out, seed=seed))
@@ -128,11 +136,10 @@ def mine(
         if lower_bound is not None:
             rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
         rule_set.save(out)
-    from sarl_core.commandline.answers import describe_rules, print_rules
-
     if as_json:
-        terminal.print_json(describe_rules(rule_set, out, tried))
+        terminal.print_json(describe_rules(rule_set, out, tried) | oddities)
     else:
+        print_oddities(oddities)
         print_rules(rule_set, out, tried, lower_bound=lower_bound)
 
 

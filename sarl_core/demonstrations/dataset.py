@@ -55,6 +55,21 @@ class ActionDimension:
 
 
 @dataclass(frozen=True)
+class ColumnUse:
+    """What one column of a file was taken for.
+
+    Attributes:
+        column: As the file calls it.
+        use: As "feature", "action", "episode number" or "not used".
+        why: In words.
+    """
+
+    column: str
+    use: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Summary:
     """What a set of demonstrations contains, in numbers.
 
@@ -108,6 +123,8 @@ class Demonstrations:
         agent: Who demonstrated, "" where unknown.
         seed: Seed it was recorded with, or None.
         notes: Sentences on how the data was read (as "one episode, for want of a column").
+        columns: What each column of the file was taken for; () where there was no table. It is
+            no part of the digest.
 
     Raises:
         InputError: If anything above does not hold.
@@ -133,6 +150,7 @@ class Demonstrations:
     agent: str = ""
     seed: int | None = None
     notes: tuple[str, ...] = ()
+    columns: tuple[ColumnUse, ...] = ()
 
     def __post_init__(self) -> None:
         """Convert, complete and check every field."""

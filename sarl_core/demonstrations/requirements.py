@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 
+FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
+
 _EXACT = 2**53  # up to here every whole number is a float64
 
 
@@ -111,6 +113,38 @@ def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:
 
 def _number(row: int, rows: NDArray[np.int64] | None) -> int:
     return (row if rows is None else int(rows[row])) + 1
+
+
+def is_whole(values: NDArray[Any]) -> bool:
+    """Whether all values of a column are whole numbers from 0.
+
+    Args:
+        values: Shape (N,).
+
+    Returns:
+        False also where one is not finite.
+    """
+    if values.dtype.kind == "b":
+        return True
+    return bool(np.all(np.isfinite(values) & (values >= 0) & (values == np.floor(values))))
+
+
+def counts_up(values: NDArray[Any], together: NDArray[np.bool_] | None = None) -> bool:
+    """Whether a column counts: each value is by one larger than the one before.
+
+    Args:
+        values: Shape (N,).
+        together: Shape (N - 1,), whether a row and the next one are to be compared; None for all.
+
+    Returns:
+        False where there is nothing to compare.
+    """
+    if values.dtype.kind == "b":
+        return False
+    rises = np.diff(values.astype(np.float64))
+    if together is not None:
+        rises = rises[together]
+    return len(rises) > 0 and bool(np.all(rises == 1))
 
 
 def as_numbers(given: Any, what: str) -> NDArray[Any]:

@@ -74,6 +74,21 @@ def test_a_bad_input_is_one_sentence_and_loses_nothing(name: str) -> None:
     assert app.query_params["data"] == "cartpole"
 
 
+def test_what_each_column_was_taken_for_is_shown() -> None:
+    rows = [f"{i},{i % 7},{i % 2}" for i in range(30)]
+    app = upload(
+        open_page("demonstrations"), ("rig.csv", csv_bytes(*rows, header="row,speed,action"))
+    )
+    assert not errors(app)
+    (shown,) = [frame.value for frame in app.dataframe if "Taken for" in frame.value]
+    assert dict(zip(shown["Column"], shown["Taken for"], strict=True)) == {
+        "row": "not used",
+        "speed": "feature",
+        "action": "action",
+    }
+    assert "'row' was not used: it counts the rows" in texts(app)
+
+
 def test_columns_of_other_names_are_mapped() -> None:
     odd = csv_bytes(*ROWS, header="run,t,left,right,move")
     app = upload(open_page("demonstrations", data="pendulum"), ("odd.csv", odd))

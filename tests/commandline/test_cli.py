@@ -78,6 +78,39 @@ def test_check_of_continuous_actions_gives_their_bounds(run):
     assert "-2 to 2" in run("check", PENDULUM)
 
 
+def rows_of_a_rig(tmp_path):
+    path = tmp_path / "rig.csv"
+    rows = [f"{i},{0.1 * (i % 7):.1f},{i % 5},{int(i % 7 > 3)},{i // 20}" for i in range(80)]
+    path.write_text("\n".join(["row,speed,gap,action,episode", *rows]) + "\n")
+    return path
+
+
+def test_check_tells_what_each_column_was_taken_for(run, tmp_path):
+    path = rows_of_a_rig(tmp_path)
+    columns = json.loads(run("check", path, "--json"))["columns"]
+    assert [(one["column"], one["use"]) for one in columns] == [
+        ("row", "not used"),
+        ("speed", "feature"),
+        ("gap", "feature"),
+        ("action", "action"),
+        ("episode", "episode number"),
+    ]
+    text = run("check", path)
+    assert "taken for" in text
+    assert "it counts the rows" in text
+    assert text.count("the columns 'speed', 'gap' were taken as observations") == 1
+
+
+def test_mine_tells_what_check_tells(run, tmp_path):
+    path, rules = rows_of_a_rig(tmp_path), tmp_path / "rules.json"
+    said = run("mine", path, "--setting", "filtered", "--out", rules)
+    assert "note: the column 'row' was not used: it counts the rows" in said
+    document = json.loads(run("mine", path, "--setting", "filtered", "--out", rules, "--json"))
+    checked = json.loads(run("check", path, "--json"))
+    assert document["notes"] == checked["notes"] != []
+    assert document["warnings"] == checked["warnings"]
+
+
 def test_check_prints_warnings(run, tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("episode,step,obs_x,obs_y,action\n0,0,1.0,2.0,0\n0,1,1.0,3.0,1\n")

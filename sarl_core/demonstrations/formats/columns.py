@@ -3,45 +3,35 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
+from sarl_core.demonstrations.dataset import ColumnUse
+from sarl_core.demonstrations.formats import vocabulary
+from sarl_core.demonstrations.formats.vocabulary import (
+    ACTIONS,
+    OBSERVATIONS,
+    PLAIN_OBSERVATIONS,
+    SINGLE_ACTION,
+    plain,
+    stripped,
+)
 from sarl_core.errors import InputError
 
-_ROLES = {
-    "episode": (
-        "episode",
-        "episodes",
-        "ep",
-        "episode_id",
-        "episode_index",
-        "episode_number",
-        "eps_id",
-        "traj",
-        "traj_id",
-        "trajectory",
-        "trajectory_id",
-    ),
-    "step": ("step", "steps", "t", "timestep", "time_step", "step_index", "step_id"),
-    "reward": ("reward", "rewards", "rew", "rews", "r"),
-    "terminated": (
-        "terminated",
-        "terminateds",
-        "terminal",
-        "terminals",
-        "termination",
-        "terminations",
-        "done",
-        "dones",
-    ),
-    "truncated": ("truncated", "truncateds", "truncation", "truncations", "timeout", "timeouts"),
-}
-_OBSERVATIONS = "obs|observations?|states?|features?"
-_ACTIONS = "actions?|acts?"
-_SINGLE_ACTION = ("action", "actions", "act", "acts", "a")
-# Row numbers that a data frame wrote along; never an observation.
-_ROW_NUMBERS = re.compile(r"|index|Unnamed: \d+|__index_level_\d+__")
-_DUBIOUS = re.compile(r"next[ _]|info|time|seed|id$|.*_id$|return|log_?prob|value|advantage", re.I)
+SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last")
+USE_WORDS = MappingProxyType(
+    {
+        "episode": "episode number",
+        "step": "step number",
+        "terminated": "end of an episode (by itself)",
+        "truncated": "end of an episode (by a limit)",
+        "first": "beginning of an episode",
+        "last": "end of an episode",
+    }
+)
+_BY_NAME = "its name says so"
+_NO_OBSERVATION = "the features' names begin with a word for observations, and its own does not"
 _NUMBERED = re.compile(r"([^\d]*?)[ _.\-\[(]?(\d{1,9})[\])]?")
 
 
@@ -57,6 +47,8 @@ class ColumnMap:
         reward: Column with the reward.
         terminated: Column that says whether the environment ended the episode at this step.
         truncated: Column that says whether a limit ended it.
+        first: Column that says whether an episode begins with this step.
+        last: Column that says whether one ends with it, for whatever reason.
         feature_names: d names to use in place of the columns' own.
         action_names: m names, likewise.
     """
@@ -68,14 +60,104 @@ class ColumnMap:
     reward: str | None = None
     terminated: str | None = None
     truncated: str | None = None
+    first: str | None = None
+    last: str | None = None
     feature_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
+
+    @classmethod
+    def of_roles(
+        cls, observations: Sequence[str], actions: Sequence[str], singles: Mapping[str, str]
+    ) -> ColumnMap:
+        """A map from the columns of each kind.
+
+        Args:
+            observations: Columns of the features.
+            actions: Columns of the action dimensions.
+            singles: The other columns, by what they hold.
+
+        Returns:
+            The map.
+        """
+        return cls(
+            tuple(observations),
+            tuple(actions),
+            episode=singles.get("episode"),
+            step=singles.get("step"),
+            reward=singles.get("reward"),
+            terminated=singles.get("terminated"),
+            truncated=singles.get("truncated"),
+            first=singles.get("first"),
+            last=singles.get("last"),
+        )
+
+    @property
+    def singles(self) -> dict[str, str]:
+        """The columns that are neither observations nor actions, by what they hold."""
+        named = {role: getattr(self, role) for role in SINGLES}
+        return {role: name for role, name in named.items() if name is not None}
 
     @property
     def used(self) -> tuple[str, ...]:
         """Every column that is named, observations first."""
-        singles = (self.episode, self.step, self.reward, self.terminated, self.truncated)
-        return (*self.observations, *self.actions, *(name for name in singles if name is not None))
+        return (*self.observations, *self.actions, *self.singles.values())
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What a table's columns are by their names.
+
+    Attributes:
+        columns: The likeliest roles; observations or actions may be empty.
+        reasons: Why each of these columns was taken for what it was.
+        unused: Columns that are nothing of these, and why.
+        unclear: Columns that may be features or something else.
+        prefixed: Whether the features' names begin with a word for observations.
+    """
+
+    columns: ColumnMap
+    reasons: Mapping[str, str]
+    unused: Mapping[str, str]
+    unclear: tuple[str, ...] = ()
+    prefixed: bool = False
+
+    def uses(self, names: Sequence[str]) -> tuple[ColumnUse, ...]:
+        """What each of a table's columns was taken for.
+
+        Args:
+            names: The columns, in the order of the table.
+
+        Returns:
+            One entry a column.
+        """
+        roles = {name: role for role, name in self.columns.singles.items()}
+        roles |= dict.fromkeys(self.columns.observations, "feature")
+        roles |= dict.fromkeys(self.columns.actions, "action")
+        return tuple(
+            ColumnUse(
+                name,
+                USE_WORDS.get(roles.get(name, ""), roles.get(name, "not used")),
+                self.reasons.get(name) or self.unused.get(name, ""),
+            )
+            for name in names
+        )
+
+    def without(self, dropped: Mapping[str, str]) -> Guess:
+        """The same guess with features that turned out to be none.
+
+        Args:
+            dropped: Why each of them is none.
+
+        Returns:
+            The new guess.
+        """
+        observations = tuple(name for name in self.columns.observations if name not in dropped)
+        return replace(
+            self,
+            columns=replace(self.columns, observations=observations),
+            reasons={name: why for name, why in self.reasons.items() if name not in dropped},
+            unused={**self.unused, **dropped},
+        )
 
 
 def guess_columns(names: Sequence[str]) -> ColumnMap:
@@ -87,91 +169,152 @@ def guess_columns(names: Sequence[str]) -> ColumnMap:
     Returns:
         A map in which observations or actions may be empty where nothing looks like them.
     """
-    roles = {role: _first_alias(names, aliases) for role, aliases in _ROLES.items()}
-    singles = {name for name in roles.values() if name is not None}
-    actions = _first_alias(names, _SINGLE_ACTION)
-    action_columns = (
-        (actions,)
-        if actions is not None
-        else tuple(name for name in names if stripped(name, _ACTIONS) is not None)
-        or tuple(name for name in names if re.fullmatch(r"a[ _]?\d+", name.strip(), re.I))
-    )
-    observations = tuple(name for name in names if stripped(name, _OBSERVATIONS) is not None)
-    if not observations:
-        observations = tuple(
-            name
-            for name in names
-            if name not in singles
-            and name not in action_columns
-            and not _ROW_NUMBERS.fullmatch(name)
-            and not _DUBIOUS.match(name)
-            and stripped(name, _ACTIONS) is None
-        )
-    return ColumnMap(
-        _by_number(observations, _OBSERVATIONS),
-        _by_number(action_columns, _ACTIONS),
-        episode=roles["episode"],
-        step=roles["step"],
-        reward=roles["reward"],
-        terminated=roles["terminated"],
-        truncated=roles["truncated"],
-    )
+    return guess_roles(names).columns
 
 
-def choose_columns(names: Sequence[str]) -> tuple[ColumnMap, tuple[str, ...]]:
-    """The roles of a table's columns, where their names leave no doubt.
+def guess_roles(names: Sequence[str]) -> Guess:
+    """The likeliest roles of a table's columns, and why.
 
     Args:
         names: The columns.
 
     Returns:
-        The map, and notes on columns that are not used or are used on a guess.
+        The guess; what the columns hold may prove it wrong.
+    """
+    actions = _actions(names)
+    reasons = dict.fromkeys(actions, _BY_NAME)
+    roles = _singles(names, actions)
+    reasons |= dict.fromkeys(roles.values(), _BY_NAME)
+    taken = {*actions, *roles.values()}
+    unused = {
+        name: why
+        for name in names
+        if name not in taken and (why := _why_unused(name, names)) is not None
+    }
+    left = [name for name in names if name not in taken and name not in unused]
+    plainly = [name for name in left if stripped(name, PLAIN_OBSERVATIONS) is not None]
+    prefixed = plainly if plainly != [name for name in plainly if _bare(name)] else []
+    if not prefixed:
+        # "state" beside "pressure" is a feature, and no word that all features begin with.
+        common = [name for name in left if stripped(name, OBSERVATIONS) is not None]
+        alone = len(common) == 1 and plainly == [] and not _bare(common[0])
+        prefixed = common if len(common) == len(left) and not alone else []
+    if prefixed:
+        reasons |= dict.fromkeys(prefixed, "its name begins with a word for observations")
+        unused |= {name: _NO_OBSERVATION for name in left if name not in prefixed}
+        features, unclear = prefixed, []
+    else:
+        unclear = [name for name in left if _unclear(name)]
+        features = [name for name in left if name not in unclear]
+        reasons |= dict.fromkeys(features, "no other use fits its name")
+    columns = ColumnMap.of_roles(
+        _by_number(tuple(features), OBSERVATIONS), _by_number(actions, ACTIONS), roles
+    )
+    return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed))
+
+
+def require_clear(guess: Guess, names: Sequence[str], *, actions: bool = True) -> None:
+    """Refuse a guess that leaves in doubt what a column is.
+
+    Args:
+        guess: By the names.
+        names: The columns.
+        actions: Whether there must be actions.
 
     Raises:
-        InputError: If it is unclear what the observations or the actions are.
+        InputError: With the columns that are unclear, and what to do.
     """
-    guess = guess_columns(names)
-    if not guess.actions:
+    columns = guess.columns
+    if actions and not columns.actions:
         raise InputError(
             f"there is no action column among {listed(names)}; name it 'action', or map the columns"
         )
-    left = [name for name in names if name not in guess.used and not _ROW_NUMBERS.fullmatch(name)]
-    if not guess.observations:
+    if not columns.observations and not guess.unclear:
         raise InputError(
             f"there is no observation column among {listed(names)}; call them 'obs_' and a name, "
             "or map the columns"
         )
-    prefixed = stripped(guess.observations[0], _OBSERVATIONS) is not None
-    if left and not prefixed:
+    if guess.unclear:
+        raise unclear_columns(guess.unclear, names)
+    if columns.reward is not None and plain(columns.reward) == "r" and not _textbook(guess):
         raise InputError(
-            f"it is unclear which columns are observations among {listed(names)}; call those "
-            "'obs_' and a name, or map the columns"
+            f"it is unclear whether the column {columns.reward!r} is the reward or a feature; call "
+            "it 'reward', or give the feature its full name"
         )
-    if prefixed:
-        _refuse_gap(guess.observations, _OBSERVATIONS)
-    _refuse_gap(guess.actions, _ACTIONS)
+    if guess.prefixed:
+        _refuse_gap(columns.observations, OBSERVATIONS)
+    _refuse_gap(columns.actions, ACTIONS)
+
+
+def unclear_columns(
+    columns: Sequence[str], names: Sequence[str], what: str = "whether it is a feature"
+) -> InputError:
+    """The error for columns that may be features or not.
+
+    Args:
+        columns: One or more.
+        names: All columns.
+        what: Is unclear of one.
+
+    Returns:
+        An error that names them and says what to do.
+    """
+    one = len(columns) == 1
+    told = (
+        f"it is unclear of the column {columns[0]!r} {what}"
+        if one
+        else f"it is unclear whether the columns {listed(columns)} are features"
+    )
+    return InputError(
+        f"{told}, among {listed(names)}; rename one that is a feature (by another word, or call "
+        "every feature 'obs_' and a name), take out one that is none, or map the columns"
+    )
+
+
+def told_guess(guess: Guess) -> tuple[str, ...]:
+    """Sentences on what was guessed.
+
+    Args:
+        guess: As it was settled.
+
+    Returns:
+        On features without a word for observations, an action called by a letter, and columns that
+        are not used.
+    """
     notes = []
-    if not prefixed:
-        notes.append(f"the columns {listed(guess.observations)} were taken as observations")
-    if left:
-        one = len(left) == 1
+    columns = guess.columns
+    if not guess.prefixed:
+        one = len(columns.observations) == 1
         notes.append(
-            f"the column{'' if one else 's'} {listed(left)} {'was' if one else 'were'} not used"
+            f"the column{'' if one else 's'} {listed(columns.observations)} "
+            f"{'was' if one else 'were'} taken as observations"
         )
-    return guess, tuple(notes)
+    letters = [name for name in (*columns.actions, columns.reward) if name and len(name) == 1]
+    for name in letters:
+        what = "reward" if name == columns.reward else "action"
+        notes.append(f"the column {name!r} was taken as the {what}")
+    by_reason: dict[str, list[str]] = {}
+    for name, why in guess.unused.items():
+        if not vocabulary.ROW_NUMBERS.fullmatch(plain(name)):
+            by_reason.setdefault(why, []).append(name)
+    for why, left in by_reason.items():
+        one = len(left) == 1
+        told = f"the column{'' if one else 's'} {listed(left)} {'was' if one else 'were'} not used"
+        notes.append(told if why == _NO_OBSERVATION else f"{told}: {why}")
+    return tuple(notes)
 
 
 def feature_names(columns: Sequence[str]) -> tuple[str, ...] | None:
     """What columns say the features are called; None where they only count them."""
-    names = [_own_name(column, _OBSERVATIONS) for column in columns]
+    names = [_own_name(column, OBSERVATIONS) for column in columns]
     return None if all(name.isdecimal() for name in names) else tuple(names)
 
 
 def action_names(columns: Sequence[str]) -> tuple[str, ...] | None:
     """What columns say the action dimensions are called; None where they only count them."""
-    if len(columns) == 1 and columns[0].strip().lower() in _SINGLE_ACTION:
+    if len(columns) == 1 and columns[0].strip().lower() in SINGLE_ACTION:
         return None
-    names = [_own_name(column, _ACTIONS) for column in columns]
+    names = [_own_name(column, ACTIONS) for column in columns]
     return None if all(name.isdecimal() for name in names) else tuple(names)
 
 
@@ -209,30 +352,81 @@ def refuse_doubled(names: Sequence[str]) -> None:
 def listed(names: Iterable[str], limit: int = 12) -> str:
     """Names for a sentence, the first few of them."""
     names = list(names)
-    shown = ", ".join(map(repr, names[:limit]))
+    short = (name if len(name) <= 60 else f"{name[:60]}..." for name in names[:limit])
+    shown = ", ".join(map(repr, short))
     return shown if len(names) <= limit else f"{shown} and {len(names) - limit:,} more"
 
 
-def stripped(column: str, prefixes: str) -> str | None:
-    """What follows a prefix: "x" of "obs_x", "0" of "obs[0]" and "obs0"; None if nothing does."""
-    bare = re.fullmatch(rf"(?:{prefixes})(\d*)", column.strip(), re.I)
-    if bare is not None:
-        return bare[1] or "0"
-    match = re.match(rf"(?:{prefixes})([ _.\-/\[(])", column, re.I)
-    if match is None:
-        return None
-    rest = column[match.end() :]
-    return rest[:-1] if match[1] in "[(" and rest[-1:] in ("]", ")") else rest
+def _actions(names: Sequence[str]) -> tuple[str, ...]:
+    by_name = {plain(name): name for name in reversed(names)}
+    alone = next((by_name[word] for word in SINGLE_ACTION if word in by_name), None)
+    letter = alone is not None and plain(alone) == "a"
+    if alone is not None and not letter:
+        return (alone,)
+    several = tuple(name for name in names if stripped(name, ACTIONS) is not None) or tuple(
+        name for name in names if re.fullmatch(r"a[ _]?\d+", name.strip(), re.I)
+    )
+    return several or ((alone,) if alone is not None else ())
+
+
+def _singles(names: Sequence[str], actions: Sequence[str]) -> dict[str, str]:
+    """The first column for each role; another one for the same role is no second."""
+    found: dict[str, str] = {}
+    for role, patterns in vocabulary.ROLES.items():
+        free = [name for name in names if name not in actions and name not in found.values()]
+        name = vocabulary.first_of(free, patterns)
+        if name is not None:
+            found[role] = name
+    return found
+
+
+def _why_unused(name: str, names: Sequence[str]) -> str | None:
+    """Why a column whose name says so is nothing that is read."""
+    word = plain(name)
+    if vocabulary.ROW_NUMBERS.fullmatch(word):
+        return "it numbers the rows"
+    if vocabulary.TIMES.fullmatch(word):
+        return "it is a time"
+    if vocabulary.BOOKKEEPING.fullmatch(word):
+        return "it is no part of a state"
+    roles = (role for role, all_of in vocabulary.ROLES.items() for one in all_of if _is(one, word))
+    role = next(roles, None)
+    if role is not None and len(word) > 1:
+        return f"another column is the {USE_WORDS.get(role, role)}"
+    follows = vocabulary.next_states(names).get(name)
+    if follows is not None and stripped(name, PLAIN_OBSERVATIONS) is None:
+        return f"it holds the next {follows!r}"
+    return None
+
+
+def _is(pattern: str, word: str) -> bool:
+    return re.fullmatch(pattern, word) is not None
+
+
+def _unclear(name: str) -> bool:
+    """Whether a column may be something else than a feature."""
+    return (
+        vocabulary.UNCLEAR.fullmatch(plain(name)) is not None
+        or stripped(name, ACTIONS) is not None
+        or vocabulary.only_next(name)
+    )
+
+
+def _bare(name: str) -> bool:
+    """Whether a name is a word for observations and nothing more."""
+    return re.fullmatch(OBSERVATIONS, name.strip(), re.I) is not None
+
+
+def _textbook(guess: Guess) -> bool:
+    """Whether other columns speak of the same notation as "r" and "a" do."""
+    columns = guess.columns
+    ends = (columns.terminated, columns.truncated, columns.first, columns.last)
+    return guess.prefixed or any(ends) or only_counted(columns.observations)
 
 
 def _own_name(column: str, prefixes: str) -> str:
     rest = stripped(column, prefixes)
     return column if rest is None else rest
-
-
-def _first_alias(names: Sequence[str], aliases: Sequence[str]) -> str | None:
-    by_name = {name.strip().lower().replace(" ", "_"): name for name in reversed(names)}
-    return next((by_name[alias] for alias in aliases if alias in by_name), None)
 
 
 def _by_number(columns: tuple[str, ...], prefixes: str) -> tuple[str, ...]:
@@ -261,7 +455,7 @@ def _numbers(columns: tuple[str, ...], prefixes: str) -> list[int] | None:
     """The numbers of columns that are only counted, as obs_0 or x0; None if they have names."""
     rests = [stripped(column, prefixes) for column in columns]
     if any(rest is not None for rest in rests):
-        counted = [rest for rest in rests if rest is not None and rest.isdecimal()]
+        counted = [rest for rest in rests if rest is not None and re.fullmatch(r"\d{1,9}", rest)]
         return [int(rest) for rest in counted] if len(counted) == len(columns) else None
     matches = [_NUMBERED.fullmatch(column) for column in columns]
     found = [match for match in matches if match is not None]

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.checks import MAX_LABELS
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
+    FEW_VALUES,
     column_of_numbers,
     flags,
     require_finite,
@@ -25,8 +26,6 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers,
 )
 from sarl_core.errors import InputError
-
-_FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
 
 
 @dataclass(frozen=True)
@@ -51,6 +50,7 @@ class Recording:
             messages.
         metadata: What the file says besides.
         notes: Sentences on how it was read.
+        columns: What each column was taken for, where there are columns.
     """
 
     observations: NDArray[Any]
@@ -69,6 +69,7 @@ class Recording:
     names: Mapping[str, str] = field(default_factory=dict)
     metadata: Metadata = field(default_factory=Metadata)
     notes: tuple[str, ...] = ()
+    columns: tuple[ColumnUse, ...] = ()
 
 
 def to_demonstrations(
@@ -104,6 +105,7 @@ def to_demonstrations(
         "agent": metadata.agent,
         "seed": metadata.seed,
         "notes": (*metadata.notes, *notes),
+        "columns": recording.columns,
     }
     actions, space = (_labels if discrete else _values)(recording, described)
     return Demonstrations(
@@ -286,7 +288,7 @@ def _is_discrete(
         return False, None
     if not np.all((column == np.floor(column)) & (column >= 0)):
         return False, None
-    if len(np.unique(column)) > _FEW_VALUES:
+    if len(np.unique(column)) > FEW_VALUES:
         return False, None
     return True, (
         "the actions are whole numbers with a decimal point and were taken as labels; name the "

@@ -11,21 +11,27 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
+    Guess,
     action_names,
     check_map,
-    choose_columns,
     feature_names,
+    guess_roles,
     listed,
     refuse_doubled,
+    require_clear,
+    told_guess,
+    unclear_columns,
 )
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.demonstrations.requirements import flags
 from sarl_core.errors import InputError
 
 MAX_COLUMNS = 4096
-_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
+_OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
 
 
 class Table(Protocol):
@@ -86,45 +92,132 @@ def recording_from_table(
     Raises:
         InputError: If roles are unclear, a column is missing, or a value is no number.
     """
-    notes: tuple[str, ...] = ()
     metadata = table.metadata
-    chosen: ColumnMap
+    guessed = False
+    notes: tuple[str, ...] = ()
     if columns is not None:
-        chosen = columns
+        guess = given(columns, "as it was mapped")
         metadata = _without_names(metadata)
     elif metadata.features and metadata.action_names:
-        chosen = _own_columns(table.names, metadata)
+        guess = given(_own_columns(table.names, metadata), "the file itself says so")
     elif not table.named:
-        chosen, notes = _unnamed(table.names, description)
+        guess, notes = _unnamed(table.names, description)
     else:
-        chosen, notes = choose_columns(table.names)
-    check_map(chosen, table.names)
-    read, kept, dropped = _without_empty_ends(table.read(chosen), chosen)
+        guess, guessed = guess_roles(table.names), True
+        if guess.unclear:
+            guess = resolved(guess, _numbers_of(table, guess.unclear), table.names)
+        require_clear(guess, table.names)
+    check_map(guess.columns, table.names)
+    read, kept, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
+    if guessed:
+        guess = settle(guess, {name: column.values for name, column in read.items()})
+        notes = told_guess(guess)
+    chosen = guess.columns
+    read = {name: read[name] for name in chosen.used}
     require_filled(read, kept)
-    single = {
-        role: None if (name := getattr(chosen, role)) is None else read[name].values
-        for role in _SINGLES
-    }
+    single = {role: read[name].values for role, name in chosen.singles.items()}
+    fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
     return Recording(
         observations=observation_block(read, chosen.observations),
         actions=action_block(read, chosen.actions),
         observation_columns=tuple(f"column {name!r}" for name in chosen.observations),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
-        feature_names=chosen.feature_names
-        or (feature_names(chosen.observations) if named else None),
+        feature_names=chosen.feature_names or (_features(guess, table.named) if named else None),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
-        episodes=single["episode"],
-        steps=single["step"],
-        rewards=single["reward"],
-        terminated=single["terminated"],
-        truncated=single["truncated"],
+        **fields,
         rows=kept,
         guess_labels=not _is_vector(chosen.actions),
-        names={role: f"column {getattr(chosen, role)!r}" for role in _SINGLES},
+        names={role: f"column {name!r}" for role, name in chosen.singles.items()},
         metadata=metadata,
-        notes=(*notes, *dropped),
+        notes=(*notes, *marked, *dropped),
+        columns=guess.uses(table.names),
     )
+
+
+def episode_fields(
+    single: Mapping[str, NDArray[Any]], columns: ColumnMap
+) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
+    """What columns say of episodes and rewards, marks of first and last steps among them.
+
+    Args:
+        single: Values by what they are, as "episode" and "last", each of shape (N,).
+        columns: The columns that hold them, for messages.
+
+    Returns:
+        The fields of a `Recording`, and notes.
+
+    Raises:
+        InputError: If a mark is neither true nor false, or marks contradict one another.
+    """
+    fields = {
+        field: single[role]
+        for field, role in (
+            ("episodes", "episode"),
+            ("steps", "step"),
+            ("rewards", "reward"),
+            ("terminated", "terminated"),
+            ("truncated", "truncated"),
+        )
+        if role in single
+    }
+    marks = {
+        role: flags(single[role], len(single[role]), f"column {getattr(columns, role)!r}")
+        for role in ("first", "last")
+        if role in single
+    }
+    notes: tuple[str, ...] = ()
+    if len(marks) == 2:
+        differs = np.flatnonzero(marks["first"][1:] != marks["last"][:-1])
+        if len(differs):
+            raise InputError(
+                f"column {columns.first!r} and column {columns.last!r} contradict each other in "
+                f"rows {differs[0] + 1} and {differs[0] + 2}: an episode must begin after the last "
+                "step of another one; mend those rows"
+            )
+    if marks and "episodes" not in fields:
+        if "first" in marks:
+            begins = marks["first"].copy()
+            how, name = "begins", columns.first
+        else:
+            begins = np.append(False, marks["last"][:-1])
+            how, name = "ends", columns.last
+        begins[:1] = False
+        fields["episodes"] = np.cumsum(begins)
+        notes = (f"there is no episode column, so an episode {how} where {name!r} says so",)
+    if "last" in marks and "truncated" not in fields:
+        # Whatever ended without the environment's saying so was cut off.
+        terminated = fields.get("terminated", np.zeros(len(marks["last"])))
+        fields["truncated"] = marks["last"] & (terminated == 0)
+    return fields, notes
+
+
+def given(columns: ColumnMap, why: str) -> Guess:
+    """Columns that nobody had to guess.
+
+    Args:
+        columns: Which columns hold what.
+        why: It is known.
+
+    Returns:
+        The certain guess.
+    """
+    return Guess(columns, dict.fromkeys(columns.used, why), {}, prefixed=True)
+
+
+def _features(guess: Guess, named: bool) -> tuple[str, ...] | None:
+    """What the features are called; a word that all names begin with says nothing."""
+    columns = guess.columns.observations
+    return feature_names(columns) if guess.prefixed or not named else columns
+
+
+def _numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    """Values of columns that may hold anything."""
+    try:
+        read = table.read(ColumnMap((), names))
+    except InputError:
+        raise unclear_columns(names, table.names) from None
+    return {name: column.values for name, column in read.items()}
 
 
 def require_filled(read: Mapping[str, Column], rows: NDArray[np.int64] | None = None) -> None:
@@ -226,26 +319,20 @@ def _own_columns(names: tuple[str, ...], metadata: Metadata) -> ColumnMap:
             f"its metadata does not know the column {stray!r}; save the file again, "
             "or without metadata"
         )
-    found = {role: role if role in names else None for role in _SINGLES}
-    return ColumnMap(
-        observations,
-        actions,
-        episode=found["episode"],
-        step=found["step"],
-        reward=found["reward"],
-        terminated=found["terminated"],
-        truncated=found["truncated"],
+    return ColumnMap.of_roles(
+        observations, actions, {role: role for role in _OWN_SINGLES if role in names}
     )
 
 
 def _unnamed(
     names: tuple[str, ...], description: EnvironmentDescription | None
-) -> tuple[ColumnMap, tuple[str, ...]]:
+) -> tuple[Guess, tuple[str, ...]]:
     """A table without a header: clear only if it is as wide as the environment's spaces."""
     if description is not None:
         d, m = len(description.feature_names), len(description.action_names)
         if len(names) == d + m:
-            return ColumnMap(names[:d], names[d:]), (
+            columns = ColumnMap(names[:d], names[d:])
+            return given(columns, f"{description.env_id} has it in this place"), (
                 f"there is no header, so the first {d} columns were taken as observations",
             )
     raise InputError(

@@ -1,0 +1,219 @@
+"""What the values of columns say of a guess by their names: counters, next states, letters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.formats import vocabulary
+from sarl_core.demonstrations.formats.columns import Guess, listed, unclear_columns
+from sarl_core.demonstrations.formats.vocabulary import plain
+from sarl_core.demonstrations.requirements import FEW_VALUES, counts_up, is_whole
+from sarl_core.errors import InputError
+
+Values = Mapping[str, NDArray[Any]]
+
+_LEAST_ROWS = 10  # fewer count up by chance
+_LEAST_CHANGES = 5  # of a column, before another one may be called its next value
+
+
+def settle(guess: Guess, values: Values) -> Guess:
+    """Correct a guess by what the columns hold.
+
+    Args:
+        guess: By the columns' names.
+        values: Of every column that it uses, each of shape (N,).
+
+    Returns:
+        The guess without features that are none.
+
+    Raises:
+        InputError: If it is unclear what a column is; the sentence names it.
+    """
+    guess = _doubtful_roles(guess, values)
+    together = same_episode(guess, values)
+    _require_action(guess, values)
+    if not guess.prefixed:
+        guess = guess.without(_counters(guess, values, together))
+    guess = guess.without(_next_states(guess, values, together))
+    if not guess.columns.observations:
+        raise InputError(
+            f"there is no observation column beside {listed(guess.unused)}, which are none; call "
+            "them 'obs_' and a name if they are, or map the columns"
+        )
+    return guess
+
+
+def resolved(guess: Guess, values: Values, names: Sequence[str]) -> Guess:
+    """A guess whose unclear columns turned out to number the rows.
+
+    Args:
+        guess: With unclear columns.
+        values: Of these.
+        names: All columns.
+
+    Returns:
+        The guess without them.
+
+    Raises:
+        InputError: If one of them holds something else.
+    """
+    unclear = tuple(name for name in guess.unclear if not _counts(values[name], None))
+    if unclear:
+        raise unclear_columns(unclear, names)
+    unused = dict.fromkeys(guess.unclear, "it counts the rows")
+    return replace(guess, unclear=(), unused={**guess.unused, **unused})
+
+
+def same_episode(guess: Guess, values: Values) -> NDArray[np.bool_]:
+    """Whether a row and the next one belong to one episode, (N - 1,), as far as columns say."""
+    columns = guess.columns
+    if columns.episode is not None:
+        episodes = values[columns.episode]
+        return np.asarray(episodes[1:] == episodes[:-1])
+    if columns.first is not None:
+        return np.asarray(values[columns.first][1:] == 0)
+    ends = [values[name] for name in (columns.last, columns.terminated, columns.truncated) if name]
+    if ends:
+        return np.asarray(np.logical_and.reduce([end[:-1] == 0 for end in ends]))
+    if columns.step is not None:
+        steps = values[columns.step]
+        return np.asarray(steps[1:] > steps[:-1])
+    return np.ones(max(len(next(iter(values.values()))) - 1, 0), dtype=np.bool_)
+
+
+def _doubtful_roles(guess: Guess, values: Values) -> Guess:
+    """Take back a role that a doubtful name suggested and that the values contradict."""
+    columns = guess.columns
+    for role in ("episode", "step"):
+        name = getattr(columns, role)
+        if name is None or not vocabulary.DOUBTFUL_ROLES.fullmatch(plain(name)):
+            continue
+        held = values[name]
+        if role == "episode":
+            if not is_whole(held) or 1 + np.count_nonzero(np.diff(held)) != len(np.unique(held)):
+                raise unclear_columns((name,), tuple(values), "whether it numbers the episodes")
+            continue
+        others = replace(columns, step=None)
+        together = same_episode(replace(guess, columns=others), values)
+        rises = np.diff(held.astype(np.float64))[together] >= 0
+        if columns.episode is None and is_whole(held):
+            rises |= (held[1:] == held[0])[together]  # it begins again
+        rising = bool(rises.mean() >= 0.9) if len(rises) else True
+        if guess.prefixed and is_whole(held):
+            continue
+        if not rising:
+            raise unclear_columns((name,), tuple(values), "whether it counts the steps")
+        if not is_whole(held):
+            guess = replace(
+                guess,
+                columns=replace(columns, step=None),
+                unused={**guess.unused, name: "it is a time"},
+            )
+    return guess
+
+
+def _require_action(guess: Guess, values: Values) -> None:
+    """Refuse "a" as the action where it may be an acceleration."""
+    columns = guess.columns
+    if [plain(name) for name in columns.actions] != ["a"] or guess.prefixed:
+        return
+    (letter,) = columns.actions
+    labels = _few_labels(values[letter])
+    rivals = [
+        name
+        for name in columns.observations
+        if vocabulary.CONTROLS.fullmatch(plain(name))
+        or (not labels and _few_labels(values[name]) and len(np.unique(values[name])) > 1)
+    ]
+    if rivals:
+        raise InputError(
+            f"it is unclear which column is the action, {letter!r} or {listed(rivals)}; call it "
+            "'action', or map the columns"
+        )
+    told = columns.reward or columns.terminated or columns.truncated or columns.last
+    if not (labels or told or all(map(vocabulary.is_state_word, columns.observations))):
+        raise InputError(
+            f"it is unclear whether the column {letter!r} is the action or a feature; call the "
+            "action 'action', or map the columns"
+        )
+
+
+def _counters(guess: Guess, values: Values, together: NDArray[np.bool_]) -> dict[str, str]:
+    """Features that count the rows, or are the clock."""
+    found = {}
+    for name in guess.columns.observations:
+        word = plain(name)
+        if _counts(values[name], None):
+            found[name] = "it counts the rows"
+        elif word in _COUNTER_WORDS and _counts(values[name], together):
+            found[name] = "it counts the steps"
+    return found
+
+
+_COUNTER_WORDS = frozenset(
+    {"row", "rows", "line", "n", "i", "j", "k", "t", "no", "nr", "num", "number", "count"}
+    | {"counter", "seq", "sequence", "sample", "record", "obs_no", "obs_nr", "sample_index"}
+    | {"sample_no", "sample_nr", "sample_number", "record_no", "record_index", "tick", "frame"}
+)
+
+
+def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> dict[str, str]:
+    """Features that hold what another one holds a step later."""
+    features = guess.columns.observations
+    follows = _followers(features, values, together)
+    found: dict[str, str] = {}
+    if guess.prefixed:
+        named = vocabulary.next_states(features)
+        return {
+            name: f"it holds the next {base!r}"
+            for name, base in named.items()
+            if follows.get(name) == base
+        }
+    perhaps = vocabulary.perhaps_next_states(features)
+    bases = set(perhaps.values())
+    # "ns0" and "ns1" beside "s0" and "s1" and nothing else: as textbooks write it.
+    complete = set(features) == bases | set(perhaps) and not bases & set(perhaps)
+    written = complete and (len(bases) > 1 or all(map(vocabulary.is_state_word, bases)))
+    for name, base in perhaps.items():
+        if written or follows.get(name) == base:
+            found[name] = f"it holds the next {base!r}"
+    for name, base in follows.items():
+        if name in found or base in found or vocabulary.says_before(base):
+            continue
+        if vocabulary.says_before(name) or name in vocabulary.next_states(features):
+            continue
+        raise InputError(
+            f"the column {name!r} holds in each row what {base!r} holds in the next one, and a "
+            f"state does not know the next; take {name!r} out, call it 'next_{base}', or call "
+            f"{base!r} 'previous_{name}' if it is the earlier one, or map the columns"
+        )
+    return found
+
+
+def _followers(
+    features: Sequence[str], values: Values, together: NDArray[np.bool_]
+) -> dict[str, str]:
+    """For each feature the other one whose next value it holds in every row."""
+    if np.count_nonzero(together) < _LEAST_ROWS:
+        return {}
+    later = {values[name][1:][together].tobytes(): name for name in features}
+    found = {}
+    for name in features:
+        held = values[name][:-1][together]
+        base = later.get(held.tobytes())
+        if base is not None and base != name and np.count_nonzero(np.diff(held)) >= _LEAST_CHANGES:
+            found[name] = base
+    return found
+
+
+def _counts(values: NDArray[Any], together: NDArray[np.bool_] | None) -> bool:
+    return len(values) >= _LEAST_ROWS and counts_up(values, together)
+
+
+def _few_labels(values: NDArray[Any]) -> bool:
+    return is_whole(values) and len(np.unique(values)) <= FEW_VALUES

@@ -1,0 +1,166 @@
+"""What people call the columns of a table: the words that tell what one holds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+OBSERVATIONS = "obs|observations?|states?|features?"
+PLAIN_OBSERVATIONS = "obs|observations?"  # the names of nothing else begin so
+ACTIONS = "actions?|acts?"
+SINGLE_ACTION = ("action", "actions", "act", "acts", "a")
+
+_COUNTED = "(_?(id|ids|index|idx|no|nr|num|number|count))?"
+# Of a name as `plain` gives it; the first pattern that a column matches takes the role.
+ROLES: Mapping[str, tuple[str, ...]] = {
+    "episode": (
+        rf"(episode|ep|eps|traj|trajectory|rollout)s?{_COUNTED}",
+        rf"(run|demo|demonstration|trial){_COUNTED}",
+    ),
+    "step": (rf"(step|time_?step|env_?step)s?{_COUNTED}", "t", rf"(frame|tick){_COUNTED}"),
+    "reward": ("rewards?|rews?", "r"),
+    "terminated": ("(is_?)?(terminated|terminal|termination|done)s?",),
+    "truncated": ("(is_?)?(truncated|truncation|timeout)s?",),
+    "first": ("is_?first|is_?start|first_step|episode_starts?",),
+    "last": ("is_?last|is_?end|last_step|episode_ends?",),
+}
+# Words for a role that may as well name a feature; what the column holds decides.
+DOUBTFUL_ROLES = re.compile(rf"(run|demo|demonstration|trial|frame|tick){_COUNTED}|t")
+# Numbers that a data frame wrote along.
+ROW_NUMBERS = re.compile(
+    r"|#|index|idx|unnamed:_\d+|__index_level_\d+__|(row|line)_?(id|index|idx|no|nr|num|number)"
+)
+TIMES = re.compile(
+    r"((unix|wall|sim|real|elapsed|clock|utc|local)_?)?"
+    r"(time|time_?stamp|date|date_?time|ts)(_(s|sec|secs|seconds|ms|us|ns|utc|unix))?"
+    r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc"
+)
+# What learners write along, and no agent sees.
+BOOKKEEPING = re.compile(
+    r"discounts?|(action_)?log_?p(robs?)?|advantages?|returns?_to_go|rtg|infos?(_.*)?"
+)
+UNCLEAR = re.compile(r"id|.*_ids?|uid|uuid|seeds?|returns?|values?|q_values?")
+CONTROLS = re.compile(
+    r"brakes?|braking|throttle|gas|steer(ing)?|steering_.*|pedal|torque|force|thrust|u|move|button"
+    r"|decision|choice|(.*_)?(cmd|command|control|action)"
+)
+
+_NEXT = ("next", "nxt", "new", "succ", "successor", "future", "prime")
+_ONLY_NEXT = frozenset({"next", "nxt", "succ", "successor", "prime"})
+_BEFORE = frozenset({"prev", "previous", "last", "lag", "lagged", "old", "past", "before"})
+_STATES = frozenset({"s", "o", "ob", "obs", "state", "states", "observation", "observations"})
+
+
+def plain(name: str) -> str:
+    """A name without case, unit and separators: "Time Step (ms)" is "time_step"."""
+    text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip())
+    text = re.sub(r"[ _]*(\[[^\]\d]*\]|\([^)\d]*\))$", "", text) or text
+    return re.sub(r"[ .\-/_]+", "_", text.lower()) if not text.startswith("__") else text.lower()
+
+
+def stripped(column: str, prefixes: str) -> str | None:
+    """What follows a prefix: "x" of "obs_x", "0" of "obs[0]" and "obs0"; None if nothing does."""
+    bare = re.fullmatch(rf"(?:{prefixes})(\d*)", column.strip(), re.I)
+    if bare is not None:
+        return bare[1] or "0"
+    match = re.match(rf"(?:{prefixes})([ _.\-/\[(])", column, re.I)
+    if match is None:
+        return None
+    rest = column[match.end() :]
+    return rest[:-1] if match[1] in "[(" and rest[-1:] in ("]", ")") else rest
+
+
+def first_of(names: Sequence[str], patterns: Sequence[str]) -> str | None:
+    """The first column that matches the first pattern that any matches."""
+    for pattern in patterns:
+        for name in names:
+            if re.fullmatch(pattern, plain(name)):
+                return name
+    return None
+
+
+def next_states(names: Sequence[str]) -> dict[str, str]:
+    """Columns whose names say that they hold what another column holds a step later.
+
+    Args:
+        names: Of all columns.
+
+    Returns:
+        The other column for each of them; as "x" for "next_x", "x_next" and "x'".
+    """
+    keys = {name: _words(name) for name in names}
+    others = {words: name for name, words in keys.items() if not _marked(words)}
+    found = {}
+    for name, words in keys.items():
+        base = tuple(word for word in map(_unmarked, words) if word)
+        if _marked(words) and base in others:
+            found[name] = others[base]
+    return found
+
+
+def perhaps_next_states(names: Sequence[str]) -> dict[str, str]:
+    """As `next_states`, for names as "ns0", "sp_0" and "obs2_0", which may mean something else."""
+    keys = {_words(name): name for name in names}
+    found = {}
+    for words, name in keys.items():
+        for base in _shortened(words):
+            if base in keys and keys[base] != name:
+                found[name] = keys[base]
+                break
+    return found
+
+
+def is_state_word(name: str) -> bool:
+    """Whether a name begins as textbooks call states: s, s0, obs."""
+    words = _words(name)
+    return bool(words) and words[0] in _STATES
+
+
+def only_next(name: str) -> bool:
+    """Whether a name says "next", be there a column that it follows or not."""
+    return bool(_ONLY_NEXT.intersection(_words(name)))
+
+
+def says_before(name: str) -> bool:
+    """Whether a name says that a column holds what was a step earlier."""
+    return bool(_BEFORE.intersection(_words(name)))
+
+
+def _words(name: str) -> tuple[str, ...]:
+    """The words and numbers of a name: "s'_0" has s, prime and 0."""
+    text = re.sub(r"['′’]", "_prime_", plain(name))
+    text = re.sub(r"_t(_?\+_?|p)1$", "_next", text)
+    return tuple(re.findall(r"[^\W\d_]+|\d+|[^\w\s]", text))
+
+
+def _marked(words: tuple[str, ...]) -> bool:
+    return any(_unmarked(word) != word for word in words)
+
+
+def _unmarked(word: str) -> str:
+    """A word without what says "next": nothing of "next", "pos" of "nextpos"."""
+    if word in _NEXT:
+        return ""
+    for mark in ("next", "nxt"):
+        if word.startswith(mark) or word.endswith(mark):
+            return word.removeprefix(mark).removesuffix(mark)
+    return word
+
+
+def _shortened(words: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """What "ns0", "sp_0", "n_x", "obs2_0" and "newpos" may be the next of."""
+    if not words:
+        return []
+    first, rest = words[0], words[1:]
+    found = [(first[1:], *rest)] if first[0] == "n" and len(first) > 1 else []
+    if first.startswith("new") and len(first) > len("new"):
+        found.append((first[len("new") :], *rest))
+    if first[-1] in "np" and len(first) > 1:
+        found.append((first[:-1], *rest))
+    if first in ("n", "p"):
+        found.append(rest)
+    if rest[:1] == ("2",):
+        found += [(first, *rest[1:]), (first, "1", *rest[1:])]
+    if rest[:1] in (("n",), ("p",)):
+        found.append((first, *rest[1:]))
+    return found
