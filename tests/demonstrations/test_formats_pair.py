@@ -134,6 +134,98 @@ def test_a_whole_table_may_be_called_obs() -> None:
     assert len(read_demonstrations(csv_bytes(*ROWS), "obs.csv")) == 5
 
 
+RIG = csv_bytes(
+    "0.3,0.8,0,0", "0.2,0.9,0,0", "0.1,0.1,1,0", "0.7,0.2,1,1", header="speed,gap,action,episode"
+)
+FOREIGN = csv_bytes("1", "1", "0", "0", header="action")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("rig_states.csv", "rig_actions.csv"),
+        ("obs.csv", "actions.csv"),
+        ("Rig-observations.csv", "Rig-actions.csv"),
+        ("obs.2.csv", "acts.2.csv"),
+    ],
+)
+def test_a_complete_table_is_no_half(names: tuple[str, str], tmp_path: Path) -> None:
+    write(tmp_path, RIG, FOREIGN, names)
+    demonstrations = load_demonstrations(tmp_path / names[0])
+    assert demonstrations.feature_names == ("speed", "gap")
+    assert demonstrations.actions.tolist() == [0, 0, 1, 1]
+    assert demonstrations.episodes.tolist() == [0, 0, 0, 1]
+    told = next(note for note in demonstrations.notes if "was not read" in note)
+    assert all(repr(name) in told for name in names)
+    for attempt in (
+        lambda: load_demonstrations(tmp_path / names[1]),
+        lambda: load_demonstrations(tmp_path),
+        lambda: read_demonstrations(RIG, names[0], companion=(FOREIGN, names[1])),
+    ):
+        with pytest.raises(InputError, match="actions of its own") as error:
+            attempt()
+        assert all(name in str(error.value) for name in names)
+
+
+def test_a_complete_table_that_is_called_actions_is_no_half(tmp_path: Path) -> None:
+    write(tmp_path, OBSERVATIONS, RIG, ("rig_states.csv", "rig_actions.csv"))
+    demonstrations = load_demonstrations(tmp_path / "rig_actions.csv")
+    assert demonstrations.feature_names == ("speed", "gap")
+    assert any("'rig_states.csv' was not read" in note for note in demonstrations.notes)
+    with pytest.raises(InputError, match=r"observations of its own .*'rig_states\.csv'"):
+        load_demonstrations(tmp_path / "rig_states.csv")
+
+
+def test_without_a_header_the_environment_tells_a_complete_table(tmp_path: Path) -> None:
+    whole = csv_bytes("0.1,0.2,0.3,0.4,0", "0.4,0.3,0.2,0.1,1", header=None)
+    write(tmp_path, whole, b"1\n1\n")
+    demonstrations = load_demonstrations(tmp_path / "obs.csv", env_id="CartPole-v1")
+    assert demonstrations.actions.tolist() == [0, 1]
+    assert any("'actions.csv' was not read" in note for note in demonstrations.notes)
+
+
+@pytest.mark.parametrize("name", ["a", "operator_action"])
+def test_what_may_be_the_action_beside_a_file_of_actions_is_unclear(
+    name: str, tmp_path: Path
+) -> None:
+    write(tmp_path, csv_bytes("0.1,0", "0.2,1", header=f"speed,{name}"), b"0\n1\n")
+    with pytest.raises(InputError, match=f"'{name}' is its action or 'actions.csv'"):
+        load_demonstrations(tmp_path / "obs.csv")
+
+
+def test_columns_of_a_pair_are_what_their_names_say(tmp_path: Path) -> None:
+    seen = csv_bytes("0,0.5,2,3", "1,0.25,2,4", "2,0.1,3,5", header="step,speed,episode,brake")
+    done = csv_bytes("2,0.5,0.1", "2,0.25,0.2", "3,0.5,0.3", header="episode,steer,gas")
+    demonstrations = load_demonstrations(write(tmp_path, seen, done))
+    assert demonstrations.feature_names == ("speed", "brake")
+    assert demonstrations.action_names == ("steer", "gas")
+    assert demonstrations.episodes.tolist() == [2, 2, 3]
+    assert [(use.column, use.use) for use in demonstrations.columns][:3] == [
+        ("step (obs.csv)", "step number"),
+        ("speed (obs.csv)", "feature"),
+        ("episode (obs.csv)", "episode number"),
+    ]
+    other = csv_bytes("2,0.5", "3,0.25", "3,0.5", header="episode,steer")
+    with pytest.raises(InputError, match="'episode' of the one and 'episode' of the other differ"):
+        load_demonstrations(write(tmp_path, seen, other))
+
+
+def test_the_last_observation_of_each_episode_needs_no_action(tmp_path: Path) -> None:
+    seen = csv_bytes("0,1", "0,2", "1,3", "1,4", "1,5", header="episode,speed")
+    demonstrations = load_demonstrations(write(tmp_path, seen, b"1\n0\n1\n"))
+    assert demonstrations.observations[:, 0].tolist() == [1, 3, 4]
+    assert demonstrations.episodes.tolist() == [0, 1, 1]
+
+
+def test_both_names_of_a_pair_are_said(tmp_path: Path) -> None:
+    write(tmp_path, names=("cart_obs.csv", "cart_acts.csv"))
+    notes = load_demonstrations(tmp_path / "cart_obs.csv").notes
+    assert any("'cart_obs.csv'" in note and "'cart_acts.csv'" in note for note in notes)
+    write(tmp_path, actions=b"0\nleft\n1\n", names=("cart_obs.csv", "cart_acts.csv"))
+    with pytest.raises(InputError, match=r"cart_acts\.csv.*'left'.*'cart_obs\.csv'"):
+        load_demonstrations(tmp_path / "cart_obs.csv")
+
+
 def test_no_column_map_and_no_other_formats_in_a_pair() -> None:
     with pytest.raises(InputError, match="not in a pair"):
         read_demonstrations(

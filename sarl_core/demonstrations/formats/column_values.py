@@ -62,11 +62,23 @@ def resolved(guess: Guess, values: Values, names: Sequence[str]) -> Guess:
     Raises:
         InputError: If one of them holds something else.
     """
-    unclear = tuple(name for name in guess.unclear if not _counts(values[name], None))
+    counted = counters(values)
+    unclear = tuple(name for name in guess.unclear if name not in counted)
     if unclear:
         raise unclear_columns(unclear, names)
-    unused = dict.fromkeys(guess.unclear, "it counts the rows")
-    return replace(guess, unclear=(), unused={**guess.unused, **unused})
+    return replace(guess, unclear=(), unused={**guess.unused, **counted})
+
+
+def counters(values: Values) -> dict[str, str]:
+    """Columns that number the rows.
+
+    Args:
+        values: Of some columns, each of shape (N,).
+
+    Returns:
+        Why each of them is no feature and no action.
+    """
+    return {name: "it counts the rows" for name in values if _counts(values[name], None)}
 
 
 def same_episode(guess: Guess, values: Values) -> NDArray[np.bool_]:
@@ -145,14 +157,13 @@ def _require_action(guess: Guess, values: Values) -> None:
 
 def _counters(guess: Guess, values: Values, together: NDArray[np.bool_]) -> dict[str, str]:
     """Features that count the rows, or are the clock."""
-    found = {}
-    for name in guess.columns.observations:
-        word = plain(name)
-        if _counts(values[name], None):
-            found[name] = "it counts the rows"
-        elif word in _COUNTER_WORDS and _counts(values[name], together):
-            found[name] = "it counts the steps"
-    return found
+    features = guess.columns.observations
+    steps = {
+        name: "it counts the steps"
+        for name in features
+        if plain(name) in _COUNTER_WORDS and _counts(values[name], together)
+    }
+    return steps | counters({name: values[name] for name in features})
 
 
 _COUNTER_WORDS = frozenset(

@@ -142,6 +142,33 @@ class Guess:
             for name in names
         )
 
+    def as_actions(self, counted: Mapping[str, str]) -> Guess:
+        """The same guess of a table that holds actions and no observations.
+
+        Args:
+            counted: Why each column that only counts is none.
+
+        Returns:
+            The new guess.
+        """
+        columns = self.columns
+        others = (*columns.observations, *self.unclear)
+        actions = columns.actions or tuple(name for name in others if name not in counted)
+        why = dict.fromkeys(actions, "the file is there for the actions")
+        return replace(
+            self,
+            columns=replace(columns, observations=(), actions=actions),
+            reasons={
+                **why,
+                **{
+                    name: self.reasons[name]
+                    for name in (*columns.actions, *columns.singles.values())
+                },
+            },
+            unused={**self.unused, **counted},
+            unclear=(),
+        )
+
     def without(self, dropped: Mapping[str, str]) -> Guess:
         """The same guess with features that turned out to be none.
 

@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.demonstrations.formats.column_values import counters, resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
+    Guess,
     action_names,
-    feature_names,
+    guess_roles,
+    listed,
+    require_clear,
+    told_guess,
 )
-from sarl_core.demonstrations.formats.csv_file import open_csv
+from sarl_core.demonstrations.formats.csv_file import CsvTable, open_csv
+from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.tables import (
+    Column,
+    Table,
     action_block,
+    episode_fields,
+    given,
+    names_of_features,
+    numbers_of,
     observation_block,
     require_filled,
 )
+from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
 from sarl_core.errors import InputError
 
 _OBSERVATIONS = ("obs", "observations", "observation", "states")
@@ -79,6 +98,36 @@ def pair_in_folder(folder: Path) -> tuple[Path, Path]:
     return pairs[0]
 
 
+def is_complete(
+    content: memoryview, name: str, partner: str, description: EnvironmentDescription | None
+) -> bool:
+    """Whether a file that is called like half of a pair holds observations and actions itself.
+
+    Args:
+        content: The whole file.
+        name: What it is called; tells which half it would be.
+        partner: What the other half would be called, for messages.
+        description: The environment, if known; it tells a table without names apart.
+
+    Returns:
+        True if the names of its columns say so, or their number.
+
+    Raises:
+        InputError: If it cannot be opened, or its columns' names leave it in doubt.
+    """
+    table = open_csv(content)
+    if not table.named:
+        return fits(table, description)
+    return bool(_own_observations(table) if holds_actions(name) else _own_actions(table, partner))
+
+
+def fits(table: Table, description: EnvironmentDescription | None) -> bool:
+    """Whether a table without a header can be told apart by the environment's spaces."""
+    return description is not None and len(table.names) == len(description.feature_names) + len(
+        description.action_names
+    )
+
+
 def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, str]) -> Recording:
     """Read a pair of files.
 
@@ -91,26 +140,191 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         What they hold.
 
     Raises:
-        InputError: If one of them cannot be read; the message begins with its name.
+        InputError: If one of them cannot be read, the message begins with its name; if one holds
+            what the other is for; or if both say something else of the episodes.
     """
+    short = PurePath(names[0]).name, PurePath(names[1]).name
     with naming(names[0]):
         table = open_csv(observations)
-        read = table.read(ColumnMap(table.names, ()))
-        require_filled(read)
-        seen = observation_block(read, table.names)
+        own = _own_actions(table, short[1])
+        if own:
+            raise InputError(
+                f"it has actions of its own ({listed(own)}), so those of {short[1]!r} are not "
+                "joined to it; give it alone, or take its actions out"
+            )
     with naming(names[1]):
-        others = open_csv(actions, like=table)
-        read = others.read(ColumnMap((), others.names))
-        require_filled(read)
-        done = action_block(read, others.names)
+        others = open_csv(actions)
+        own = _own_observations(others)
+        if own:
+            raise InputError(
+                f"it has observations of its own ({listed(own)}), so it is not joined to "
+                f"{short[0]!r}; give it alone, or take its observations out"
+            )
+        if not others.named or len(others.names) == 1:  # it may have no delimiter to go by
+            others = open_csv(actions, like=table)
+    with naming(names[0]):
+        seen = _observations_of(table)
+        observed = observation_block(seen.read, seen.guess.columns.observations)
+    with naming(names[1]):
+        taken = _actions_of(others)
+        done = action_block(taken.read, taken.guess.columns.actions)
+    observed, fields, notes = _together(observed, done, (seen, taken), names)
+    features, dimensions = seen.guess.columns.observations, taken.guess.columns.actions
     return Recording(
-        observations=seen,
+        observations=observed,
         actions=done,
-        observation_columns=tuple(f"{column!r} of {names[0]}" for column in table.names),
-        action_columns=tuple(f"{column!r} of {names[1]}" for column in others.names),
-        feature_names=feature_names(table.names) if table.named else None,
-        action_names=action_names(others.names) if others.named else None,
+        observation_columns=tuple(f"{column!r} of {names[0]}" for column in features),
+        action_columns=tuple(f"{column!r} of {names[1]}" for column in dimensions),
+        feature_names=names_of_features(seen.guess, table.named) if table.named else None,
+        action_names=action_names(dimensions) if others.named else None,
+        **fields,
+        guess_labels=done.ndim == 1,
+        metadata=Metadata(),
+        names={
+            role: f"column {name!r} of {file}"
+            for half, file in zip((seen, taken), names, strict=True)
+            for role, name in half.guess.columns.singles.items()
+        },
+        notes=notes,
+        columns=tuple(
+            replace(use, column=f"{use.column} ({file})")
+            for half, one, file in ((seen, table, short[0]), (taken, others, short[1]))
+            for use in half.guess.uses(one.names)
+        ),
     )
+
+
+def told_pair(names: tuple[str, str]) -> str:
+    """The note on a pair that was joined.
+
+    Args:
+        names: Of the observations and of the actions.
+
+    Returns:
+        A sentence with both names.
+    """
+    seen, done = (PurePath(name).name for name in names)
+    return f"the observations are those of {seen!r}, and the actions those of {done!r}"
+
+
+def told_alone(name: str, partner: str) -> str:
+    """The note on a file that was read without the one beside it.
+
+    Args:
+        name: Of the file.
+        partner: Of the one that its name would go with.
+
+    Returns:
+        A sentence with both names.
+    """
+    return f"{partner!r} was not read, as {name!r} has observations and actions itself"
+
+
+@dataclass(frozen=True)
+class _Half:
+    """What one file of a pair holds."""
+
+    guess: Guess
+    read: dict[str, Column]
+    notes: tuple[str, ...]
+
+
+def _observations_of(table: CsvTable) -> _Half:
+    """Read the file of the observations."""
+    if not table.named:
+        return _whole(table, ColumnMap(table.names, ()))
+    guess = guess_roles(table.names)
+    if guess.unclear:
+        guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
+    require_clear(guess, table.names, actions=False)
+    read = table.read(guess.columns)
+    guess = settle(guess, {name: column.values for name, column in read.items()})
+    read = {name: read[name] for name in guess.columns.used}
+    require_filled(read)
+    return _Half(guess, read, told_guess(guess))
+
+
+def _actions_of(table: CsvTable) -> _Half:
+    """Read the file of the actions: every column that is nothing else is one."""
+    if not table.named:
+        return _whole(table, ColumnMap((), table.names))
+    guess = guess_roles(table.names)
+    others = (*guess.columns.observations, *guess.unclear)
+    held = {name: column.values for name, column in table.read(ColumnMap((), others)).items()}
+    guess = guess.as_actions(counters(held)) if others else guess
+    if not guess.columns.actions:
+        require_clear(guess, table.names)
+    read = table.read(guess.columns)
+    require_filled(read)
+    return _Half(guess, read, ())
+
+
+def _whole(table: CsvTable, columns: ColumnMap) -> _Half:
+    """Read a file without names."""
+    read = table.read(columns)
+    require_filled(read)
+    return _Half(given(columns, "there is no header, and this is what the file is for"), read, ())
+
+
+def _together(
+    observed: NDArray[np.float32],
+    done: NDArray[Any],
+    halves: tuple[_Half, _Half],
+    names: tuple[str, str],
+) -> tuple[NDArray[np.float32], dict[str, NDArray[Any]], tuple[str, ...]]:
+    """Observations for the actions, and what both files say of the episodes."""
+    columns = [half.guess.columns for half in halves]
+    single = [
+        {role: half.read[name].values for role, name in half.guess.columns.singles.items()}
+        for half in halves
+    ]
+    notes = (*halves[0].notes, *halves[1].notes)
+    if len(observed) != len(done) and "episode" in single[0]:
+        episodes = single[0]["episode"]
+        kept = np.append(episodes[1:] == episodes[:-1], False)
+        if np.count_nonzero(kept) == len(done):
+            observed = observed[kept]
+            single[0] = {role: values[kept] for role, values in single[0].items()}
+            notes = (*notes, "the last observation of each episode has no action and was dropped")
+    for role in single[0].keys() & single[1].keys():
+        first, second = single[0][role], single[1][role]
+        if len(first) == len(second) and not np.array_equal(first, second):
+            row = int(np.argmax(first != second)) + 1
+            raise InputError(
+                f"{names[0]} with {names[1]}: the column {getattr(columns[0], role)!r} of the one "
+                f"and {getattr(columns[1], role)!r} of the other differ in row {row}; give files "
+                "of the same steps"
+            )
+    merged = single[1] | {
+        role: values for role, values in single[0].items() if len(values) == len(done)
+    }
+    roles = {role: getattr(columns[0], role) or getattr(columns[1], role) for role in merged}
+    fields, marked = episode_fields(merged, ColumnMap.of_roles((), (), roles))
+    return observed, fields, (*notes, *marked)
+
+
+def _own_actions(table: CsvTable, partner: str) -> tuple[str, ...]:
+    """Columns of a file of observations that hold actions."""
+    if not table.named:
+        return ()
+    found = guess_roles(table.names).columns.actions
+    doubtful = [name for name in table.names if is_perhaps_action(name)]
+    if doubtful and (not found or set(found) <= set(doubtful)):
+        raise InputError(
+            f"it is unclear whether {listed(doubtful)} is its action or {partner!r} beside it "
+            "holds the actions; call it 'action' if it is, or 'obs_' and a name"
+        )
+    return found
+
+
+def _own_observations(table: CsvTable) -> tuple[str, ...]:
+    """Columns of a file of actions that hold observations."""
+    guess = guess_roles(table.names)
+    if not table.named or not guess.columns.actions or not guess.columns.observations:
+        return ()
+    read = table.read(ColumnMap((), guess.columns.observations))
+    counted = counters({name: column.values for name, column in read.items()})
+    return tuple(name for name in guess.columns.observations if name not in counted)
 
 
 def _word(name: str, words: tuple[str, ...]) -> re.Match[str] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import BinaryIO
 
@@ -11,13 +11,17 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.csv_file import open_csv, write_csv
-from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.naming import naming, naming_both
 from sarl_core.demonstrations.formats.npz_file import read_npz, write_npz
 from sarl_core.demonstrations.formats.pair import (
+    fits,
     holds_actions,
+    is_complete,
     pair_in_folder,
     partner_names,
     read_pair,
+    told_alone,
+    told_pair,
 )
 from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, write_parquet
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
@@ -99,6 +103,11 @@ def load_demonstrations(
             )
             if partner is None:
                 return _read(_content(path), path.name, description, columns, str(path))
+            content = _content(path)
+            _check_signature(content, path.name)
+            if is_complete(content, path.name, partner.name, description):
+                alone = _read(content, path.name, description, columns, str(path))
+                return _noted(alone, told_alone(path.name, partner.name))
             pair = (partner, path) if holds_actions(path.name) else (path, partner)
         contents = _content(pair[0]), _content(pair[1])
     return _read_pair(contents, (str(pair[0]), str(pair[1])), description)
@@ -221,7 +230,7 @@ def _read(
         return to_demonstrations(form.read(content), description)
     table = form.open_table(content)
     partners = partner_names(PurePath(name).name)
-    if partners and not table.named and columns is None and not _fits(table, description):
+    if partners and not table.named and columns is None and not fits(table, description):
         halves = ("observations", "actions")
         own = holds_actions(PurePath(name).name)
         raise InputError(
@@ -231,26 +240,26 @@ def _read(
     return to_demonstrations(recording_from_table(table, columns, description), description)
 
 
-def _fits(table: Table, description: EnvironmentDescription | None) -> bool:
-    """Whether a table without a header can be told apart by the environment's spaces."""
-    return description is not None and len(table.names) == len(description.feature_names) + len(
-        description.action_names
-    )
-
-
 def _read_pair(
     contents: tuple[memoryview, memoryview],
     names: tuple[str, str],
     description: EnvironmentDescription | None,
 ) -> Demonstrations:
-    for content, name in zip(contents, names, strict=True):
-        with naming(name):
-            if PurePath(name).suffix.lower() != ".csv":
-                raise InputError("a pair of observations and actions is two .csv files; give those")
-            _check_signature(content, name)
-    recording = read_pair(*contents, names)
-    with naming(f"{names[0]} with {names[1]}"):
-        return to_demonstrations(recording, description)
+    with naming_both(names):
+        for content, name in zip(contents, names, strict=True):
+            with naming(name):
+                if PurePath(name).suffix.lower() != ".csv":
+                    raise InputError(
+                        "a pair of observations and actions is two .csv files; give those"
+                    )
+                _check_signature(content, name)
+        recording = read_pair(*contents, names)
+        with naming(f"{names[0]} with {names[1]}"):
+            return _noted(to_demonstrations(recording, description), told_pair(names))
+
+
+def _noted(demonstrations: Demonstrations, note: str) -> Demonstrations:
+    return replace(demonstrations, notes=(*demonstrations.notes, note))
 
 
 def _format(name: str) -> Format:

@@ -105,7 +105,7 @@ def recording_from_table(
     else:
         guess, guessed = guess_roles(table.names), True
         if guess.unclear:
-            guess = resolved(guess, _numbers_of(table, guess.unclear), table.names)
+            guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
         require_clear(guess, table.names)
     check_map(guess.columns, table.names)
     read, kept, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
@@ -123,7 +123,8 @@ def recording_from_table(
         actions=action_block(read, chosen.actions),
         observation_columns=tuple(f"column {name!r}" for name in chosen.observations),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
-        feature_names=chosen.feature_names or (_features(guess, table.named) if named else None),
+        feature_names=chosen.feature_names
+        or (names_of_features(guess, table.named) if named else None),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
         **fields,
         rows=kept,
@@ -205,13 +206,13 @@ def given(columns: ColumnMap, why: str) -> Guess:
     return Guess(columns, dict.fromkeys(columns.used, why), {}, prefixed=True)
 
 
-def _features(guess: Guess, named: bool) -> tuple[str, ...] | None:
+def names_of_features(guess: Guess, named: bool) -> tuple[str, ...] | None:
     """What the features are called; a word that all names begin with says nothing."""
     columns = guess.columns.observations
     return feature_names(columns) if guess.prefixed or not named else columns
 
 
-def _numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """Values of columns that may hold anything."""
     try:
         read = table.read(ColumnMap((), names))

@@ -116,6 +116,13 @@ def is_state_word(name: str) -> bool:
     return bool(words) and words[0] in _STATES
 
 
+def is_perhaps_action(name: str) -> bool:
+    """Whether a column may be the action under a longer name, or is called "a"."""
+    return re.fullmatch("a|.+_(actions?|acts?)", plain(name)) is not None and not (
+        says_before(name) or only_next(name)
+    )
+
+
 def only_next(name: str) -> bool:
     """Whether a name says "next", be there a column that it follows or not."""
     return bool(_ONLY_NEXT.intersection(_words(name)))
