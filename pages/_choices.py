@@ -20,10 +20,10 @@ from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rule_names import renamed_rules
+from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
 from sarl_core.rollouts.agents import EXPERT_FOLDER, Agent, make_agent, shipped_experts
 from sarl_core.rollouts.seeds import FRESH
-from sarl_core.shielding.effects import fits
 from sarl_core.shielding.shield import Projection
 
 AS_DEMONSTRATED = "as demonstrated"

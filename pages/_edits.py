@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
+from sarl_core.mining.applying import labels_of
 from sarl_core.mining.editing import Edit, History, apply, check_edit
 from sarl_core.mining.holding_out import with_untried_held_out
 from sarl_core.mining.rule_files import rules_from_json
+from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import Ground, ground_of
 from sarl_core.shielding.disagreement import sampled_states
-from sarl_core.shielding.effects import Verdicts, expert_labels, fits, verdicts
+from sarl_core.shielding.effects import Verdicts, verdicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +262,7 @@ def _basis(
         ground = ground_of(_rule_set, sampled_states([_rule_set]))
         return Basis(ground, None, "random state", f"{len(ground.states)} random")
     ground = ground_of(_rule_set, _demonstrations.observations)
-    return Basis(ground, expert_labels(_rule_set, _demonstrations), "demonstrated state", told)
+    return Basis(ground, labels_of(_rule_set, _demonstrations), "demonstrated state", told)
 
 
 def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:

@@ -17,11 +17,11 @@ from sarl_core.explaining.confusion_table import confusion_html
 from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
 from sarl_core.explaining.difference_words import decided_text, rows_text
 from sarl_core.explaining.language import counted
-from sarl_core.mining.difference import check_comparable
+from sarl_core.mining.difference import comparable
+from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
-from sarl_core.shielding.effects import fits
 
 UNEDITED = "before the edits"
 EVERY = "all"
@@ -60,7 +60,7 @@ def compared(
     digests: tuple[str, str, str], _first: RuleSet, _second: RuleSet, _demonstrations: Any
 ) -> tuple[Disagreement, Any]:
     """The comparison, and the states."""
-    check_comparable(_first, _second)
+    _second = comparable(_first, _second).rule_set
     states = (
         sampled_states([_first, _second])
         if _demonstrations is None

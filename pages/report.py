@@ -28,7 +28,7 @@ from sarl_core.explaining.language import counted
 from sarl_core.explaining.report import Report, Wishes
 from sarl_core.explaining.report_again import command_line, mining_command
 from sarl_core.explaining.report_comparison import Result, results_from_text
-from sarl_core.explaining.report_counts import check_fit
+from sarl_core.explaining.report_counts import report_rules
 from sarl_core.explaining.report_thresholds import read_card
 from sarl_core.mining.rules import RuleSet
 
@@ -125,7 +125,7 @@ def order(choices: Choices, demonstrations: Demonstrations) -> Order:
     rule_set, digest = rules_for(choices.rules, choices.rule_file)
     if rule_set is None:
         raise InputError("there are no rules to report; choose some")
-    check_fit(rule_set, demonstrations)
+    report_rules(rule_set, demonstrations)
     results, result_names = results_of_choices(choices, demonstrations)
     card = chosen_card(choices)
     rules_path, data_path = file_names(choices)

@@ -20,8 +20,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import label_text
 from sarl_core.explaining.lit_path import PathFinder
 from sarl_core.explaining.what_if import by_use
+from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import RuleSet
-from sarl_core.shielding.effects import fits
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
 from sarl_core.shielding.shield import Outside, Projection, Shield

@@ -328,6 +328,16 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
             ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
         ]
     )
+    print_notes(document["notes"])
+
+
+def print_notes(notes: Sequence[str]) -> None:
+    """Print what else a person should know, a line each.
+
+    Args:
+        notes: Clauses.
+    """
+    terminal.print_lines([f"note: {note}" for note in notes])
 
 
 def _outside(summary: dict[str, float], shield: Shield) -> str:
@@ -364,6 +374,7 @@ def describe_replay(replay: Replay, path: Path, shielded: Sequence[bool]) -> dic
             {"agent": episode.agent, "shielded": has_shield, **episode.to_dict()["episodes"][0]}
             for episode, has_shield in zip(replay.episodes, shielded, strict=False)
         ],
+        "notes": list(dict.fromkeys(note for one in replay.episodes for note in one.notes)),
     }
 
 
@@ -381,3 +392,4 @@ def print_replay(document: dict[str, Any]) -> None:
             for entry in document["episodes"]
         ],
     )
+    print_notes(document["notes"])

@@ -35,12 +35,13 @@ def diff(
     data/demonstrations/cartpole.parquet`
     """
     with terminal.working("Comparing"):
-        from sarl_core.mining.difference import check_comparable
+        from sarl_core.mining.difference import comparable
+        from sarl_core.mining.rule_order import rules_for
         from sarl_core.mining.rules import RuleSet
         from sarl_core.shielding.disagreement import SAMPLED_STATES, disagreement, sampled_states
 
         one, other = RuleSet.load(first), RuleSet.load(second)
-        check_comparable(one, other)
+        other, notes = comparable(one, other)
         if demonstrations is None:
             states = sampled_states([one, other])
             states_from = (
@@ -48,19 +49,22 @@ def diff(
                 "the same every time; --demonstrations takes those of a file."
             )
         else:
-            states = read_demonstrations(demonstrations, None).observations
+            shown = read_demonstrations(demonstrations, None)
+            one, more = rules_for(one, shown, called="the states")
+            other, notes = comparable(one, other)[0], (*notes, *more)
+            states = shown.observations
             states_from = f"The states are those of {demonstrations}."
         found = disagreement(one, other, states)
     from sarl_core.explaining.difference_words import difference_document, difference_lines
 
     names = (str(first), str(second))
     if as_json:
-        terminal.print_json(
-            difference_document(
-                found,
-                names=names,
-                states_from=str(demonstrations or "random over the range of the thresholds"),
-            )
+        document = difference_document(
+            found,
+            names=names,
+            states_from=str(demonstrations or "random over the range of the thresholds"),
         )
+        terminal.print_json({**document, "notes": list(notes)})
     else:
-        terminal.print_lines(difference_lines(found, names=names, states_from=states_from))
+        lines = difference_lines(found, names=names, states_from=states_from)
+        terminal.print_lines([*lines, *(f"note: {note}" for note in notes)])

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from sarl_core.demonstrations.checks import MAX_FEATURES
+from sarl_core.demonstrations.feature_order import numbered
 from sarl_core.errors import InputError
 
 
@@ -53,7 +54,9 @@ class EnvironmentDescription:
 
 
 @dataclass(frozen=True)
-class _Names:
+class EnvironmentNames:
+    """Names of features with their units, of action dimensions and of their labels."""
+
     features: tuple[tuple[str, str], ...]
     actions: tuple[str, ...]
     labels: tuple[tuple[str, ...], ...] = ()
@@ -70,8 +73,8 @@ _LUNAR_LANDER_FEATURES = (
     ("right leg contact", ""),
 )
 
-_CATALOGUE: dict[str, _Names] = {
-    "CartPole": _Names(
+_CATALOGUE: dict[str, EnvironmentNames] = {
+    "CartPole": EnvironmentNames(
         (
             ("cart position", "m"),
             ("cart velocity", "m/s"),
@@ -81,17 +84,19 @@ _CATALOGUE: dict[str, _Names] = {
         ("push",),
         (("push left", "push right"),),
     ),
-    "LunarLander": _Names(
+    "LunarLander": EnvironmentNames(
         _LUNAR_LANDER_FEATURES,
         ("engine",),
         (("do nothing", "fire left engine", "fire main engine", "fire right engine"),),
     ),
-    "LunarLanderContinuous": _Names(_LUNAR_LANDER_FEATURES, ("main engine", "lateral engines")),
-    "Pendulum": _Names(
+    "LunarLanderContinuous": EnvironmentNames(
+        _LUNAR_LANDER_FEATURES, ("main engine", "lateral engines")
+    ),
+    "Pendulum": EnvironmentNames(
         (("cosine of the angle", ""), ("sine of the angle", ""), ("angular velocity", "rad/s")),
         ("torque",),
     ),
-    "BipedalWalker": _Names(
+    "BipedalWalker": EnvironmentNames(
         (
             ("hull angle", "rad"),
             ("hull angular velocity", ""),
@@ -111,13 +116,15 @@ _CATALOGUE: dict[str, _Names] = {
         ),
         ("hip 1 torque", "knee 1 torque", "hip 2 torque", "knee 2 torque"),
     ),
-    "MountainCar": _Names(
+    "MountainCar": EnvironmentNames(
         (("car position", "m"), ("car velocity", "m/s")),
         ("acceleration",),
         (("accelerate left", "do not accelerate", "accelerate right"),),
     ),
-    "MountainCarContinuous": _Names((("car position", "m"), ("car velocity", "m/s")), ("force",)),
-    "Acrobot": _Names(
+    "MountainCarContinuous": EnvironmentNames(
+        (("car position", "m"), ("car velocity", "m/s")), ("force",)
+    ),
+    "Acrobot": EnvironmentNames(
         (
             ("cosine of angle 1", ""),
             ("sine of angle 1", ""),
@@ -239,7 +246,7 @@ def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
             "be mined; choose an environment with discrete or continuous actions"
         )
     m = len(counts) if low is None else len(low)
-    names = _catalogued(env_id, d, m, discrete=low is None)
+    names = catalogued(env_id, d, m, discrete=low is None)
     return EnvironmentDescription(
         env_id=env_id,
         feature_names=tuple(name for name, _ in names.features),
@@ -260,8 +267,18 @@ def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
     )
 
 
-def _catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> _Names:
-    """Names from the catalogue if they fit the spaces, else numbers."""
+def catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> EnvironmentNames:
+    """Names from the catalogue if they fit the spaces, else numbers.
+
+    Args:
+        env_id: Of an environment that need not be made.
+        d: Number of features.
+        m: Number of action dimensions.
+        discrete: Whether the actions are labels.
+
+    Returns:
+        d features and m actions.
+    """
     name = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1]
     family = name.rsplit("-v", 1)[0].removesuffix("Hardcore")
     for key in (family, f"{family}Continuous"):
@@ -273,7 +290,7 @@ def _catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> _Names:
             and len(names.actions) == m
         ):
             return names
-    return _Names(
-        tuple((f"feature {index}", "") for index in range(d)),
+    return EnvironmentNames(
+        tuple((name, "") for name in numbered(d)),
         ("action",) if m == 1 else tuple(f"action {index}" for index in range(m)),
     )

@@ -26,6 +26,7 @@ from sarl_core.explaining.language import (
 )
 from sarl_core.files import whole_file
 from sarl_core.mining.rounding import Rounding, merged_rules, rounded_rules
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -87,6 +88,7 @@ def prepare(
     require_rules(rule_set)
     rounding, changed = None, 0
     if demonstrations is not None:
+        rule_set = rules_for(rule_set, demonstrations).rule_set
         rounding = rounded_rules(rule_set, demonstrations)
         changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)
         rule_set = rounding.rule_set

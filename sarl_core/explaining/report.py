@@ -19,7 +19,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.explaining.report_again import commands_that_hold, facts
 from sarl_core.explaining.report_comparison import Result, compared
-from sarl_core.explaining.report_counts import Tally, check_fit, same_environment, tally
+from sarl_core.explaining.report_counts import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report_demonstrations import shown
 from sarl_core.explaining.report_gaps import gaps
 from sarl_core.explaining.report_rules import in_order, rules_part
@@ -135,8 +135,8 @@ def make_report(
         CancelledError: If `progress` returned False.
     """
     wishes = wishes or Wishes()
-    check_fit(rule_set, demonstrations)
     as_given = rule_set
+    rule_set, notes = report_rules(rule_set, demonstrations)
     if same_environment(rule_set, demonstrations):
         # A rule file keeps the names of its day; a report speaks as the demonstrations do.
         rule_set = renamed_rules(rule_set, names_of(demonstrations))
@@ -164,6 +164,7 @@ def make_report(
             rules_name=wishes.rules_name,
             demonstrations_name=wishes.demonstrations_name,
             seeds=(wishes.seed, wishes.seed + wishes.episodes - 1) if examples else None,
+            notes=() if same_environment(rule_set, demonstrations) else notes,
         ),
         commands=commands_that_hold(wishes.commands, as_given, trees),
     )

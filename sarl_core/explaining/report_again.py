@@ -41,6 +41,7 @@ def facts(
     rules_name: str,
     demonstrations_name: str,
     seeds: tuple[int, int] | None,
+    notes: Sequence[str] = (),
 ) -> tuple[tuple[str, str], ...]:
     """What tells a report from any other.
 
@@ -51,6 +52,7 @@ def facts(
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
         seeds: First and last of the episodes that were played; None where none were.
+        notes: What is to be said of how rules and demonstrations were matched.
 
     Returns:
         Names and values.
@@ -67,6 +69,7 @@ def facts(
         found.append(("Seed of the demonstrations", str(demonstrations.seed)))
     if seeds is not None:
         found.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
+    found += [("Which feature is which", note) for note in notes]
     versions = [f"Python {platform.python_version()}"]
     versions += [f"{package} {_version(package)}" for package in _PACKAGES]
     return (*found, ("Versions", ", ".join(versions)))

@@ -13,6 +13,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.explaining.edited_sets import is_plain
 from sarl_core.mining.evidence import wilson
+from sarl_core.mining.rule_order import Fitted, rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.shield import Shield
 
@@ -78,54 +79,31 @@ class Tally:
         return Share(sum(share.part for share in self.shares), int((self.rules >= 0).sum()))
 
 
-def check_fit(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
-    """Refuse demonstrations of other features or actions than the rules'.
-
-    Of one environment features are what they are, whatever people call them.
+def report_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Fitted:
+    """The rules as a report speaks of them: in the order of the demonstrations' features.
 
     Args:
         rule_set: The rules.
         demonstrations: N pairs.
 
+    Returns:
+        Under their own names.
+
     Raises:
-        InputError: If one differs.
+        InputError: If features or actions are others.
     """
-    advice = "give the demonstrations the rules were mined from"
-    asked = [feature.name for feature in rule_set.source.features]
-    there = [feature.name for feature in demonstrations.features]
-    if len(asked) != len(there):
-        raise InputError(
-            f"the rules ask about {len(asked)} features and the demonstrations have {len(there)}; "
-            f"{advice}"
-        )
-    alike = same_environment(rule_set, demonstrations)
-    for number, (one, other) in enumerate(zip(asked, there, strict=True), start=1):
-        if one != other and not alike:
-            raise InputError(
-                f"feature {number} is {one!r} in the rules and {other!r} in the demonstrations; "
-                f"{advice}"
-            )
-    actions = demonstrations.action_dimensions
-    if len(rule_set.actions) != len(actions):
-        raise InputError(
-            f"the rules are for {len(rule_set.actions)} action dimensions and the demonstrations "
-            f"have {len(actions)}; {advice}"
-        )
-    for rules, shown in zip(rule_set.actions, actions, strict=True):
-        if rules.is_interval != (shown.kind == "interval"):
-            kinds = ("continuous", "discrete") if rules.is_interval else ("discrete", "continuous")
-            raise InputError(
-                f"the rules are for {kinds[0]} actions and the demonstrations have {kinds[1]} "
-                f"ones; {advice}"
-            )
+    fitted = rules_for(rule_set, demonstrations)
+    for rules, shown in zip(fitted.rule_set.actions, demonstrations.action_dimensions, strict=True):
         if not rules.is_interval and (rules.n_labels, rules.first) != (
             len(shown.labels),
             shown.first,
         ):
             raise InputError(
                 f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
-                f"{len(shown.labels)} in the demonstrations; {advice}"
+                f"{len(shown.labels)} in the demonstrations; give the demonstrations the rules "
+                "were mined from"
             )
+    return fitted
 
 
 def same_environment(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
@@ -154,7 +132,7 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     Raises:
         InputError: If features or actions differ.
     """
-    check_fit(rule_set, demonstrations)
+    rule_set = report_rules(rule_set, demonstrations).rule_set
     actions = demonstrations.action_columns
     found = Shield(rule_set).decide_batch(demonstrations.observations, actions).rules
     labels = np.stack(

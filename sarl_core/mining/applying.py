@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError
 from sarl_core.mining.rule_tree import NO_RULE, Numbered, RuleNode, tree_of
 from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import walk
@@ -61,16 +60,12 @@ def labels_of(rule_set: RuleSet, demonstrations: Demonstrations) -> NDArray[np.i
     """What the expert did, as labels of a rule set.
 
     Args:
-        rule_set: Of the same features and action dimensions.
+        rule_set: In the order of the same features and action dimensions.
         demonstrations: N pairs.
 
     Returns:
         Shape (N, m), one column an action dimension.
-
-    Raises:
-        InputError: If the rules are for other features or actions.
     """
-    require_same_kind(rule_set, demonstrations)
     return np.stack(
         [
             dimension.labels_of(demonstrations.action_columns[:, index])
@@ -78,41 +73,6 @@ def labels_of(rule_set: RuleSet, demonstrations: Demonstrations) -> NDArray[np.i
         ],
         axis=1,
     )
-
-
-def require_same_kind(rule_set: RuleSet, demonstrations: Demonstrations) -> None:
-    """Refuse demonstrations that rules cannot be asked about.
-
-    Args:
-        rule_set: The rules.
-        demonstrations: Of whatever environment.
-
-    Raises:
-        InputError: If features or actions are others.
-    """
-    expected, given = len(rule_set.source.features), demonstrations.observations.shape[1]
-    if expected != given:
-        raise InputError(
-            f"the rules ask about {expected} features and the demonstrations have {given}; "
-            "choose demonstrations of the rules' environment"
-        )
-    dimensions = demonstrations.action_dimensions
-    if len(rule_set.actions) != len(dimensions):
-        raise InputError(
-            f"the rules are for {len(rule_set.actions)} action dimensions and the demonstrations "
-            f"have {len(dimensions)}; choose demonstrations of the rules' environment"
-        )
-    for action, dimension in zip(rule_set.actions, dimensions, strict=True):
-        if action.is_interval != (dimension.kind == "interval"):
-            raise InputError(
-                f"the action {action.name!r} is {_kind(action.is_interval)} in the rules and "
-                f"{_kind(dimension.kind == 'interval')} in the demonstrations; choose "
-                "demonstrations of the rules' environment"
-            )
-
-
-def _kind(continuous: bool) -> str:
-    return "continuous" if continuous else "discrete"
 
 
 def _rule_of_each(nodes: list[RuleNode], observations: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -16,8 +16,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.feature_order import Named, only_counts
 from sarl_core.errors import InputError
 from sarl_core.mining.manual_rules import region_of
+from sarl_core.mining.rule_order import Fitted, fitted_rules
 from sarl_core.mining.rules import Rule, RuleSet
 
 What = Literal["conditions", "action", "switched", "place", "origin"]
@@ -58,31 +60,44 @@ class Difference:
     same: int
 
 
-def check_comparable(first: RuleSet, second: RuleSet) -> None:
-    """Refuse to compare rule sets that speak of different things.
+def comparable(first: RuleSet, second: RuleSet) -> Fitted:
+    """Put a rule set into the order of another's features, or refuse to compare them.
 
-    Names may have been edited: where both say the same environment, the numbers of features and
-    labels tell.
+    Names may have been edited: where both say the same environment, the places of features and
+    the numbers of labels tell.
 
     Args:
         first: A rule set.
         second: Another.
 
+    Returns:
+        The second set, in the first one's order.
+
     Raises:
         InputError: If their features, actions or intervals differ.
     """
     known = first.source.env_id != "" and first.source.env_id == second.source.env_id
-    names = [[feature.name for feature in one.source.features] for one in (first, second)]
-    if len(names[0]) != len(names[1]) or (not known and names[0] != names[1]):
-        raise InputError(
-            f"the two rule sets are for different features ({_listed(names[0])}; "
-            f"{_listed(names[1])}); give two of the same environment"
-        )
+    if len(first.source.features) != len(second.source.features):
+        raise _of_other_features(first, second)
     if len(first.actions) != len(second.actions):
         raise InputError(
             f"the two rule sets are for {len(first.actions)} and {len(second.actions)} action "
             "dimensions; give two of the same environment"
         )
+    fitted = fitted_rules(
+        second,
+        Named(
+            "the first rules",
+            tuple(feature.name for feature in first.source.features),
+            first.source.env_id,
+        ),
+        tuple(action.name for action in first.actions),
+        rules="the second rules",
+    )
+    others = "" not in (first.source.env_id, second.source.env_id) and not known
+    if others and fitted.rule_set is not second:
+        raise _of_other_features(first, second)
+    second = fitted.rule_set
     for one, other in zip(first.actions, second.actions, strict=True):
         if one.edges != other.edges:
             divided = [
@@ -96,11 +111,21 @@ def check_comparable(first: RuleSet, second: RuleSet) -> None:
                 "other; mine both with the same divider and bounds"
             )
         same_labels = one.n_labels == other.n_labels and one.first == other.first
-        if not same_labels or (not known and one.label_names != other.label_names):
+        named = not known and not any(map(only_counts, (one.label_names, other.label_names)))
+        if not same_labels or (named and one.label_names != other.label_names):
             raise InputError(
                 f"the two rule sets are for different actions ({_listed(one.label_names)}; "
                 f"{_listed(other.label_names)}); give two of the same environment"
             )
+    return fitted
+
+
+def _of_other_features(first: RuleSet, second: RuleSet) -> InputError:
+    names = (tuple(one.name for one in each.source.features) for each in (first, second))
+    return InputError(
+        f"the two rule sets are for different features ({'; '.join(map(_listed, names))}); give "
+        "two of the same environment"
+    )
 
 
 def _listed(names: tuple[str, ...] | list[str], most: int = 4) -> str:
@@ -129,7 +154,7 @@ def rule_difference(
     Raises:
         InputError: If the two are for different features or actions.
     """
-    check_comparable(first, second)
+    second = comparable(first, second).rule_set
     pairing = _Pairing(first, second)
     pairing.by_conditions()
     if regions is not None:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.applying import Applications, applications, require_same_kind
+from sarl_core.mining.applying import Applications, applications
 from sarl_core.mining.evidence import DataBox
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
@@ -30,7 +31,7 @@ def with_boxes(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
     Raises:
         InputError: If the rules are for other features or actions.
     """
-    require_same_kind(rule_set, demonstrations)
+    rule_set = rules_for(rule_set, demonstrations).rule_set
     found = applications(rule_set, demonstrations.observations)
     boxes = _boxes(found, demonstrations.observations, len(rule_set.rules))
     return replace(

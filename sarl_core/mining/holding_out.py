@@ -17,6 +17,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.applying import applications, labels_of
 from sarl_core.mining.evidence import Z_95, HeldOut, Interval, wilson
 from sarl_core.mining.landscape import NodeCounts
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.tree import PolicyTree
 
@@ -82,6 +83,7 @@ def with_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
     Raises:
         InputError: If the rules are for other features or actions.
     """
+    rule_set = rules_for(rule_set, held_out).rule_set
     shown = labels_of(rule_set, held_out)
     found = applications(rule_set, held_out.observations)
     count = len(rule_set.rules)
@@ -116,9 +118,10 @@ def with_untried_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSe
     Raises:
         InputError: If the rules are for other features or actions.
     """
-    untried = tuple(rule for rule in rule_set.rules if rule.held_out is None)
-    if not untried:
+    if all(rule.held_out is not None for rule in rule_set.rules):
         return rule_set
+    rule_set = rules_for(rule_set, held_out).rule_set
+    untried = tuple(rule for rule in rule_set.rules if rule.held_out is None)
     tried = iter(with_held_out(replace(rule_set, rules=untried), held_out).rules)
     return replace(
         rule_set,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Condition, Rule, RuleSet
 
 _MOST_DIGITS = 17  # tell every double from every other
@@ -89,12 +89,7 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
     Raises:
         InputError: If the demonstrations have another number of features than the rules.
     """
-    d = demonstrations.observations.shape[1]
-    if d != len(rule_set.source.features):
-        raise InputError(
-            f"the rules ask about {len(rule_set.source.features)} features and the demonstrations "
-            f"have {d}; choose demonstrations of the rules' environment"
-        )
+    rule_set = rules_for(rule_set, demonstrations).rule_set
     columns = np.ascontiguousarray(demonstrations.observations.T)
     able = [_can_apply(rule) for rule in rule_set.rules]
     whole: frozenset[int] = frozenset()

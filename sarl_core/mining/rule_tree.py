@@ -13,6 +13,7 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet, node_of
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 
@@ -96,18 +97,7 @@ def recount(rule_set: RuleSet, demonstrations: Demonstrations) -> tuple[PolicyTr
         InputError: If the rules are not the leaves of trees, or are for other features or
             actions.
     """
-    if len(rule_set.source.features) != demonstrations.observations.shape[1]:
-        raise InputError(
-            f"the rules ask about {len(rule_set.source.features)} features and the demonstrations "
-            f"have {demonstrations.observations.shape[1]}; choose demonstrations of the rules' "
-            "environment"
-        )
-    if len(rule_set.actions) != demonstrations.action_columns.shape[1]:
-        raise InputError(
-            f"the rules are for {len(rule_set.actions)} action dimensions and the demonstrations "
-            f"have {demonstrations.action_columns.shape[1]}; choose demonstrations of the rules' "
-            "environment"
-        )
+    rule_set = rules_for(rule_set, demonstrations).rule_set
     return tuple(
         count_tree(
             _structure(rule_set, dimension), demonstrations, dimension, divider=rule_set.divider

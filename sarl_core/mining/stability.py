@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.applying import Applications, applications, require_same_kind
+from sarl_core.mining.applying import Applications, applications
 from sarl_core.mining.progress import Progress
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Operator, Rule, RuleSet
 from sarl_core.mining.tasks import run_each
 from sarl_core.mining.tree import grow_policy_trees
@@ -152,7 +153,7 @@ def rule_stability(
             f"{rounds} rounds with a limit of {limit:g} show nothing; give at least one round and "
             "a limit above 0, at most 1"
         )
-    require_same_kind(rule_set, demonstrations)
+    rule_set = rules_for(rule_set, demonstrations).rule_set
     rng = np.random.default_rng(seed)
     count = demonstrations.n_episodes
     own = applications(rule_set, demonstrations.observations)

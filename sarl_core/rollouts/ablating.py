@@ -15,7 +15,7 @@ from sarl_core.rollouts.ablation import MOST_RULES, Ablation, rules_to_take_out
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.comparison import crashed
 from sarl_core.rollouts.episodes import Episodes, join, run_seeds
-from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.pool import LARGEST_PIECE, Found, Task, WorkerPool
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rule
@@ -49,7 +49,7 @@ class AblationRecord:
     Attributes:
         env_id: Environment.
         agent: Chooses the actions.
-        shield: With all its rules.
+        shield: With all its rules, in the order of the environment's features.
         seed: Of the first episode.
     """
 
@@ -66,7 +66,7 @@ class AblationRecord:
             InputError: If the environment cannot be used, the shield is not for it, or there is
                 no rule to take out.
         """
-        check_environment(env_id, shield)
+        shield = shield_for(env_id, shield)
         if not any(rule.enabled for rule in shield.rule_set.rules):
             raise InputError(
                 "the rule set has no rule in force that could be taken out; mine with lower "

@@ -55,6 +55,7 @@ class Episodes:
             outside of, (E,) int64; none where not given.
         withheld: Those of them at which no action was changed, because rules abstain there,
             (E,) int64; none where not given.
+        notes: What is to be said of how rules and environment were matched, as clauses.
     """
 
     env_id: str
@@ -71,6 +72,7 @@ class Episodes:
     flips: NDArray[np.int64] | None = None
     outside: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     withheld: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -152,6 +154,7 @@ class Episodes:
         return {
             "episodes": [dict(zip(names, row, strict=True)) for row in rows],
             "summary": self.summary(),
+            "notes": list(self.notes),
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -177,7 +180,7 @@ class Episodes:
 _COLUMNS = tuple(
     column.name
     for column in fields(Episodes)
-    if column.name not in ("env_id", "agent", "steps", "flips")
+    if column.name not in ("env_id", "agent", "steps", "flips", "notes")
 )
 
 

@@ -24,6 +24,7 @@ from sarl_core.rollouts.film import Palette
 from sarl_core.rollouts.filming import _no_display as no_display
 from sarl_core.rollouts.filming import _picture as draw
 from sarl_core.rollouts.filming import picture_speed
+from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.progress import CancelledError, Progress, report
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.rollouts.spaces import SpaceAdapter, adapt
@@ -151,6 +152,8 @@ def example_frames(
         if value < 1:
             raise InputError(f"the number of {name} is {value}; give 1 or more")
     picture_speed(env_id)  # refuses an environment without pictures before anything is played
+    shield = shield_for(env_id, Shield(rule_set))
+    rule_set = shield.rule_set
     # Half the way is playing, half is drawing.
     total = 2 * episodes * len(players)
     played: list[Played] = []
@@ -162,7 +165,7 @@ def example_frames(
         def told(done: int, _: int, before: int = number * episodes) -> None:
             report(progress, before + done, total)
 
-        played.append(_play(env_id, rule_set, player, episodes, seed, told))
+        played.append(_play(env_id, shield, player, episodes, seed, told))
         for rule, found in places.items():
             if len(found) < each:
                 found += _spread(played[-1].steps, rule, rule_set, number, each - len(found))
@@ -187,9 +190,8 @@ def example_frames(
 
 
 def _play(
-    env_id: str, rule_set: RuleSet, player: Player, episodes: int, seed: int, told: Progress
+    env_id: str, shield: Shield, player: Player, episodes: int, seed: int, told: Progress
 ) -> Played:
-    shield = Shield(rule_set)
     found = rollout(
         env_id,
         make_agent(player.agent, env_id, stochastic=player.stochastic, seed=seed),
@@ -201,20 +203,10 @@ def _play(
     steps = found.steps
     assert steps is not None
     if not player.shielded:
-        _check_width(rule_set, steps)
         rules = shield.decide_batch(steps.observation, steps.executed).rules
         columns = {name: getattr(steps, name) for name in StepTable.__dataclass_fields__}
         steps = StepTable(**(columns | {"rules": rules}))
     return Played(player, found.seeds, steps)
-
-
-def _check_width(rule_set: RuleSet, steps: StepTable) -> None:
-    wanted, there = len(rule_set.actions), steps.executed.shape[1]
-    if wanted != there:
-        raise InputError(
-            f"the rules are for {wanted} action dimensions and the environment takes {there}; "
-            "choose the environment of the rules"
-        )
 
 
 def _spread(

@@ -16,7 +16,8 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.film import Film
 from sarl_core.rollouts.flips import count_flips
-from sarl_core.rollouts.spaces import SpaceAdapter, adapt
+from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.spaces import SpaceAdapter
 from sarl_core.rollouts.steps import StepTable
 
 if TYPE_CHECKING:
@@ -94,10 +95,10 @@ def film_episode(
         InputError: If the pictures are of another kind, or the shield does not fit.
         WorkError: If drawing fails.
     """
+    adapter, shield, notes = check_environment(env_id, shield)
     generator = np.random.default_rng(seed)
     rows: list[_Row] = []
     with _no_display(), _drawing(env_id, shield) as env:
-        adapter = adapt(env)
         observation, _ = env.reset(seed=seed)
         terminated = truncated = False
         while not (terminated or truncated):
@@ -126,6 +127,7 @@ def film_episode(
         outside=np.array([int(steps.outside.sum())]),
         withheld=np.array([int((steps.outside & ~steps.intervened).sum())]),
         flips=count_flips(steps.intervened, steps.episode),
+        notes=notes,
     )
 
 

@@ -23,6 +23,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.film import Film, Palette
 from sarl_core.rollouts.filming import film_episode, picture_speed
 from sarl_core.rollouts.overlay import Caption, Panel, action_text, side_by_side_picture
+from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.rendering import DescribeRule, Replay, plain_descriptions
 from sarl_core.shielding.shield import Decision, Shield
@@ -156,6 +157,7 @@ def fork(
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     fps, limit = picture_speed(env_id)
     palette = Palette(OVERLAY_COLOURS)
+    shield = shield_for(env_id, shield)
     describe = describe_rule or plain_descriptions(shield.rule_set)
     episodes: list[Episodes] = []
     panels: list[Panel] = []

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.progress import Progress
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -94,10 +95,11 @@ def find_gaps(
         InputError: If agent, rules and environment do not fit.
         CancelledError: If `progress` returned False.
     """
+    shield = shield_for(env_id, Shield(rules, projection=projection))
     found = rollout(
         env_id,
         agent,
-        shield=Shield(rules, projection=projection),
+        shield=shield,
         episodes=episodes,
         seed=seed,
         jobs=jobs,
@@ -108,7 +110,7 @@ def find_gaps(
     missing = table.rules < 0
     rows = np.flatnonzero(missing.any(axis=1))
     return Gaps(
-        feature_names=tuple(feature.name for feature in rules.source.features),
+        feature_names=tuple(feature.name for feature in shield.rule_set.source.features),
         episode=table.episode[rows],
         step=table.step[rows],
         observations=table.observation[rows],

@@ -32,6 +32,7 @@ class Outcome(NamedTuple):
     flips: NDArray[np.int64]
     outside: NDArray[np.int64]
     withheld: NDArray[np.int64]
+    notes: tuple[str, ...]
 
 
 class Choice(NamedTuple):
@@ -109,9 +110,9 @@ class _Run:
         max_steps: int,
         keep_steps: bool,
     ) -> None:
-        self.env_id, self.agent, self.shield = env_id, agent, shield
+        self.env_id, self.agent = env_id, agent
         self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
-        self.adapter = check_environment(env_id, shield)
+        self.adapter, self.shield, self.notes = check_environment(env_id, shield)
         self.lanes: list[_Lane] = []
         self.states = np.zeros((0, self.adapter.n_features), dtype=np.float32)
         self.started = 0
@@ -228,6 +229,7 @@ class _Run:
             self.flips,
             self.outside,
             self.withheld,
+            self.notes,
         )
 
 
@@ -271,25 +273,56 @@ def choose(
     )
 
 
-def check_environment(env_id: str, shield: Shield | None) -> SpaceAdapter:
-    """Read an environment's spaces, and refuse what cannot be run.
+def shield_for(env_id: str, shield: Shield) -> Shield:
+    """The shield whose rules are in the order of an environment's features and actions.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        shield: In whatever order.
+
+    Returns:
+        The same object where the order is the same.
+
+    Raises:
+        InputError: If the environment cannot be used, or the shield is not for it.
+    """
+    fitted = check_environment(env_id, shield).shield
+    return shield if fitted is None else fitted
+
+
+class Ready(NamedTuple):
+    """An environment that can be run, and the shield for it.
+
+    Attributes:
+        adapter: Of its spaces.
+        shield: In the order of its features, or None.
+        notes: What is to be said of that order.
+    """
+
+    adapter: SpaceAdapter
+    shield: Shield | None
+    notes: tuple[str, ...]
+
+
+def check_environment(env_id: str, shield: Shield | None) -> Ready:
+    """Read an environment's spaces, put the shield into their order, and refuse what cannot be run.
 
     Args:
         env_id: What ``gymnasium.make`` takes.
         shield: To be used in it, or None.
 
     Returns:
-        Its adapter.
+        Its adapter, and the shield as it is to be used.
 
     Raises:
         InputError: If the environment cannot be used, or the shield is not for it.
     """
     describe_environment(env_id)
     env = make_environment(env_id)
-    if shield is not None:
-        from sarl_core.shielding.wrappers import check_fit
-
-        check_fit(env.observation_space, env.action_space, shield)
     adapter = adapt(env)
     env.close()
-    return adapter
+    if shield is None:
+        return Ready(adapter, None, ())
+    from sarl_core.shielding.wrappers import fitted
+
+    return Ready(adapter, *fitted(shield, adapter.observation_space, adapter.action_space, env_id))

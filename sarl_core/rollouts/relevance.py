@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.environments import describe_environment, make_environment
 from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import PolicyAgent
-from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.seeds import RELEVANCE
@@ -194,9 +194,7 @@ def study_relevance(
             raise InputError(f"{name} is {value} and must be at least {least}; give more")
     if len(set(seeds)) < len(seeds) or min(seeds) < 0:
         raise InputError("the seeds of the learners must differ and be 0 or more; give others")
-    shields = [Shield(rules) for rules in rule_sets.values()]
-    for shield in shields:
-        check_environment(env_id, shield)
+    shields = [shield_for(env_id, Shield(rules)) for rules in rule_sets.values()]
     shape = (len(shields), len(seeds), phases + 1)
     applied, broken = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
     returns = np.zeros(shape[1:])

@@ -110,7 +110,7 @@ def without_rule(shield: Shield, index: int) -> Shield:
     rules = list(shield.rule_set.rules)
     rules[index] = replace(rules[index], enabled=False)
     rule_set = replace(shield.rule_set, rules=tuple(rules))
-    return Shield(rule_set, projection=shield.projection, outside=shield.outside)
+    return shield.with_rules(rule_set)
 
 
 def _decides_otherwise(episodes: Episodes, shield: Shield, index: int) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.difference import Difference, check_comparable, rule_difference
+from sarl_core.mining.difference import Difference, comparable, rule_difference
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import Ground, deciding, ground_of, labels_at, regions
 
@@ -126,7 +126,11 @@ def disagreement(
         InputError: If the two are for different features or actions, or the states are.
         ValueError: If there are no states, or the two were walked with different ones.
     """
-    check_comparable(_rules_of(first), _rules_of(second))
+    ordered = comparable(_rules_of(first), _rules_of(second)).rule_set
+    if ordered is not _rules_of(second):
+        # What was walked in another order is walked again, with the states of the first.
+        states = first.states if isinstance(first, Ground) else states
+        second = ordered
     grounds = [_walked(each, states) for each in (first, second)]
     if len(grounds[0].states) != len(grounds[1].states):
         raise ValueError("the two rule sets were walked with different states")

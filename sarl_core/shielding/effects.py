@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import Ground, deciding, labels_at
 
@@ -63,46 +62,6 @@ class Verdicts:
         if self.right is None or not covered:
             return float("nan")
         return int(self.right.sum()) / covered
-
-
-def fits(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
-    """Whether the states and actions of demonstrations are those a rule set speaks of.
-
-    Args:
-        rule_set: Of m action dimensions.
-        demonstrations: Any.
-
-    Returns:
-        Whether there are as many features and actions of the same kinds, by the same names or of
-        the same environment.
-    """
-    source, actions = rule_set.source, rule_set.actions
-    names = [feature.name for feature in source.features]
-    theirs = [feature.name for feature in demonstrations.features]
-    shown = demonstrations.action_dimensions
-    if len(names) != len(theirs) or len(actions) != len(shown):
-        return False
-    known = source.env_id != "" and source.env_id == demonstrations.env_id
-    return (known or names == theirs) and all(
-        action.is_interval == (one.kind == "interval")
-        for action, one in zip(actions, shown, strict=True)
-    )
-
-
-def expert_labels(rule_set: RuleSet, demonstrations: Demonstrations) -> NDArray[np.int64]:
-    """What the expert did, in the labels of a rule set.
-
-    Args:
-        rule_set: Of m action dimensions.
-        demonstrations: N pairs with as many.
-
-    Returns:
-        Shape (N, m).
-    """
-    columns = demonstrations.action_columns
-    return np.stack(
-        [action.labels_of(columns[:, at]) for at, action in enumerate(rule_set.actions)], axis=1
-    )
 
 
 def verdicts(

@@ -237,6 +237,17 @@ class Shield:
             executed.reshape(proposed.shape), proposed, rules, intervened, margin, outside
         )
 
+    def with_rules(self, rule_set: RuleSet) -> Shield:
+        """The same way to act with other rules.
+
+        Args:
+            rule_set: The rules.
+
+        Returns:
+            Another shield; this one stays what it is.
+        """
+        return Shield(rule_set, projection=self.projection, outside=self.outside)
+
     @property
     def scanned(self) -> tuple[int, ...]:
         """The rules in whose place another may apply when they are taken out.

@@ -11,13 +11,18 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from sarl_core.shielding.shield import BatchDecision, Shield
-from sarl_core.shielding.wrappers import StepRecord, check_fit, is_flat
+from sarl_core.shielding.wrappers import StepRecord, fitted, is_flat, spec_id
 
 
 class ShieldedVecEnv(VecEnvWrapper):
     """Environments side by side, every action of each passing through one shield.
 
     The record of each step is in ``infos[i]["shield"]``.
+
+    Attributes:
+        shield: The rules in force, in the order of the environments' features.
+        notes: What is to be said of that order, where names do not tell it.
+        penalty: Taken off the reward at every intervention.
     """
 
     def __init__(self, venv: VecEnv, shield: Shield, *, penalty: float = 0.0) -> None:
@@ -29,11 +34,13 @@ class ShieldedVecEnv(VecEnvWrapper):
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment.
+            InputError: If the rules are not for the spaces of this environment, or its features
+                have other names than theirs.
         """
-        check_fit(venv.observation_space, venv.action_space, shield)
         super().__init__(venv)
-        self.shield = shield
+        self.shield, self.notes = fitted(
+            shield, venv.observation_space, venv.action_space, _id_of(venv)
+        )
         self.penalty = penalty
         self._states = np.empty((0, 0), dtype=np.float32)
         self._decision: BatchDecision | None = None
@@ -103,6 +110,14 @@ class ShieldedVecEnv(VecEnvWrapper):
             return
         rows = [flatten(space, _row(observations, i)) for i in range(self.num_envs)]
         self._states = np.array(rows, dtype=np.float32)
+
+
+def _id_of(venv: VecEnv) -> str:
+    """The id of the environments; "" where it cannot be asked for."""
+    try:
+        return spec_id(venv.get_attr("spec", indices=0)[0])
+    except (AttributeError, NotImplementedError, IndexError):
+        return ""
 
 
 def _row(observations: Any, i: int) -> Any:

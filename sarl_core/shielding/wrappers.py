@@ -8,7 +8,10 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces.utils import flatten
 
+from sarl_core.demonstrations.environments import catalogued
+from sarl_core.demonstrations.feature_order import Named
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_order import fitted_rules
 from sarl_core.shielding.shield import Shield
 
 
@@ -44,6 +47,11 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
 
     Whoever acts in it, a learner, an evaluation or a renderer, cannot do otherwise. The record
     of each step is in ``info["shield"]``.
+
+    Attributes:
+        shield: The rules in force, in the order of the environment's features.
+        notes: What is to be said of that order, where names do not tell it.
+        penalty: Taken off the reward at every intervention.
     """
 
     def __init__(
@@ -57,12 +65,14 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment.
+            InputError: If the rules are not for the spaces of this environment, or its features
+                have other names than theirs.
         """
         gymnasium.utils.RecordConstructorArgs.__init__(self, shield=shield, penalty=penalty)
         super().__init__(env)
-        check_fit(env.observation_space, env.action_space, shield)
-        self.shield = shield
+        # A wrapper that changes observations may have changed what their entries are.
+        env_id = "" if _observes_otherwise(env) else spec_id(env.spec)
+        self.shield, self.notes = fitted(shield, env.observation_space, env.action_space, env_id)
         self.penalty = penalty
         self._flat = is_flat(env.observation_space)
         self._observation: Any = None
@@ -120,6 +130,83 @@ def is_flat(space: gymnasium.Space[Any]) -> bool:
         False where `flatten` is needed.
     """
     return isinstance(space, gymnasium.spaces.Box) and len(space.shape) == 1
+
+
+class FittedShield(NamedTuple):
+    """A shield for one environment.
+
+    Attributes:
+        shield: Its rules are in the order of the environment's features and actions, under the
+            numbers they had.
+        notes: What is to be said of that order, as clauses; none where it was the same.
+    """
+
+    shield: Shield
+    notes: tuple[str, ...]
+
+
+def fitted(
+    shield: Shield,
+    observation_space: gymnasium.Space[Any],
+    action_space: gymnasium.Space[Any],
+    env_id: str = "",
+) -> FittedShield:
+    """Put a shield's rules into the order of an environment's features, by their names.
+
+    Args:
+        shield: The rules.
+        observation_space: Of the environment.
+        action_space: Of the environment.
+        env_id: Which tells the names of its features, where they are known; "" if unknown.
+
+    Returns:
+        The same shield where the order is the same.
+
+    Raises:
+        InputError: If the number of features, the kind and number of actions or their names
+            differ.
+    """
+    check_fit(observation_space, action_space, shield)
+    rule_set = shield.rule_set
+    discrete = not rule_set.actions[0].is_interval
+    names = catalogued(
+        env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
+    )
+    found = fitted_rules(
+        rule_set,
+        Named(
+            env_id.rsplit(":", 1)[-1] or "the environment",
+            tuple(name for name, _ in names.features),
+            env_id,
+        ),
+        names.actions,
+    )
+    if found.rule_set is rule_set:
+        return FittedShield(shield, found.notes)
+    return FittedShield(shield.with_rules(found.rule_set), found.notes)
+
+
+def spec_id(spec: Any) -> str:
+    """The id of a made environment, as ``gymnasium.make`` took it.
+
+    Args:
+        spec: Its ``spec``, or None.
+
+    Returns:
+        "" where it has none.
+    """
+    return str(getattr(spec, "id", "") or "")
+
+
+def _observes_otherwise(env: Any) -> bool:
+    """Whether a wrapper changes the observations, other than by laying them flat."""
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, gymnasium.ObservationWrapper) and not isinstance(
+            env, gymnasium.wrappers.FlattenObservation
+        ):
+            return True
+        env = env.env
+    return False
 
 
 def check_fit(

@@ -22,14 +22,16 @@ from sarl_core.explaining.difference_words import (
     what_text,
 )
 from sarl_core.explaining.edit_words import change_text, conflict_text, edit_text, state_text
+from sarl_core.mining.applying import labels_of
 from sarl_core.mining.editing import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.manual_rules import Ask, manual_rule
+from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import disagreement
-from sarl_core.shielding.effects import change, expert_labels, fits, verdicts
+from sarl_core.shielding.effects import change, verdicts
 
 ACTIONS = (LabelledDimension("push", ("left", "right")),)
 STATES = np.linspace(0.05, 0.95, 10, dtype=np.float32).reshape(-1, 1)
@@ -75,7 +77,7 @@ def test_what_became_of_a_rule():
 
 
 def test_a_change_and_a_conflict_in_words():
-    ground, expert = ground_of(RULES, STATES), expert_labels(RULES, SHOWN)
+    ground, expert = ground_of(RULES, STATES), labels_of(RULES, SHOWN)
     before = verdicts(ground, RULES, expert)
     after = verdicts(ground, apply(RULES, [Add(HAND)]), expert)
     # Above 0.3 are 7 states: 5 had no rule, 2 (0.35 and 0.45) the other one.

@@ -7,7 +7,7 @@ import pytest
 
 from sarl_core import InputError, RuleSet
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.mining.difference import check_comparable, rule_difference
+from sarl_core.mining.difference import comparable, rule_difference
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
@@ -171,10 +171,8 @@ def test_sets_for_other_things_are_refused_in_one_sentence(more, words):
 
 def test_another_divider_is_named_and_new_names_are_no_hindrance():
     with pytest.raises(InputError, match="2 intervals in one rule set and 3 intervals"):
-        check_comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-1, 0, 1, 2)))
+        comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-1, 0, 1, 2)))
     with pytest.raises(InputError, match="some edges"):
-        check_comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-2, 0, 2)))
+        comparable(rules(actions=intervals(-1, 0, 1)), rules(actions=intervals(-2, 0, 2)))
     renamed = replace(SOURCE, features=(Feature("tilt", "°"), Feature("pace", "")))
-    check_comparable(
-        rules(), rules(source=renamed, actions=(LabelledDimension("shove", ("l", "r")),))
-    )
+    comparable(rules(), rules(source=renamed, actions=(LabelledDimension("shove", ("l", "r")),)))

@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
+from sarl_core.mining.applying import labels_of
 from sarl_core.mining.editing import Add, Move, Pin, Switch, apply
 from sarl_core.mining.manual_rules import Ask, manual_rule
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.deciding import deciding, ground_of, labels_at, regions
 from sarl_core.shielding.disagreement import disagreement, sampled_states
-from sarl_core.shielding.effects import change, expert_labels, verdicts
+from sarl_core.shielding.effects import change, verdicts
 
 
 def walk(n: int = 250) -> Demonstrations:
@@ -127,7 +128,7 @@ def test_a_region_is_where_a_rule_applies_whatever_comes_before_it():
 def test_effects_are_what_counting_one_by_one_gives():
     edited = apply(FINE, EDITS)
     ground = ground_of(FINE, DATA.observations)
-    expert = expert_labels(FINE, DATA)
+    expert = labels_of(FINE, DATA)
     assert expert.tolist() == DATA.actions.tolist()
     found = verdicts(ground, edited, expert)
     covered = right = 0

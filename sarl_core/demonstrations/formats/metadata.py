@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.feature_order import Order
 from sarl_core.errors import InputError
 
 KEY = "sarl"
@@ -50,6 +51,24 @@ class Metadata:
         if any(self.label_names):
             return True
         return False if self.action_low else None
+
+    def with_actions_in(self, order: Order) -> Metadata:
+        """The same with its action dimensions in another order.
+
+        Args:
+            order: Of its action dimensions.
+
+        Returns:
+            What was not said stays so.
+        """
+        return replace(
+            self,
+            action_names=order.put(self.action_names),
+            label_names=order.put(self.label_names),
+            label_first=order.put(self.label_first),
+            action_low=order.put(self.action_low),
+            action_high=order.put(self.action_high),
+        )
 
 
 def encode_metadata(demonstrations: Demonstrations) -> str:

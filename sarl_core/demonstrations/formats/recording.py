@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.checks import MAX_LABELS
 from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
+from sarl_core.demonstrations.feature_order import Named, line_up, numbered, only_counts
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
@@ -160,41 +161,47 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
             f"its actions are {kinds[says]}, but those of {described.env_id} are "
             f"{kinds[described.is_discrete]}; choose the environment it was recorded in"
         )
+    recording = _in_order(recording, described)
     counts = [len(labels) for labels in described.label_names]
-    if says and [len(labels) for labels in metadata.label_names] != counts:
+    if says and [len(labels) for labels in recording.metadata.label_names] != counts:
         raise InputError(
             f"its actions have other labels than those of {described.env_id}; choose the "
             "environment it was recorded in"
         )
-    if metadata.features:
-        return recording
-    notes = list(recording.notes)
-    order = _order(recording.feature_names, described.feature_names)
-    if order is not None:
-        notes.append(f"the observation columns were put into the order of {described.env_id}")
+    return recording
+
+
+def _in_order(recording: Recording, described: EnvironmentDescription) -> Recording:
+    """Bring the columns into the environment's order, by their names."""
+    metadata = recording.metadata
+    named = Named("the file", (), metadata.env_id)
+    wanted = Named(described.env_id, described.feature_names, described.env_id)
+    names = tuple(feature.name for feature in metadata.features) or recording.feature_names
+    features = line_up(named._replace(names=names or numbered(len(wanted.names))), wanted)
+    orders = [features]
+    if features.how == "permuted":
         recording = replace(
             recording,
-            observations=recording.observations[:, order],
-            observation_columns=tuple(recording.observation_columns[i] for i in order),
+            observations=recording.observations[:, features.places],
+            observation_columns=features.put(recording.observation_columns),
             feature_names=described.feature_names,
+            metadata=replace(metadata, features=features.put(metadata.features)),
         )
-    order = _order(recording.action_names, described.action_names)
-    if order is not None:
-        notes.append(f"the action columns were put into the order of {described.env_id}")
-        recording = replace(
-            recording,
-            actions=recording.actions[:, order],
-            action_columns=tuple(recording.action_columns[i] for i in order),
-            action_names=described.action_names,
-        )
-    return replace(recording, notes=tuple(notes))
-
-
-def _order(names: tuple[str, ...] | None, wanted: tuple[str, ...]) -> list[int] | None:
-    """Where each wanted name stands, if the names are the same in another order."""
-    if names is None or names == wanted or sorted(names) != sorted(wanted):
-        return None
-    return [names.index(name) for name in wanted]
+    if len(described.action_names) > 1:  # a single one needs no name
+        wanted = wanted._replace(names=described.action_names)
+        names = metadata.action_names or recording.action_names or numbered(len(wanted.names))
+        actions = line_up(named._replace(names=names), wanted, what="action dimensions")
+        orders.append(actions)
+        if actions.how == "permuted":
+            recording = replace(
+                recording,
+                actions=recording.actions[:, actions.places],
+                action_columns=actions.put(recording.action_columns),
+                action_names=described.action_names,
+                metadata=recording.metadata.with_actions_in(actions),
+            )
+    notes = tuple(order.note for order in orders if order.note)
+    return replace(recording, notes=(*recording.notes, *notes))
 
 
 def _checked(recording: Recording) -> Recording:
@@ -305,7 +312,7 @@ def _features(
             "feature_names": tuple(feature.name for feature in metadata.features),
             "feature_units": tuple(feature.unit for feature in metadata.features),
         }
-    if described is not None and (names is None or only_counted(names)):
+    if described is not None and (names is None or only_counts(names)):
         names = described.feature_names
     if described is not None and names == described.feature_names:
         return {"feature_names": names, "feature_units": described.feature_units}

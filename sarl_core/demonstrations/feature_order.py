@@ -1,0 +1,193 @@
+"""How the features of two things that meet line up: by their names, or as they come.
+
+Rules and an environment, rules and demonstrations, a file and the environment it was recorded in:
+each numbers its features in an order of its own, and only names tell which is which.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, TypeVar
+
+from sarl_core.errors import InputError
+
+_T = TypeVar("_T")
+
+How = Literal["same", "permuted", "trusted"]
+
+_COUNTED = re.compile(r"(\D*?)[ _.\-\[(]?(\d{1,9})[\])]?")
+_SHORT = 7  # as "feature": a longer word before a number says what is counted
+_OBSERVATION = ("observation", "observations")
+_MOST_CHARACTERS = 110  # of a list in a message
+
+
+class Named(NamedTuple):
+    """One of two things that meet.
+
+    Attributes:
+        whose: What it is in a sentence, as "the rules" or "CartPole-v1".
+        names: Of its features, in its own order.
+        env_id: Environment it is of, "" where unknown.
+    """
+
+    whose: str
+    names: tuple[str, ...]
+    env_id: str = ""
+
+
+class Order(NamedTuple):
+    """How the features of one thing line up with another's.
+
+    Attributes:
+        how: Whether both have the same order, the first has to be permuted, or nothing but the
+            order says which is which.
+        places: For each feature of the second, its place in the first.
+        note: What a person should know, as a clause; "" where the order is the same.
+    """
+
+    how: How
+    places: tuple[int, ...]
+    note: str = ""
+
+    def put(self, entries: tuple[_T, ...]) -> tuple[_T, ...]:
+        """What the first has, one entry a feature, in the second's order; nothing stays nothing."""
+        return tuple(entries[place] for place in self.places) if entries else entries
+
+
+def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
+    """Say which feature of one thing is which of another; the one place that decides it.
+
+    Names are the same whatever their capitals, and whether words are parted by spaces, lines or
+    hyphens. Names that only count (``feature 0``, ``obs_1``) say nothing. Of one environment a
+    feature may have been renamed by a person: its place then says what it is, as long as no name
+    of the other stands elsewhere.
+
+    Args:
+        first: One of them.
+        second: The other, whose order is wanted.
+        what: What is named, in the plural.
+
+    Returns:
+        The order.
+
+    Raises:
+        InputError: If there are not as many, or their names are of different things.
+    """
+    if len(first.names) != len(second.names):
+        asks = "ask about" if what == "features" else "are for"
+        raise InputError(
+            f"{first.whose} {asks} {len(first.names)} {what} and {second.whose} have "
+            f"{len(second.names)}; give two of the same environment"
+        )
+    as_they_are = tuple(range(len(first.names)))
+    one, other = _plain(first.names), _plain(second.names)
+    known = first.env_id != "" and _bare(first.env_id) == _bare(second.env_id)
+    nameless = [only_counts(side.names) for side in (first, second)]
+    if one == other and (known or not all(nameless)):
+        return Order("same", as_they_are)
+    if sorted(one) == sorted(other) and len(set(one)) == len(one) and not all(nameless):
+        places = tuple(one.index(name) for name in other)
+        return Order(
+            "permuted",
+            places,
+            f"the {what} of {first.whose} were put into the order of "
+            f"{second.whose}, by their names",
+        )
+    if any(nameless):
+        who = " and ".join(
+            side.whose for side, empty in zip((first, second), nameless, strict=True) if empty
+        )
+        return Order(
+            "trusted",
+            as_they_are,
+            f"the {what} of {who} have no names, so they were trusted to be in the order of "
+            f"{'each other' if all(nameless) else first.whose if nameless[1] else second.whose}",
+        )
+    stands = {name: place for place, name in enumerate(one)}
+    if known and all(stands.get(name, place) == place for place, name in enumerate(other)):
+        renamed = [
+            f"{mine!r} for {theirs!r}"
+            for mine, theirs, *plain in zip(first.names, second.names, one, other, strict=True)
+            if plain[0] != plain[1]
+        ]
+        return Order(
+            "trusted",
+            as_they_are,
+            f"some {what} have other names in {first.whose} than in {second.whose} "
+            f"({shortened(renamed)}); both are of {_bare(first.env_id)}, so their order was "
+            "trusted",
+        )
+    at = next(place for place, name in enumerate(one) if name != other[place])
+    mine, theirs = (shortened(side.names[at : at + 1]) for side in (first, second))
+    raise InputError(
+        f"{first.whose} and {second.whose} have different {what}: number {at + 1} is {mine!r} in "
+        f"{first.whose} and {theirs!r} in {second.whose} ({shortened(first.names)}; "
+        f"{shortened(second.names)}); give two of the same environment, or name them alike"
+    )
+
+
+def only_counts(names: Sequence[str]) -> bool:
+    """Whether names say no more than their place, as x0, x1, x2 or feature 1, feature 2.
+
+    Args:
+        names: Any number.
+
+    Returns:
+        True also of no names at all.
+    """
+    if not names:
+        return True
+    matches = [_COUNTED.fullmatch(name.strip()) for name in names]
+    found = [match for match in matches if match is not None]
+    if len(found) < len(names) or len({match[1].casefold() for match in found}) > 1:
+        return False
+    word = found[0][1].strip().casefold()
+    numbers = [int(match[2]) for match in found]
+    return (
+        (len(word) <= _SHORT or word in _OBSERVATION)
+        and numbers[0] in (0, 1)
+        and numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    )
+
+
+def numbered(count: int) -> tuple[str, ...]:
+    """Names for features that have none.
+
+    Args:
+        count: How many.
+
+    Returns:
+        As "feature 0".
+    """
+    return tuple(f"feature {index}" for index in range(count))
+
+
+def shortened(names: Sequence[str]) -> str:
+    """A list for a message: as many names as a line takes, and how many more there are.
+
+    Args:
+        names: Any number.
+
+    Returns:
+        At most about a line.
+    """
+    shown: list[str] = []
+    length = 0
+    for name in names:
+        text = name if len(name) <= 40 else f"{name[:37]}..."
+        length += len(text) + 2
+        if shown and length > _MOST_CHARACTERS:
+            break
+        shown.append(text)
+    rest = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {rest} more" if rest else "")
+
+
+def _bare(env_id: str) -> str:
+    """An id without the module that registers it."""
+    return env_id.rsplit(":", 1)[-1]
+
+
+def _plain(names: Sequence[str]) -> list[str]:
+    return [" ".join(re.split(r"[\s_\-]+", name.casefold().strip())) for name in names]

@@ -1,0 +1,148 @@
+"""Rules whose features and action dimensions are put into the order of what they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.feature_order import Named, Order, line_up
+from sarl_core.errors import InputError
+from sarl_core.mining.evidence import DataBox
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import Condition, Rule, RuleSet
+
+
+class Fitted(NamedTuple):
+    """A rule set in the order of what it meets.
+
+    Attributes:
+        rule_set: The same rules under the same numbers.
+        notes: How it was found out which feature is which, where that has to be said.
+    """
+
+    rule_set: RuleSet
+    notes: tuple[str, ...]
+
+
+def fitted_rules(
+    rule_set: RuleSet, features: Named, actions: Sequence[str], *, rules: str = "the rules"
+) -> Fitted:
+    """Put rules into the order of an environment's or of demonstrations' features and actions.
+
+    Args:
+        rule_set: The rules.
+        features: Of what they meet, d names.
+        actions: Names of its m action dimensions.
+        rules: What the rules are called in a message.
+
+    Returns:
+        The same object where the order is the same.
+
+    Raises:
+        InputError: If there are more or fewer, or their names are of other things.
+    """
+    env_id = rule_set.source.env_id
+    names = tuple(feature.name for feature in rule_set.source.features)
+    found = [line_up(Named(rules, names, env_id), features)]
+    if len(actions) > 1 or len(rule_set.actions) > 1:  # a single one needs no name
+        found.append(
+            line_up(
+                Named(rules, tuple(action.name for action in rule_set.actions), env_id),
+                features._replace(names=tuple(actions)),
+                what="action dimensions",
+            )
+        )
+    notes = tuple(order.note for order in found if order.note)
+    if all(order.how != "permuted" for order in found):
+        return Fitted(rule_set, notes)
+    return Fitted(_reordered(rule_set, found[0], found[1] if len(found) > 1 else None), notes)
+
+
+def rules_for(
+    rule_set: RuleSet, demonstrations: Demonstrations, *, called: str = "the demonstrations"
+) -> Fitted:
+    """Put rules into the order of demonstrations.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: N pairs.
+        called: What they are called in a message.
+
+    Returns:
+        The same object where the order is the same.
+
+    Raises:
+        InputError: If features or actions are others.
+    """
+    fitted = fitted_rules(
+        rule_set,
+        Named(
+            called,
+            tuple(feature.name for feature in demonstrations.features),
+            demonstrations.env_id,
+        ),
+        tuple(dimension.name for dimension in demonstrations.action_dimensions),
+    )
+    _check_actions(fitted.rule_set.actions, demonstrations)
+    if fitted.rule_set is rule_set and rule_set.source.digest == demonstrations.digest:
+        return Fitted(rule_set, ())  # mined from these very pairs
+    return fitted
+
+
+def fits(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
+    """Whether demonstrations are of the features and actions that rules speak of.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Any.
+
+    Returns:
+        Whether `rules_for` takes them.
+    """
+    try:
+        rules_for(rule_set, demonstrations)
+    except InputError:
+        return False
+    return True
+
+
+def _check_actions(actions: tuple[LabelledDimension, ...], demonstrations: Demonstrations) -> None:
+    advice = "choose demonstrations of the rules' environment"
+    for rules, shown in zip(actions, demonstrations.action_dimensions, strict=True):
+        if rules.is_interval != (shown.kind == "interval"):
+            kinds = ("continuous", "discrete") if rules.is_interval else ("discrete", "continuous")
+            raise InputError(
+                f"the action {rules.name!r} is {kinds[0]} in the rules and {kinds[1]} in the "
+                f"demonstrations; {advice}"
+            )
+
+
+def _reordered(rule_set: RuleSet, features: Order, actions: Order | None) -> RuleSet:
+    """The rules with every number of a feature and of an action dimension exchanged."""
+    feature_to = {mine: theirs for theirs, mine in enumerate(features.places)}
+    dimensions = tuple(range(len(rule_set.actions))) if actions is None else actions.places
+    dimension_to = {mine: theirs for theirs, mine in enumerate(dimensions)}
+    rules = tuple(_moved(rule, feature_to, features, dimension_to) for rule in rule_set.rules)
+    return replace(
+        rule_set,
+        rules=rules,
+        actions=rule_set.actions if actions is None else actions.put(rule_set.actions),
+        source=replace(rule_set.source, features=features.put(rule_set.source.features)),
+    )
+
+
+def _moved(
+    rule: Rule, feature_to: dict[int, int], features: Order, dimension_to: dict[int, int]
+) -> Rule:
+    box = rule.box
+    return replace(
+        rule,
+        dimension=dimension_to[rule.dimension],
+        conditions=tuple(
+            Condition(feature_to[feature], op, threshold)
+            for feature, op, threshold in rule.conditions
+        ),
+        box=None if box is None else DataBox(*(features.put(bound) for bound in box)),
+    )
