@@ -57,7 +57,7 @@ def test_rules_of_columns_in_another_order_act_on_the_right_features(capsys, tmp
     assert main(["mine", str(CART), *AT, "--out", str(right)]) == 0
     capsys.readouterr()
     expected = evaluated(capsys, right)
-    assert moved["summary"]["mean"] == expected["summary"]["mean"] > 400
+    assert moved["summary"]["mean"] == expected["summary"]["mean"] > 300
     assert any("by their names" in note for note in moved["notes"])
     assert expected["notes"] == []
 
@@ -78,7 +78,7 @@ def test_columns_without_names_are_trusted_and_every_command_says_so(capsys, tmp
 @pytest.mark.parametrize("command", ["evaluate", "ablate"])
 def test_other_names_are_refused_with_both_lists(capsys, tmp_path, command):
     rules = mined(capsys, write(tmp_path, "other", ["a", "b", "c", "d"]))
-    more = ["--out", str(tmp_path / "out.json")] if command == "ablate" else []
+    more = ["--out", str(tmp_path / "out.csv")] if command == "ablate" else []
     assert main([command, *RUN, "--rules", str(rules), *more]) == 2
     error = capsys.readouterr().err
     assert "a, b, c, d" in error
@@ -114,5 +114,5 @@ def test_a_renamed_feature_is_still_itself(capsys, tmp_path):
     path = tmp_path / "renamed.parquet"
     save_demonstrations(renamed, path)
     found = evaluated(capsys, mined(capsys, path))
-    assert found["summary"]["mean"] > 400
+    assert found["summary"]["mean"] > 300
     assert any("'Ort' for 'cart position'" in note for note in found["notes"])
