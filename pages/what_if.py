@@ -211,6 +211,8 @@ def proposal() -> Any:
         title = f"The agent wants: {dimension.name}" if several else "The agent wants"
         if dimension.is_interval:
             low, high = dimension.edges[0], dimension.edges[-1]
+            if low == high:  # the rules know a single value; the agent may want another
+                low, high = low - 1.0, high + 1.0
             values.append(
                 st.slider(
                     title,

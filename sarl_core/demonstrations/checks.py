@@ -238,9 +238,13 @@ def _labels(
     displays = [f"action {name!r}" for name in action_names]
     if raw.label_names is None:
         require_labels(columns, first, (MAX_LABELS,) * m, displays)
+        least, most = columns.min(axis=0).tolist(), columns.max(axis=0).tolist()
+        if raw.label_first is None:
+            # What is always done is one action, and not one of as many as its number is high.
+            first = tuple(low if low == high else 0 for low, high in zip(least, most, strict=True))
         names = tuple(
-            tuple(str(label) for label in range(low, int(highest) + 1))
-            for low, highest in zip(first, columns.max(axis=0), strict=True)
+            tuple(str(label) for label in range(low, high + 1))
+            for low, high in zip(first, most, strict=True)
         )
     else:
         names = tuple(tuple(map(str, labels)) for labels in raw.label_names)

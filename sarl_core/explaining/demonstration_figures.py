@@ -110,7 +110,7 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
     for edge in dimension.inner_edges:
         figure.add_vline(x=edge, line={"color": MUTED_COLOUR, "width": 1, "dash": "dot"})
     figure.update_layout(**_layout(ACTION_HEIGHT), barmode="stack", bargap=0)
-    figure.update_xaxes(fixedrange=True, range=[dimension.edges[0], dimension.edges[-1]])
+    figure.update_xaxes(fixedrange=True, range=[histogram.edges[0], histogram.edges[-1]])
     figure.update_yaxes(nticks=4, rangemode="tozero", ticksuffix=" %", fixedrange=True)
     return figure
 

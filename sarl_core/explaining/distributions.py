@@ -147,10 +147,11 @@ def interval_histogram(
     """
     k = dimension.n_labels
     each = max(1, bins // k)
-    parts = [
-        np.linspace(low, high, each, endpoint=False) for low, high in pairwise(dimension.edges)
-    ]
-    edges = np.concatenate([*parts, [dimension.edges[-1]]])
+    bounds = dimension.edges
+    if bounds[0] == bounds[-1]:  # a single value, with some room beside it
+        bounds = (bounds[0] - 0.5, bounds[0] + 0.5)
+    parts = [np.linspace(low, high, each, endpoint=False) for low, high in pairwise(bounds)]
+    edges = np.concatenate([*parts, bounds[-1:]])
     index = np.searchsorted(edges[1:-1], values.astype(np.float64), side="right")
     return Histogram(edges, _count(index, index // each, k, k * each))
 

@@ -195,6 +195,8 @@ def action_text(label: int, dimension: LabelledDimension) -> str:
     """
     if dimension.is_interval:
         low, high = dimension.edges[label], dimension.edges[label + 1]
+        if low == high:
+            return f"{dimension.name} {number_text(low)}"
         return (
             f"{dimension.name} from {number_text(low, apart_from=high)} "
             f"to {number_text(high, apart_from=low)}"
@@ -216,6 +218,8 @@ def label_text(label: int, dimension: LabelledDimension) -> str:
     """
     if dimension.is_interval:
         low, high = dimension.edges[label], dimension.edges[label + 1]
+        if low == high:
+            return number_text(low)
         return f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}"
     return dimension.label_names[label]
 

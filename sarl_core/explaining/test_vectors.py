@@ -155,7 +155,7 @@ def _values(dimension: LabelledDimension) -> NDArray[Any]:
     if not dimension.is_interval:
         return np.arange(dimension.n_labels, dtype=np.int64) + dimension.first
     edges = np.array(dimension.edges, dtype=np.float32)
-    width = edges[-1] - edges[0]
+    width = edges[-1] - edges[0] or np.float32(1)
     return np.concatenate(
         [
             edges,

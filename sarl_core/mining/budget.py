@@ -17,7 +17,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 from sarl_core.mining.rules import RuleSet, Thresholds
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree, structure_of
+from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree, fitted
 
 MIN_RULES = 2
 _LEAST_PAIRS = 5  # a mean of fewer values is no mean
@@ -81,9 +81,9 @@ def _by_labels(
 
     learner = DecisionTreeClassifier(criterion="gini", max_leaf_nodes=max_rules, random_state=seed)
     labels = dimension.labels_of(demonstrations.action_columns[:, index])
-    learner.fit(demonstrations.observations, labels, sample_weight=weights)
+    structure = fitted(learner, demonstrations.observations, labels, weights)
     said = learner.classes_[learner.tree_.value[:, 0, :].argmax(axis=1)]
-    return _saying(structure_of(learner), said)
+    return _saying(structure, said)
 
 
 def _by_values(
@@ -101,8 +101,8 @@ def _by_values(
         max_leaf_nodes=max_rules, min_samples_leaf=_LEAST_PAIRS, random_state=seed
     )
     values = demonstrations.action_columns[:, index].astype(np.float64)
-    learner.fit(demonstrations.observations, values, sample_weight=weights)
-    return _saying(structure_of(learner), dimension.labels_of(learner.tree_.value[:, 0, 0]))
+    structure = fitted(learner, demonstrations.observations, values, weights)
+    return _saying(structure, dimension.labels_of(learner.tree_.value[:, 0, 0]))
 
 
 def _by_scores(
@@ -115,8 +115,8 @@ def _by_scores(
     from sklearn.tree import DecisionTreeRegressor
 
     learner = DecisionTreeRegressor(max_leaf_nodes=max_rules, random_state=seed)
-    learner.fit(demonstrations.observations, scores, sample_weight=weights)
-    return _saying(structure_of(learner), learner.tree_.value[:, :, 0].argmax(axis=1))
+    structure = fitted(learner, demonstrations.observations, scores, weights)
+    return _saying(structure, learner.tree_.value[:, :, 0].argmax(axis=1))
 
 
 def _saying(structure: TreeStructure, label: NDArray[np.int64]) -> TreeStructure:

@@ -27,7 +27,8 @@ class LabelledDimension:
         name: Of the action dimension.
         label_names: One name a label.
         edges: Of a continuous dimension, the k + 1 edges of its k intervals, ascending; () if
-            it is discrete.
+            it is discrete. A single value that was always shown is one label between two equal
+            edges.
         first: Of a discrete dimension, the action that label 0 stands for.
         bounds_from: Of a continuous dimension, where the outer edges come from.
     """
@@ -46,13 +47,16 @@ class LabelledDimension:
 
         Args:
             name: Of the action dimension.
-            edges: k + 1 numbers, ascending.
+            edges: k + 1 numbers, ascending; or two equal ones.
             bounds_from: Where the outer ones come from.
 
         Returns:
             A dimension with k labels.
         """
-        names = tuple(f"{low:.4g} to {high:.4g}" for low, high in pairwise(edges))
+        names = tuple(
+            f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+            for low, high in pairwise(edges)
+        )
         return cls(name, names, edges=tuple(map(float, edges)), bounds_from=bounds_from)
 
     @property
@@ -138,7 +142,6 @@ def _labelled(dimension: ActionDimension, divider: int) -> LabelledDimension:
     if dimension.kind == "discrete":
         return LabelledDimension(dimension.name, dimension.labels, first=dimension.first)
     low, high = dimension.low, dimension.high
-    if not low < high:  # all demonstrated values are the same: any width will do
-        high = low + 1.0
-    edges = np.linspace(low, high, divider + 1).tolist()
+    # One value that was always shown is one label, however finely others are divided.
+    edges = np.linspace(low, high, divider + 1).tolist() if low < high else [low, high]
     return LabelledDimension.of_edges(dimension.name, edges, bounds_from=dimension.bounds_from)

@@ -73,7 +73,7 @@ class Quantisation:
         Returns:
             0 to 1.
         """
-        return self.errors[snapping] / self.width
+        return self.errors[snapping] / self.width if self.width else 0.0
 
     def targets(self, snapping: Snapping) -> Floats | None:
         """What the values of each interval become.

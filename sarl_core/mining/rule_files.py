@@ -326,8 +326,11 @@ def _read_action(part: _Reader) -> LabelledDimension:
             and -_LARGEST <= edge <= _LARGEST
             for edge in edges
         )
-        if not numeric or len(edges) < 3 or sorted(set(edges)) != edges:
-            raise part.fail("'edges' must be three or more numbers in ascending order")
+        single = numeric and len(edges) == 2 and edges[0] == edges[1]
+        if not single and (not numeric or len(edges) < 3 or sorted(set(edges)) != edges):
+            raise part.fail(
+                "'edges' must be three or more numbers in ascending order, or one number twice"
+            )
         action = LabelledDimension.of_edges(
             name, edges, bounds_from=part.take("bounds_from", str, "action space")
         )
