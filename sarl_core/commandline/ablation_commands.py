@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.inputs import read_shield
+from sarl_core.commandline.inputs import read_agent, read_shield
 from sarl_core.commandline.options import (
     AgentName,
     Env,
     Json,
+    Normalise,
     OutsideName,
     ProjectionName,
     Seed,
@@ -34,6 +35,7 @@ def ablate(
             "--rules", metavar="RULES.json", show_default=False, help="The rules of the shield."
         ),
     ],
+    normalise: Normalise = None,
     episodes: Annotated[
         int,
         typer.Option("--episodes", help="With every rule taken out, and with none; at least 2."),
@@ -84,12 +86,11 @@ def ablate(
         assert shield is not None
         found = run(
             env,
-            agent,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
             shield,
             episodes=episodes,
             seed=seed,
             most=most,
-            stochastic=stochastic,
             jobs=jobs or os.cpu_count() or 1,
             progress=lambda done, total: advance(done, total),
         )

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.inputs import read_demonstrations
+from sarl_core.commandline.inputs import read_agent, read_demonstrations
 from sarl_core.commandline.options import (
     AgentName,
     Env,
     EnvOfFile,
     File,
     Json,
+    Normalise,
     Seed,
     Stochastic,
 )
@@ -35,6 +36,7 @@ def record(
             help="A .parquet, .csv or .npz file.",
         ),
     ],
+    normalise: Normalise = None,
     steps: Annotated[int, typer.Option("--steps", min=1, help="How many to record.")] = 15_000,
     seed: Seed = 0,
     stochastic: Stochastic = False,
@@ -51,7 +53,11 @@ def record(
         from sarl_core.rollouts.recording import record as record_demonstrations
 
         demonstrations = record_demonstrations(
-            env, agent, steps=steps, seed=seed, stochastic=stochastic, progress=advance
+            env,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
+            steps=steps,
+            seed=seed,
+            progress=advance,
         )
         save_demonstrations(demonstrations, out)
     _tell_demonstrations(demonstrations, out, as_json)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.inputs import read_demonstrations
+from sarl_core.commandline.inputs import read_agent, read_demonstrations
 from sarl_core.commandline.options import (
     AgentName,
     Divider,
     EnvOfFile,
     File,
     Json,
+    Normalise,
     ProjectionName,
     Seed,
 )
@@ -23,6 +24,7 @@ from sarl_core.errors import InputError
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.mining.rules import Thresholds
+    from sarl_core.rollouts.agents import Agent
     from sarl_core.rollouts.aggregation import Aggregation
     from sarl_core.rollouts.aggregation_plan import Plan
     from sarl_core.rollouts.gaps import Gaps
@@ -56,6 +58,7 @@ def aggregate(
             help="Who is asked: expert (the shipped one), the path of a trained policy, or none.",
         ),
     ] = "expert",
+    normalise: Normalise = None,
     rounds: Annotated[
         int, typer.Option("--rounds", help="How often the rules act and the expert answers.")
     ] = 20,
@@ -113,15 +116,22 @@ def aggregate(
             seed=seed,
         )
         shown = read_demonstrations(file, env)
+        agents = _agents(agent, expert, env or shown.env_id, normalise)
     if nobody:
-        _gaps(shown, plan, env or shown.env_id, agent, out, jobs, as_json)
+        _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json)
         return
     with terminal.working("Asking the expert") as advance:
         from sarl_core.rollouts.aggregation import aggregate as run
         from sarl_core.rollouts.aggregation_files import save_aggregation
 
         found = run(
-            shown, plan, env_id=env, agent=agent, expert=expert, jobs=jobs, progress=advance
+            shown,
+            plan,
+            env_id=env,
+            agent=agents[0],
+            expert=agents[1],
+            jobs=jobs,
+            progress=advance,
         )
     written, card = save_aggregation(found, out, command=_command(context))
     if not found.is_finished:
@@ -156,6 +166,26 @@ def aggregate(
     )
 
 
+def _agents(
+    agent: str, expert: str, env_id: str, normalise: str | None
+) -> tuple[Agent, Agent | str]:
+    """Who is shielded and who is asked; `normalise` is of the one that is a .zip."""
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    zipped = [name.lower().endswith(".zip") for name in (agent, expert)]
+    if normalise is not None and all(zipped):
+        raise InputError(
+            "--normalise is of one .zip, and both agent and expert are one; leave it out, and lay "
+            "the statistics of each beside it, as NAME_vecnormalize.pkl"
+        )
+    return (
+        read_agent(agent, env_id, None if zipped[1] else normalise),
+        expert
+        if expert == _NOBODY
+        else read_agent(expert, env_id, normalise if zipped[1] else None),
+    )
+
+
 def _what_is_left(found: Aggregation, written: Path, out: Path) -> str:
     """In one line, what a stopped run leaves behind."""
     from sarl_core.rollouts.aggregation_files import chosen_by
@@ -179,15 +209,19 @@ def _thresholds(support: float | None, confidence: float | None) -> Thresholds |
 
 
 def _gaps(
-    shown: Demonstrations, plan: Plan, env_id: str, agent: str, out: Path, jobs: int, as_json: bool
+    shown: Demonstrations,
+    plan: Plan,
+    env_id: str,
+    agent: Agent,
+    out: Path,
+    jobs: int,
+    as_json: bool,
 ) -> None:
     """Without an expert: which states need a demonstration."""
     if plan.thresholds is None:
         raise InputError(
             "without thresholds every state is covered; give --support and --confidence"
         )
-    if not env_id:
-        raise InputError("the demonstrations name no environment; say which with --env")
     found: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
         from sarl_core.mining.algorithm_1 import mine_rules

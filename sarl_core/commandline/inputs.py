@@ -5,11 +5,44 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from sarl_core.commandline import terminal
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.rollouts.agents import Agent
     from sarl_core.shielding.shield import Shield
+
+
+def read_agent(
+    agent: str,
+    env_id: str,
+    normalise: str | None,
+    *,
+    stochastic: bool = False,
+    seed: int = 0,
+) -> Agent:
+    """Make an agent, and say on standard error how its file was read.
+
+    Args:
+        agent: Of the option ``--agent``.
+        env_id: Where it acts.
+        normalise: Of the option ``--normalise``, or None.
+        stochastic: Whether a trained policy is sampled.
+        seed: Of the untrained weights.
+
+    Returns:
+        The agent.
+
+    Raises:
+        InputError: If there is no such agent, or it does not fit the environment.
+    """
+    from sarl_core.rollouts.agents import PolicyAgent, make_agent
+
+    made = make_agent(agent, env_id, stochastic=stochastic, seed=seed, normalise=normalise)
+    if isinstance(made, PolicyAgent):
+        terminal.print_notes(made.notes)
+    return made
 
 
 def read_demonstrations(file: Path, env_id: str | None) -> Demonstrations:

@@ -36,6 +36,16 @@ AgentName = Annotated[
         "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
     ),
 ]
+Normalise = Annotated[
+    str | None,
+    typer.Option(
+        "--normalise",
+        metavar="FILE",
+        show_default="what lies beside the .zip under a name that leaves no doubt",
+        help="Of a .zip that was trained under VecNormalize: the .pkl with its statistics; none "
+        "if its observations were not normalised.",
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Same seed, same result.")]
 Stochastic = Annotated[
     bool,

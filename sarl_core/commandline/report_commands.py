@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.inputs import read_demonstrations
-from sarl_core.commandline.options import Json
+from sarl_core.commandline.inputs import read_agent, read_demonstrations
+from sarl_core.commandline.options import Json, Normalise
+
+if TYPE_CHECKING:
+    from sarl_core.rollouts.agents import Agent
 
 # Those of `Wishes`, which is not loaded for --help.
 _IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
@@ -71,6 +75,7 @@ def report(
             "Rules that do not come up are shown by a novice that the rules shield.",
         ),
     ] = None,
+    normalise: Normalise = None,
     seed: Annotated[
         int, typer.Option("--seed", min=0, help="Of the first episode for the pictures.")
     ] = _SEED,
@@ -104,6 +109,7 @@ def report(
             "--frames": None if frames == _FRAMES else frames,
             "--env": env,
             "--agent": agent,
+            "--normalise": normalise,
             "--seed": None if seed == _SEED else seed,
             "--episodes": None if episodes == _EPISODES else episodes,
             "--out": out,
@@ -113,7 +119,7 @@ def report(
             in_full=in_full,
             frames=frames,
             env_id=env or "",
-            agent=agent,
+            agent=_player(agent, env or given.env_id, normalise),
             seed=seed,
             episodes=episodes,
             commands=(
@@ -153,3 +159,15 @@ def report(
     if found.without:
         lines.append(f"There are no pictures: {found.without}.")
     terminal.print_lines(lines)
+
+
+def _player(agent: str | None, env_id: str, normalise: str | None) -> Agent | str | None:
+    """Who plays for the pictures: sampled, if it can be, and so comes by more states."""
+    from sarl_core.rollouts.agents import PolicyAgent
+
+    if agent is None or not env_id:
+        return agent
+    made = read_agent(agent, env_id, normalise)
+    if isinstance(made, PolicyAgent):
+        return replace(made, stochastic=not made.policy.noise_by_state)
+    return made

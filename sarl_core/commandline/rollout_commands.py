@@ -8,11 +8,12 @@ from typing import Annotated
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.inputs import read_shield
+from sarl_core.commandline.inputs import read_agent, read_shield
 from sarl_core.commandline.options import (
     AgentName,
     Env,
     Json,
+    Normalise,
     OutsideName,
     ProjectionName,
     Rules,
@@ -25,6 +26,7 @@ from sarl_core.errors import InputError
 def evaluate(
     env: Env,
     agent: AgentName,
+    normalise: Normalise = None,
     rules: Rules = None,
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many.")] = 10,
     seed: Annotated[
@@ -51,11 +53,10 @@ def evaluate(
         shield = read_shield(rules, projection, outside)
         found = rollout(
             env,
-            agent,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
             shield=shield,
             episodes=episodes,
             seed=seed,
-            stochastic=stochastic,
             keep_steps=False,
             progress=advance,
         )
@@ -81,6 +82,7 @@ def render(
             help="A .gif or .mp4 file.",
         ),
     ],
+    normalise: Normalise = None,
     rules: Rules = None,
     seed: Seed = 0,
     both: Annotated[
@@ -107,14 +109,11 @@ def render(
     with terminal.working("Playing") as advance:
         from sarl_core.rollouts.rendering import render_episode, side_by_side
 
+        actor = read_agent(agent, env, normalise, stochastic=stochastic, seed=seed)
         if both and shield is not None:
-            replay = side_by_side(
-                env, agent, shield, seed=seed, stochastic=stochastic, progress=advance
-            )
+            replay = side_by_side(env, actor, shield, seed=seed, progress=advance)
         else:
-            replay = render_episode(
-                env, agent, shield=shield, seed=seed, stochastic=stochastic, progress=advance
-            )
+            replay = render_episode(env, actor, shield=shield, seed=seed, progress=advance)
     with terminal.working("Writing") as advance:
         replay.save(out, progress=advance)
     from sarl_core.commandline.answers import describe_replay, print_replay

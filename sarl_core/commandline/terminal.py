@@ -180,6 +180,16 @@ def print_lines(lines: Iterable[str]) -> None:
         print(line)  # noqa: T201
 
 
+def print_notes(notes: Iterable[str]) -> None:
+    """Say what was found or looks odd, beside the answer: on standard error.
+
+    Args:
+        notes: Sentences.
+    """
+    for note in notes:
+        print(f"note: {' '.join(note.split())}", file=sys.stderr)  # noqa: T201
+
+
 def check_output(path: Path, suffixes: Sequence[str]) -> None:
     """Refuse a path that cannot be written, before any work is done for it.
 

@@ -6,7 +6,7 @@ not depend on what runs beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, cast, runtime_checkable
 
@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import describe_environment, make_environment
 from sarl_core.errors import InputError
-from sarl_core.rollouts.policies import MlpPolicy
+from sarl_core.rollouts.policies import MlpPolicy, Normalisation
 from sarl_core.rollouts.spaces import Actions, label_counts
 
 EXPERT_FOLDER = Path(__file__).resolve().parents[2] / "data" / "experts"
 
+_FAR = 8.0  # standard deviations
+_ODD_SHARE = 0.1  # of the states; features that hardly vary in training may jump now and then
+_TRIED_EPISODES, _TRIED_STEPS = 4, 50
 _SMALLEST_UNIFORM = 1e-12  # the quantile of 0 would be infinite
 
 
@@ -57,20 +60,22 @@ class PolicyAgent:
     Attributes:
         name: What it is called on screen.
         policy: The network.
-        stochastic: Whether its actions are sampled and not the most likely ones. The values
-            of a `greedy` policy (DQN) are no distribution: it always takes the best.
+        stochastic: Whether its actions are sampled and not the most likely ones. A policy
+            without a distribution (DQN, TD3) always does the same.
         label_first: Action that label 0 stands for, shape (m,).
+        notes: Sentences on how its file was read, and on what looks odd in it.
     """
 
     name: str
     policy: MlpPolicy
     stochastic: bool
     label_first: NDArray[np.int64]
+    notes: tuple[str, ...] = ()
 
     @property
     def n_uniforms(self) -> int:
         """One a dimension when sampled."""
-        sampled = self.stochastic and self.policy.head != "greedy"
+        sampled = self.stochastic and self.policy.is_sampled
         return self.policy.n_dimensions if sampled else 0
 
     def act(
@@ -135,18 +140,25 @@ class UniformAgent:
 
 
 def make_agent(
-    spec: str | Path | Agent, env_id: str, *, stochastic: bool = False, seed: int = 0
+    spec: str | Path | Agent,
+    env_id: str,
+    *,
+    stochastic: bool = False,
+    seed: int = 0,
+    normalise: str | Path | None = None,
 ) -> Agent:
     """Make the agent that a name or a file stands for.
 
     Args:
         spec: ``novice`` (uniform random actions), ``untrained`` (fresh PPO weights, sampled),
             ``expert`` (the shipped one of this environment), the path of an `.npz` policy or
-            of a Stable-Baselines3 `.zip` (PPO, A2C or DQN with `MlpPolicy`); an agent is
-            given back as it is.
+            of a Stable-Baselines3 `.zip` with an `MlpPolicy`; an agent is given back as it is.
         env_id: What ``gymnasium.make`` takes.
         stochastic: Whether a trained policy is sampled.
         seed: Of the untrained weights; the same seed gives the same weights.
+        normalise: Of a `.zip` that was trained under `VecNormalize`: the `.pkl` with its
+            statistics, or ``none`` where its observations were not normalised. Found beside
+            the `.zip` where not given and the name leaves no doubt.
 
     Returns:
         The agent.
@@ -156,17 +168,32 @@ def make_agent(
     """
     if isinstance(spec, Agent):
         return spec
+    if normalise is not None and Path(spec).suffix.lower() != ".zip":
+        raise InputError(
+            f"statistics to normalise by belong to a Stable-Baselines3 .zip, and the agent is "
+            f"{str(spec)!r}; leave out --normalise"
+        )
     first = np.array(describe_environment(env_id).label_first, dtype=np.int64)
     if spec == "novice":
         return _novice(env_id, first)
     if spec == "untrained":
         return PolicyAgent("untrained", _untrained(env_id, seed), True, first)
+    notes: tuple[str, ...] = ()
     if spec == "expert":
         name, policy = "expert", _expert(env_id)
     else:
-        name, policy = Path(spec).stem, _policy_from(Path(spec), env_id)
+        name = Path(spec).stem
+        policy, notes = _policy_from(Path(spec), env_id, normalise)
     _check_fit(str(spec), policy, env_id)
-    return PolicyAgent(name, policy, stochastic, first)
+    if stochastic and policy.noise_by_state:
+        raise InputError(
+            f"the policy {spec} explored by noise that hangs on the state (gSDE), which is not "
+            "read; leave out --stochastic"
+        )
+    agent = PolicyAgent(name, policy, stochastic, first, notes)
+    if policy.normalisation is not None and spec != "expert":
+        return replace(agent, notes=(*notes, *_unlike(agent, policy.normalisation, env_id)))
+    return agent
 
 
 def shipped_experts(folder: Path = EXPERT_FOLDER) -> dict[str, Path]:
@@ -232,7 +259,9 @@ def _expert(env_id: str) -> MlpPolicy:
     return MlpPolicy.load(found)
 
 
-def _policy_from(path: Path, env_id: str) -> MlpPolicy:
+def _policy_from(
+    path: Path, env_id: str, normalise: str | Path | None
+) -> tuple[MlpPolicy, tuple[str, ...]]:
     if path.suffix.lower() not in (".npz", ".zip"):
         raise InputError(
             f"there is no agent {str(path)!r}; give novice, untrained, expert, or the path of "
@@ -241,12 +270,54 @@ def _policy_from(path: Path, env_id: str) -> MlpPolicy:
     if not path.is_file():
         raise InputError(f"the policy {path} does not exist; check the path")
     if path.suffix.lower() == ".npz":
-        return MlpPolicy.load(path)
+        return MlpPolicy.load(path), ()
     from sarl_core.rollouts.sb3_zip import load_sb3_zip
 
     env = make_environment(env_id)
     try:
-        return load_sb3_zip(path, env, env_id)
+        return load_sb3_zip(path, env, env_id, normalise=normalise)
+    finally:
+        env.close()
+
+
+def _unlike(agent: PolicyAgent, normalisation: Normalisation, env_id: str) -> tuple[str, ...]:
+    """Say so where the first states that a policy meets are unlike those of its statistics."""
+    states = _first_states(agent, env_id)
+    far = np.abs(normalisation.deviations(states)) > _FAR
+    share = float(far.any(axis=1).mean())
+    if not share > _ODD_SHARE:
+        return ()
+    i = int(far.mean(axis=0).argmax())
+    names = describe_environment(env_id).feature_names
+    return (
+        f"the policy {agent.name} meets states in {env_id} unlike those that it was trained on: "
+        f"{share:.0%} of its first {len(states)} lie more than {_FAR:g} standard deviations from "
+        f"the mean of its training (most often in {names[i]}); check that its statistics and "
+        "this environment belong to it",
+    )
+
+
+def _first_states(agent: PolicyAgent, env_id: str) -> NDArray[np.float32]:
+    """Some states that an agent meets, from the start of a few episodes, shape (n, d)."""
+    from sarl_core.rollouts.spaces import adapt
+
+    env = make_environment(env_id)
+    try:
+        adapter, rows = adapt(env), []
+        for seed in range(_TRIED_EPISODES):
+            observation, over = env.reset(seed=seed)[0], False
+            for _ in range(_TRIED_STEPS):
+                rows.append(adapter.flat(observation))
+                if over or not np.isfinite(rows[-1]).all():
+                    break
+                chosen = agent.policy.act(rows[-1][None]) + (
+                    agent.label_first if agent.policy.is_discrete else 0
+                )
+                observation, _, terminated, truncated, _ = env.step(
+                    adapter.native(adapter.shaped(chosen)[0])
+                )
+                over = terminated or truncated
+        return np.array(rows, dtype=np.float32)
     finally:
         env.close()
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.rollouts.activations import Activation, activate
 from sarl_core.rollouts.files import read_limited_npz
 
-Head = Literal["categorical", "gaussian", "squashed_gaussian", "greedy"]
-Activation = Literal["tanh", "relu"]
+Head = Literal["categorical", "gaussian", "squashed_gaussian", "clipped", "squashed", "greedy"]
 
 _FORMAT = "sarl-policy"
 _VERSION = 1
@@ -33,14 +33,16 @@ class Normalisation:
     """Observation statistics a policy was trained with.
 
     Attributes:
-        mean: Running mean, shape (d,).
-        variance: Running variance, shape (d,).
+        mean: Running mean, shape (d,), in the precision in which it was kept.
+        variance: Running variance, shape (d,), likewise.
         clip: Bound on the normalised values, in standard deviations.
+        epsilon: Added to the variance, under the root.
     """
 
-    mean: NDArray[np.float32]
-    variance: NDArray[np.float32]
+    mean: NDArray[np.floating[Any]]
+    variance: NDArray[np.floating[Any]]
     clip: float
+    epsilon: float = _VARIANCE_FLOOR
 
     def __call__(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
         """Normalise a batch.
@@ -51,9 +53,23 @@ class Normalisation:
         Returns:
             Shape (B, d), within [-clip, clip].
         """
-        scaled = (observations - self.mean) / np.sqrt(self.variance + _VARIANCE_FLOOR)
+        scaled = self.deviations(observations)
         clipped: NDArray[np.float32] = np.clip(scaled, -self.clip, self.clip).astype(np.float32)
         return clipped
+
+    def deviations(self, observations: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """How far observations lie from the mean.
+
+        Args:
+            observations: Shape (B, d).
+
+        Returns:
+            Shape (B, d), in standard deviations.
+        """
+        result: NDArray[np.floating[Any]] = (observations - self.mean) / np.sqrt(
+            self.variance + self.epsilon
+        )
+        return result
 
 
 @dataclass(frozen=True)
@@ -67,6 +83,8 @@ class MlpPolicy:
         head: ``categorical``: logits, one block of ``label_counts[i]`` a dimension;
             ``gaussian``: the mean of a normal distribution, clipped to the action space;
             ``squashed_gaussian``: mean and log standard deviation side by side, through tanh;
+            ``clipped``: one action and no distribution, clipped to the action space;
+            ``squashed``: one action and no distribution, through tanh;
             ``greedy``: values of discrete actions, of which the largest is taken.
         label_counts: Number of labels of each discrete dimension; empty for continuous actions.
         log_std: Of a ``gaussian`` head, shape (m,).
@@ -74,6 +92,9 @@ class MlpPolicy:
         action_high: Upper bounds of continuous actions, shape (m,).
         normalisation: Of the observations, or None.
         env_id: Environment it was trained on, or "".
+        mean_bound: What a ``squashed`` action is clipped to before its tanh, or None.
+        noise_by_state: Whether it explored by noise that hangs on the state (gSDE), which is
+            not read: such a policy cannot be sampled.
     """
 
     weights: tuple[NDArray[np.float32], ...]
@@ -86,6 +107,8 @@ class MlpPolicy:
     action_high: NDArray[np.float32] | None = None
     normalisation: Normalisation | None = None
     env_id: str = ""
+    mean_bound: float | None = None
+    noise_by_state: bool = False
 
     def __post_init__(self) -> None:
         """Refuse weights that do not fit together.
@@ -156,6 +179,11 @@ class MlpPolicy:
         """Whether it gives labels and not continuous actions."""
         return self.head in ("categorical", "greedy")
 
+    @property
+    def is_sampled(self) -> bool:
+        """Whether its output is a distribution, of which actions can be drawn."""
+        return self.head in ("categorical", "gaussian", "squashed_gaussian")
+
     def _expected_outputs(self) -> int:
         if self.is_discrete:
             return sum(self.label_counts)
@@ -179,9 +207,7 @@ class MlpPolicy:
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             stacked = stacked @ weight + bias
             if layer < last:
-                stacked = (
-                    np.tanh(stacked) if self.activation == "tanh" else np.maximum(stacked, 0.0)
-                )
+                stacked = activate(self.activation, stacked)
         result: NDArray[np.float32] = stacked[:, 0, :]
         return result
 
@@ -199,8 +225,9 @@ class MlpPolicy:
             Labels (B, m) int64, or continuous actions (B, m) float32 within the bounds.
         """
         outputs = self.outputs(observations)
+        uniforms = uniforms if self.is_sampled else None
         if self.is_discrete:
-            return self._labels(outputs, uniforms if self.head == "categorical" else None)
+            return self._labels(outputs, uniforms)
         return self._continuous(outputs, uniforms)
 
     def log_probabilities(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -252,7 +279,9 @@ class MlpPolicy:
                 assert self.log_std is not None
                 log_std = np.broadcast_to(self.log_std, actions.shape)
             actions = actions + np.exp(log_std) * noise
-        if self.head == "squashed_gaussian":
+        if self.mean_bound is not None:
+            actions = np.clip(actions, -self.mean_bound, self.mean_bound)
+        if self.head in ("squashed_gaussian", "squashed"):
             span = self.action_high - self.action_low
             actions = self.action_low + 0.5 * (np.tanh(actions) + 1.0) * span
         return np.clip(actions, self.action_low, self.action_high).astype(np.float32)
@@ -285,6 +314,11 @@ class MlpPolicy:
             arrays["observation_mean"] = self.normalisation.mean
             arrays["observation_variance"] = self.normalisation.variance
             arrays["observation_clip"] = np.array(self.normalisation.clip)
+            arrays["observation_epsilon"] = np.array(self.normalisation.epsilon)
+        if self.mean_bound is not None:
+            arrays["mean_bound"] = np.array(self.mean_bound)
+        if self.noise_by_state:
+            arrays["noise_by_state"] = np.array(True)
         with whole_file(Path(path)) as unfinished, unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
 
@@ -337,9 +371,11 @@ def _parts(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     normalisation = None
     if "observation_mean" in arrays:
         normalisation = Normalisation(
-            mean=arrays["observation_mean"].astype(np.float32),
-            variance=arrays["observation_variance"].astype(np.float32),
+            mean=_floats(arrays["observation_mean"]),
+            variance=_floats(arrays["observation_variance"]),
             clip=float(arrays["observation_clip"]),
+            # Older files have the one that Stable-Baselines3 takes unless told otherwise.
+            epsilon=float(arrays.get("observation_epsilon", np.array(_VARIANCE_FLOOR))),
         )
     return {
         "weights": tuple(arrays[f"weight_{i}"].astype(np.float32) for i in range(layers)),
@@ -350,4 +386,11 @@ def _parts(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         "action_high": optional("action_high"),
         "normalisation": normalisation,
         "env_id": str(arrays["env_id"]),
+        "mean_bound": float(arrays["mean_bound"]) if "mean_bound" in arrays else None,
+        "noise_by_state": bool(arrays.get("noise_by_state", np.array(False))),
     }
+
+
+def _floats(values: NDArray[Any]) -> NDArray[np.floating[Any]]:
+    """Kept as precise as they are: some files have float32, some float64."""
+    return values if values.dtype == np.float64 else values.astype(np.float32)

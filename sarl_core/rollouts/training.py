@@ -176,7 +176,7 @@ def train_expert(
 
 
 def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
-    """Read a Stable-Baselines3 PPO, A2C, DQN or SAC `MlpPolicy` into arrays.
+    """Read an `MlpPolicy` of Stable-Baselines3 into arrays.
 
     Args:
         model: The learner, in memory.
@@ -184,10 +184,14 @@ def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
 
     Returns:
         A policy that gives the same actions.
+
+    Raises:
+        InputError: If it is a policy of another kind.
     """
     from gymnasium import spaces
     from stable_baselines3.common.vec_env import VecNormalize
 
+    from sarl_core.rollouts.sb3_settings import read_settings
     from sarl_core.rollouts.sb3_weights import policy_from_state
     from sarl_core.rollouts.spaces import label_counts
 
@@ -200,10 +204,19 @@ def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
     if isinstance(env, VecNormalize) and env.norm_obs:
         statistics: Any = env.obs_rms  # one object, as an MlpPolicy takes no Dict observation
         normalisation = Normalisation(
-            mean=statistics.mean.astype(np.float32),
-            variance=statistics.var.astype(np.float32),
+            mean=statistics.mean.copy(),
+            variance=statistics.var.copy(),
             clip=float(env.clip_obs),
+            epsilon=float(env.epsilon),
         )
+    kind = type(model.policy)
+    settings = read_settings(
+        f"{kind.__module__}.{kind.__qualname__}",
+        {
+            name: value if isinstance(value, (bool, int, float)) or value is None else str(value)
+            for name, value in (model.policy_kwargs or {}).items()
+        },
+    )
     space = model.action_space
     return policy_from_state(
         state,
@@ -211,6 +224,7 @@ def export_policy(model: BaseAlgorithm, *, env_id: str = "") -> MlpPolicy:
         label_counts=label_counts(space),
         action_low=_bounds(space.low) if isinstance(space, spaces.Box) else None,
         action_high=_bounds(space.high) if isinstance(space, spaces.Box) else None,
+        settings=settings,
         normalisation=normalisation,
         env_id=env_id,
     )

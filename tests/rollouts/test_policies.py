@@ -78,8 +78,6 @@ def test_agrees_with_the_learner_in_memory(
 ) -> None:
     model = learner(algorithm, env_id, parameters, steps)
     policy = export_policy(model, env_id=env_id)
-    if parameters.get("policy_kwargs", {}).get("activation_fn") is torch.nn.ReLU:
-        policy = replace(policy, activation="relu")
     policy.save(tmp_path / "policy.npz")
     again = MlpPolicy.load(tmp_path / "policy.npz")
     observations, actions = visited(model, env_id)
