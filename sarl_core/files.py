@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import os
+import platform
+import re
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from sarl_core.errors import InputError, WorkError
 
+_LONGEST_STEM = 60  # of a file's name, so that what is put around it fits
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a path beside `path` to write to; it takes the place of `path` when all went well.
+
+    What a killed process left unfinished beside it is removed.
 
     Args:
         path: The file that is to appear; its suffix is kept, because writers look at it.
@@ -26,7 +33,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     if not path.parent.is_dir():
         raise InputError(f"the folder {path.parent} does not exist; make it or choose another")
-    unfinished = path.with_name(f".{path.stem}.{os.getpid()}.{os.urandom(4).hex()}{path.suffix}")
+    stem = f".{path.stem[:_LONGEST_STEM]}."
+    remove_abandoned(path.parent, stem, path.suffix)
+    unfinished = path.with_name(f"{stem}{mark_of_process()}{path.suffix}")
     try:
         yield unfinished
         unfinished.replace(path)
@@ -36,3 +45,62 @@ def whole_file(path: Path) -> Iterator[Path]:
         ) from error
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def mark_of_process() -> str:
+    """A name that nobody else gives, and that tells who gave it.
+
+    Returns:
+        The machine's name as a number, the process and a random number.
+    """
+    return f"{_machine()}-{os.getpid()}-{os.urandom(4).hex()}"
+
+
+def remove_abandoned(folder: Path, prefix: str, suffix: str = "") -> None:
+    """Remove what processes of this machine that are no longer there left in a folder.
+
+    Args:
+        folder: To look in.
+        prefix: Before the `mark_of_process` in a file's or folder's name.
+        suffix: After it.
+    """
+    pattern = re.compile(
+        re.escape(prefix) + _machine() + r"-(\d{1,10})-[0-9a-f]{8}" + re.escape(suffix)
+    )
+    try:
+        names = [entry.name for entry in os.scandir(folder)]
+    except OSError:
+        return
+    for name in names:
+        match = pattern.fullmatch(name)
+        if match is not None and not _is_alive(int(match[1])):
+            _remove(folder / name)
+
+
+def _remove(path: Path) -> None:
+    import shutil
+
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+        return
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:  # somebody else's; it stays
+        return
+
+
+def _machine() -> str:
+    """Processes are numbered on each machine anew, and a folder may be shared by several."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # where asking with signal 0 would end it
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from sarl_core.commandline.streams import interruptible, lasting_streams
 from sarl_core.errors import InputError, SarlError
 
 if TYPE_CHECKING:
@@ -41,6 +42,20 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
         The exit code: 0; 2 if the input was wrong; 1 if the work failed; 130 after Ctrl-C.
     """
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
+    with lasting_streams() as output, interruptible():
+        code = _run(app, arguments)
+        output.flush()
+        if output.failure is None or code:
+            return code
+        print(  # noqa: T201
+            f"error: the answer could not be written to standard output ({output.failure}); "
+            "free some space, or send it elsewhere",
+            file=sys.stderr,
+        )
+        return 1
+
+
+def _run(app: typer.Typer, arguments: Sequence[str]) -> int:
     debug = "--debug" in arguments
     try:
         with warnings.catch_warnings():
@@ -115,7 +130,8 @@ def print_json(document: object) -> None:
     Args:
         document: Mappings, sequences, text, numbers.
     """
-    print(json.dumps(plain(document), ensure_ascii=False, allow_nan=False))  # noqa: T201
+    only_ascii = not (sys.stdout.encoding or "").lower().startswith("utf")
+    print(json.dumps(plain(document), ensure_ascii=only_ascii, allow_nan=False))  # noqa: T201
 
 
 def plain(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 import struct
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -18,6 +19,7 @@ from sarl_core.rollouts.progress import Progress, report
 
 _LEAST_DELAY = 2  # hundredths of a second; browsers show anything shorter for a tenth
 _LONGEST_DELAY = 65_535
+_LITTLE_SPACE = 2**20  # bytes; less than any film of ours takes while it is made
 # A fixed number of threads and no date: the same pictures give the same bytes.
 _MP4 = (
     "-crf",
@@ -213,7 +215,7 @@ def encode_mp4(
 
     Raises:
         InputError: If there is nothing to show, or the folder does not exist.
-        WorkError: If the encoder fails.
+        WorkError: If the encoder fails, or what it wrote cannot be played.
     """
     with whole_file(Path(path)) as unfinished:
         done = 0
@@ -228,14 +230,14 @@ def encode_mp4(
                 done += 1
                 report(progress, done, count or done)
         except OSError as error:
-            raise WorkError(f"{path} could not be encoded ({error}); try a .gif") from error
+            raise _not_encoded(Path(path)) from error
         finally:
             if writer is not None:
                 writer.close()
         if not done:
             raise InputError("there is no picture to show; render at least one")
-        if not unfinished.exists() or not unfinished.stat().st_size:
-            raise WorkError(f"{path} could not be encoded; try a .gif")
+        if _pictures_in(unfinished) != done:
+            raise _not_encoded(Path(path))
 
 
 def _open_mp4(path: Path, fps: float) -> Any:
@@ -250,6 +252,30 @@ def _open_mp4(path: Path, fps: float) -> Any:
         pixelformat="yuv420p",
         macro_block_size=2,
         quality=None,
-        ffmpeg_log_level="error",
+        ffmpeg_log_level="quiet",  # what went wrong is told in a sentence of ours
         output_params=list(_MP4),
     )
+
+
+def _pictures_in(path: Path) -> int:
+    """How many pictures a film shows, 0 where no player opens it.
+
+    The encoder is another process and tells nobody how it ended; on a full disk it leaves a file
+    behind. So what it wrote is read.
+    """
+    from imageio_ffmpeg import count_frames_and_secs
+
+    try:
+        return int(count_frames_and_secs(path)[0])
+    except (OSError, RuntimeError):
+        return 0
+
+
+def _not_encoded(path: Path) -> WorkError:
+    free = shutil.disk_usage(path.parent).free
+    if free < _LITTLE_SPACE:
+        return WorkError(
+            f"{path} could not be encoded: {free / 2**20:.1f} MB are left in its folder; "
+            "free some space or choose another place"
+        )
+    return WorkError(f"{path} could not be encoded; try a .gif, or another place")
