@@ -7,8 +7,16 @@ deep link.
 
 from __future__ import annotations
 
+import atexit
+from contextlib import ExitStack
 from pathlib import Path
 
 import streamlit as st
+
+from sarl_core.files import temporary_folder
+
+_while_it_runs = ExitStack()
+_while_it_runs.enter_context(temporary_folder())
+atexit.register(_while_it_runs.close)
 
 app = st.App(Path(__file__).parent / "pages" / "_router.py")

@@ -15,7 +15,7 @@ from _words import in_full
 
 from sarl_core.errors import WorkError
 from sarl_core.mining.progress import CancelledError, Progress
-from sarl_core.rollouts.pool import begin_process
+from sarl_core.rollouts.workers import begin_process
 
 KEPT = 24
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends

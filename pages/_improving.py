@@ -20,8 +20,8 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.aggregation import Aggregation, Round, aggregate
 from sarl_core.rollouts.aggregation_plan import Plan
 from sarl_core.rollouts.gaps import Gaps, gaps_so_far
-from sarl_core.rollouts.pool import begin_process
 from sarl_core.rollouts.progress import CancelledError
+from sarl_core.rollouts.workers import giving_way
 
 KEPT = 6  # a finished run holds up to some ten megabytes of demonstrations
 _SOON = 0.03  # share of the work from which on the rest can be guessed
@@ -111,7 +111,7 @@ class Working(Job):
                 return
             self._began = time.monotonic()
             try:
-                with _processes():
+                with giving_way():
                     finished = self._find_gaps() if self.order.expert is None else self._improve()
             except CancelledError:
                 return
@@ -200,12 +200,3 @@ class Working(Job):
 def jobs() -> int:
     """Processes for a run: at least two, so that the server itself plays no episode."""
     return min(max(os.cpu_count() or 1, 2), 8)
-
-
-@contextmanager
-def _processes() -> Iterator[None]:
-    """Where work is done in processes, let them give way to the server."""
-    from joblib import parallel_config
-
-    with parallel_config(backend="loky", initializer=begin_process, inner_max_num_threads=1):
-        yield

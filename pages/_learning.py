@@ -13,7 +13,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from _choices import digest_of
 from _jobs import Job
 
 from sarl_core.errors import InputError, SarlError, WorkError
+from sarl_core.files import shared_temporary_folder
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.learning_arms import LearningArm
 from sarl_core.rollouts.learning_files import (
@@ -89,7 +89,7 @@ class Order:
 def base() -> Path:
     """The folder of all studies that visitors asked for; SARL_LEARNING names another one."""
     name = f"sarl-explorer-{os.getuid()}" if hasattr(os, "getuid") else "sarl-explorer"
-    return Path(os.environ.get("SARL_LEARNING", "") or Path(tempfile.gettempdir()) / name)
+    return Path(os.environ.get("SARL_LEARNING", "") or shared_temporary_folder() / name)
 
 
 def study_of(order: Order) -> LearningStudy | None:

@@ -1,10 +1,12 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and leaving nothing behind."""
 
 from __future__ import annotations
 
 import os
 import platform
 import re
+import shutil
+import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +14,7 @@ from pathlib import Path
 
 from sarl_core.errors import InputError, WorkError
 
+_TEMPORARY = "sarl-temporary-"
 _LONGEST_STEM = 60  # of a file's name, so that what is put around it fits
 
 
@@ -47,6 +50,40 @@ def whole_file(path: Path) -> Iterator[Path]:
         unfinished.unlink(missing_ok=True)
 
 
+@contextmanager
+def temporary_folder() -> Iterator[None]:
+    """Let everything that is put aside for a while lie in one folder, removed in the end.
+
+    Libraries leave things behind when they are killed, and some always do (Stable-Baselines3 makes
+    a folder a learner). What a killed process left is removed by the next one that begins.
+    """
+    shared = shared_temporary_folder()
+    remove_abandoned(shared, _TEMPORARY)
+    folder = shared / f"{_TEMPORARY}{mark_of_process()}"
+    kept = tempfile.tempdir, os.environ.get("TMPDIR")
+    try:
+        folder.mkdir(mode=0o700)
+    except OSError:  # nothing can be put aside there; most work needs nothing of the kind
+        yield
+        return
+    tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
+    try:
+        yield
+    finally:
+        tempfile.tempdir, variable = kept
+        if variable is None:
+            del os.environ["TMPDIR"]
+        else:
+            os.environ["TMPDIR"] = variable
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def shared_temporary_folder() -> Path:
+    """Where things are put aside that outlive this process."""
+    folder = Path(tempfile.gettempdir())
+    return folder.parent if folder.name.startswith(_TEMPORARY) else folder
+
+
 def mark_of_process() -> str:
     """A name that nobody else gives, and that tells who gave it.
 
@@ -78,8 +115,6 @@ def remove_abandoned(folder: Path, prefix: str, suffix: str = "") -> None:
 
 
 def _remove(path: Path) -> None:
-    import shutil
-
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
         return

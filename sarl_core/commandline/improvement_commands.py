@@ -192,7 +192,7 @@ def _what_is_left(found: Aggregation, written: Path, out: Path) -> str:
 
     beside = "" if written == out else f" ({out} stays as it was)"
     return (
-        f"stopped by Ctrl-C after {len(found.rounds)} of {found.plan.rounds} rounds; the best "
+        f"stopped after {len(found.rounds)} of {found.plan.rounds} rounds; the best "
         f"rules so far are in {written}{beside}, chosen by {chosen_by(found)}; no "
         "fresh episode has tried them"
     )
@@ -283,7 +283,7 @@ def _keep_gaps(found: Gaps, out: Path, planned: int) -> str:
     _write_gaps(found, written)
     beside = "" if written == out else f" ({out} stays as it was)"
     return (
-        f"stopped by Ctrl-C after {found.episodes} of {planned} episodes; the {len(found):,} "
+        f"stopped after {found.episodes} of {planned} episodes; the {len(found):,} "
         f"states without a rule that they met are in {written}{beside}"
     )
 

@@ -80,7 +80,7 @@ def reproduce(
         report = run(out, chosen, effort=QUICK if quick else FULL, watch=watch, finished=finished)
     except KeyboardInterrupt as error:
         kept = f"{', '.join(done)} in {out} can be used" if done else "no figure was finished"
-        raise terminal.StoppedError(f"stopped by Ctrl-C; {kept}") from error
+        raise terminal.StoppedError(f"stopped; {kept}") from error
     if as_json:
         from sarl_core.reproducing.report import report_document
 

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
 
@@ -96,7 +97,7 @@ def lasting_streams() -> Iterator[Stream]:
     _open_missing_descriptors()
     kept = sys.stdout, sys.stderr
     out, error = (Stream(stream or _nowhere()) for stream in kept)
-    sys.stdout, sys.stderr = out, error  # type: ignore[assignment]
+    sys.stdout, sys.stderr = out, error
     try:
         yield out
     finally:
@@ -133,4 +134,4 @@ def _open_missing_descriptors() -> None:
 
 
 def _nowhere() -> TextIO:
-    return open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # lasts as long as the process
+    return Path(os.devnull).open("w", encoding="utf-8")  # lasts as long as the process

@@ -17,6 +17,7 @@ import typer
 
 from sarl_core.commandline.streams import interruptible, lasting_streams
 from sarl_core.errors import InputError, SarlError
+from sarl_core.files import temporary_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,7 +43,7 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
         The exit code: 0; 2 if the input was wrong; 1 if the work failed; 130 after Ctrl-C.
     """
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
-    with lasting_streams() as output, interruptible():
+    with lasting_streams() as output, interruptible(), temporary_folder():
         code = _run(app, arguments)
         output.flush()
         if output.failure is None or code:
@@ -78,7 +79,7 @@ def _run(app: typer.Typer, arguments: Sequence[str]) -> int:
 def _code(result: object) -> int:
     # Typer turns Ctrl-C into a code, without a word.
     if result == _INTERRUPTED:
-        print("error: stopped by Ctrl-C; nothing was written", file=sys.stderr)  # noqa: T201
+        print("error: stopped; nothing was written", file=sys.stderr)  # noqa: T201
     return result if isinstance(result, int) else 0
 
 
@@ -91,7 +92,7 @@ def _told(error: BaseException) -> tuple[str, int]:
     if isinstance(error, SarlError):
         return str(error), 2 if isinstance(error, InputError) else 1
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):
-        return "stopped by Ctrl-C; nothing was written", _INTERRUPTED
+        return "stopped; nothing was written", _INTERRUPTED
     return f"{type(error).__name__}: {error} (run it again with --debug to see where)", 1
 
 

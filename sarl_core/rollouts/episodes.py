@@ -21,6 +21,7 @@ from sarl_core.rollouts.player import Outcome, play
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.statistics import Interval, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
+from sarl_core.rollouts.workers import parallel
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -332,10 +333,10 @@ def _in_processes(
     jobs: int,
     keep_steps: bool,
 ) -> Iterator[Outcome]:
-    from joblib import Parallel, delayed
+    from joblib import delayed
 
     # In rounds, so that a caller who stops between two leaves no unfinished work behind.
-    with Parallel(n_jobs=jobs) as work:
+    with parallel(jobs) as work:
         for start in range(0, len(pieces), jobs):
             yield from work(
                 delayed(play)(

@@ -13,7 +13,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +23,13 @@ from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, run_seeds
 from sarl_core.rollouts.packed_shield import PackedShield, pack, unpack
+from sarl_core.rollouts.workers import begin_process
 from sarl_core.shielding.shield import Shield
 
 _PIECE_SECONDS = 1.0  # what one piece should take: progress is told, and work ends, this often
 _FIRST_PIECE = 4
 LARGEST_PIECE = 32  # environments that `play` steps side by side
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
-_LOOK_SECONDS = 2.0  # between two looks at whether the server is still there
-_NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,24 +236,6 @@ def _next_piece(task: int, state: _Progress) -> _Piece:
     piece = _Piece(task, state.asked, state.seeds[state.asked : state.asked + size])
     state.asked += len(piece.seeds)
     return piece
-
-
-def begin_process(gives_way: bool = True) -> None:
-    """End with the process that asks, and let others go first; for a new process.
-
-    Args:
-        gives_way: Whether others go first.
-    """
-    if gives_way and hasattr(os, "nice"):
-        os.nice(_NICENESS)
-    Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    """Wait until the server is gone. Killed, it tells nobody."""
-    while os.getppid() == parent:
-        time.sleep(_LOOK_SECONDS)
-    os._exit(0)
 
 
 def _work(

@@ -21,6 +21,7 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.seeds import REFINEMENT, of_run
+from sarl_core.rollouts.workers import parallel
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
@@ -115,7 +116,7 @@ def refine(
     Raises:
         CancelledError: If `progress` returned False.
     """
-    from joblib import Parallel, delayed
+    from joblib import delayed
 
     parameters = _Parameters(tuple(trees), tuple(_spread(tree, pairs) for tree in trees))
     few = pairs_of(pairs, _FEW)
@@ -133,7 +134,7 @@ def refine(
             for index, structure in enumerate(parameters.structures(point))
         )
 
-    with Parallel(n_jobs=jobs) as work:
+    with parallel(jobs) as work:
         for number in range(1, generations + 1):
             directions = generator.normal(size=(PAIRS, len(here)))
             first = generation_seed(seed, number)

@@ -91,7 +91,7 @@ def test_stopped_by_ctrl_c_the_finished_rounds_are_kept(capsys, tmp_path, monkey
     told = capsys.readouterr()
     assert code == 130
     assert told.err == (
-        f"error: stopped by Ctrl-C after 2 of 5 rounds; the best rules so far are in {out}, "
+        f"error: stopped after 2 of 5 rounds; the best rules so far are in {out}, "
         "chosen by the episodes of their round only; no fresh episode has tried them\n"
     )
     assert len(RuleSet.load(out)) <= 3
@@ -126,7 +126,7 @@ def test_stopped_by_ctrl_c_the_gaps_so_far_are_written(capsys, tmp_path, monkeyp
     arguments = ["aggregate", CART, "--expert", "none", "--out", str(out), *thresholds]
     stop_at = 1
     assert main(arguments) == 130
-    assert capsys.readouterr().err == "error: stopped by Ctrl-C; nothing was written\n"
+    assert capsys.readouterr().err == "error: stopped; nothing was written\n"
     assert not out.exists()
     calls.clear()
     stop_at = 2
@@ -135,7 +135,7 @@ def test_stopped_by_ctrl_c_the_gaps_so_far_are_written(capsys, tmp_path, monkeyp
         rows = list(csv.DictReader(file))
     assert {int(row["episode"]) for row in rows} <= set(range(8))
     assert capsys.readouterr().err == (
-        f"error: stopped by Ctrl-C after 8 of 12 episodes; the {len(rows):,} states without a "
+        f"error: stopped after 8 of 12 episodes; the {len(rows):,} states without a "
         f"rule that they met are in {out}\n"
     )
     before = out.read_bytes()

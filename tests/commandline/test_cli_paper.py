@@ -84,8 +84,8 @@ def test_some_figures_or_all_in_the_order_of_the_paper(arguments, expected, monk
 @pytest.mark.parametrize(
     ("done", "words"),
     [
-        ([], "stopped by Ctrl-C; no figure was finished"),
-        (["2"], "stopped by Ctrl-C; Figure 2 in paper can be used"),
+        ([], "stopped; no figure was finished"),
+        (["2"], "stopped; Figure 2 in paper can be used"),
     ],
 )
 def test_control_c_says_what_was_finished(done, words, capsys, monkeypatch):
