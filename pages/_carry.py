@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import streamlit as st
+from _cache import cached
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.exports import Prepared, export_rules, export_vectors, prepare
@@ -42,14 +42,14 @@ def prepared_for(
     return _prepared(key, rule_set, demonstrations, merged)
 
 
-@st.cache_resource(max_entries=12, show_spinner="Rounding, and counting what changes …")
+@cached(show_spinner="Rounding, and counting what changes …")
 def _prepared(
     key: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None, _merged: bool
 ) -> Prepared:
     return prepare(_rule_set, merged=_merged, demonstrations=_demonstrations)
 
 
-@st.cache_resource(max_entries=24, show_spinner="Writing …")
+@cached(show_spinner="Writing …")
 def content_of(
     key: tuple[str, ...], _suffix: str, _projection: Projection, _rule_set: RuleSet
 ) -> bytes:
@@ -57,13 +57,13 @@ def content_of(
     return export_rules(_rule_set, _suffix, _projection)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def vectors_of(key: tuple[str, ...], _projection: Projection, _rule_set: RuleSet) -> bytes:
     """Its test vectors, made when asked for."""
     return export_vectors(_rule_set, _projection)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def matrix_of(
     key: tuple[str, ...], _rule_set: RuleSet, _demonstrations: Demonstrations
 ) -> RuleMatrix:
@@ -71,7 +71,7 @@ def matrix_of(
     return rule_matrix(_rule_set, _demonstrations)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def picture_of(key: tuple[object, ...], _matrix: RuleMatrix, _page: int) -> bytes:
     """One page of them as a picture."""
     return matrix_png(_matrix, _matrix.page(_page))

@@ -13,6 +13,7 @@ from pathlib import Path
 import _names
 import _state as state
 import streamlit as st
+from _cache import cached
 from _environments import registered
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
@@ -129,7 +130,7 @@ def compact_file() -> Path:
     return RULES_FOLDER / f"{state.chosen_dataset()}_compact.json"
 
 
-@st.cache_resource(max_entries=16, show_spinner=False)
+@cached()
 def _rule_file(path: Path, stamp: int) -> tuple[RuleSet, str]:
     content = path.read_bytes()
     return rules_from_json(content, name=path.name), digest_of(content)

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import _state as state
 import streamlit as st
+from _cache import cached
 from _choices import COMPACT, compact_file, compact_rules
 from _words import in_full
 
@@ -84,7 +85,7 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
         return None
 
 
-@st.cache_resource(max_entries=12, show_spinner="Counting the compact rules …")
+@cached(show_spinner="Counting the compact rules …")
 def _counted(digest: str, _shipped: RuleSet, _demonstrations: Demonstrations) -> Compact:
     trees = recount(_shipped, _demonstrations)
     found = leaf_rules(trees)

@@ -6,6 +6,7 @@ from functools import partial
 
 import _hold_out
 import streamlit as st
+from _cache import cached
 from _evidence_work import worked_out
 from _rule_table import table_height
 from _words import escaped
@@ -21,7 +22,7 @@ AT_ONCE = 50_000  # pairs up to which contradictions are looked for without bein
 PLAIN = {"displayModeBar": False}
 
 
-@st.cache_resource(max_entries=8, show_spinner="Comparing every state with those near it …")
+@cached(show_spinner="Comparing every state with those near it …")
 def _contradictions(
     digest: str, divider: int, reach: float, _demonstrations: Demonstrations
 ) -> Contradictions:

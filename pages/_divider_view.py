@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _state as state
 import streamlit as st
+from _cache import cached
 from _choices import FRESH_SEED, agent_for, environment_of, has_expert, named_agent
 from _comparisons import Row, row_key
 from _run_bar import known, run_bar, working
@@ -30,7 +31,7 @@ Divided = tuple[tuple[Quantisation, ...], ...]
 Combination = tuple[int, Snapping]
 
 
-@st.cache_resource(max_entries=12, show_spinner="Dividing the actions …")
+@cached(show_spinner="Dividing the actions …")
 def _quantised(digest: str, _demonstrations: Demonstrations) -> Divided:
     return quantise(_demonstrations)
 

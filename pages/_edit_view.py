@@ -8,6 +8,7 @@ import _edits
 import _state as state
 import numpy as np
 import streamlit as st
+from _cache import cached
 from _edits import Base
 from _rule_table import action_column, table_height
 from _words import escaped, in_full
@@ -125,7 +126,7 @@ def where(of: Base) -> str:
 # --- the table ---------------------------------------------------------------------------------
 
 
-@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+@cached(show_spinner="Writing the rules in plain language …")
 def _texts(digest: str, _rule_set: RuleSet) -> dict[str, tuple[str, str]]:
     return {rule.id: _text(rule, _rule_set) for rule in _rule_set.rules}
 
@@ -228,7 +229,7 @@ def _touched(rule: Rule) -> bool:
     return rule.placed or not rule.enabled
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _written(
     digest: str,
     key: str,

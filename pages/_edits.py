@@ -14,6 +14,7 @@ import _compact
 import _state as state
 import numpy as np
 import streamlit as st
+from _cache import cached
 from _choices import CHOSEN, COMPACT, OWN_FILE, as_named, compact_rules, digest_of, rules_for
 from numpy.typing import NDArray
 
@@ -186,7 +187,7 @@ def _told(edits: tuple[Edit, ...]) -> str:
     return digest_of(repr(edits).encode())
 
 
-@st.cache_resource(max_entries=32, show_spinner=False)
+@cached()
 def _edited(
     digest: str,
     told: str,
@@ -254,7 +255,7 @@ def basis_of(rule_set: RuleSet, digest: str) -> Basis:
     return _basis(digest, told, rule_set, demonstrations)
 
 
-@st.cache_resource(max_entries=16, show_spinner="Looking which rule decides which state …")
+@cached(show_spinner="Looking which rule decides which state …")
 def _basis(
     digest: str, told: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None
 ) -> Basis:
@@ -271,6 +272,6 @@ def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
     return _verdicts(of.digest, told, _with(of, edits), of.basis)
 
 
-@st.cache_resource(max_entries=32, show_spinner=False)
+@cached()
 def _verdicts(digest: str, told: str, _edited_set: RuleSet, _basis: Basis) -> Verdicts:
     return verdicts(_basis.ground, _edited_set, _basis.expert)

@@ -9,6 +9,7 @@ from typing import Any
 
 import _state as state
 import streamlit as st
+from _cache import cached
 from _evidence_work import worked_out
 from _rule_table import table_height
 
@@ -49,7 +50,7 @@ class Found:
     threshold: float
 
 
-@st.cache_resource(max_entries=12, show_spinner="Weighing the evidence …")
+@cached(show_spinner="Weighing the evidence …")
 def _found(key: tuple[object, ...], episodes: int, _rule_set: RuleSet) -> Found:
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     threshold = _rule_set.thresholds.confidence
@@ -57,12 +58,12 @@ def _found(key: tuple[object, ...], episodes: int, _rule_set: RuleSet) -> Found:
     return Found(rules, missing, threshold)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> str:
     return overview_plot(_found.rules[:MOST_DRAWN], _rule_set, _found.threshold)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _enough(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
     import pandas as pd
 

@@ -15,7 +15,7 @@ from _words import in_full
 
 from sarl_core.errors import WorkError
 from sarl_core.mining.progress import CancelledError, Progress
-from sarl_core.rollouts.workers import begin_process
+from sarl_core.rollouts.workers import beginning
 
 KEPT = 24
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
@@ -40,7 +40,7 @@ class Processes:
                 self._executor = ProcessPoolExecutor(
                     min(max(os.cpu_count() or 1, 2), 8),
                     timeout=_IDLE_SECONDS,
-                    initializer=begin_process,
+                    **beginning(gives_way=True),
                     env={"OMP_NUM_THREADS": "1"},
                 )
             executor: Executor = self._executor

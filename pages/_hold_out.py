@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import streamlit as st
+from _cache import cached
 from _url import set_url_choice, url_choice, url_text
 from _words import in_full
 
@@ -101,7 +102,7 @@ def parted(demonstrations: Demonstrations) -> Parts:
     return _parted(demonstrations.digest, choice, demonstrations)
 
 
-@st.cache_resource(max_entries=8, show_spinner="Choosing the episodes …")
+@cached(show_spinner="Choosing the episodes …")
 def _parted(digest: str, choice: Choice, _demonstrations: Demonstrations) -> Parts:
     there = _demonstrations.episodes[_demonstrations.episode_starts].tolist()
     gone = set(choice.left_out)

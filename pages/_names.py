@@ -9,6 +9,7 @@ import hashlib
 from typing import cast
 
 import streamlit as st
+from _cache import cached
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, check_names, names_of, renamed, tidy
@@ -77,6 +78,6 @@ def digest_of_names(names: Names | None) -> str:
     return "" if names is None else hashlib.blake2b(repr(names).encode()).hexdigest()[:16]
 
 
-@st.cache_resource(max_entries=8, show_spinner=False)
+@cached()
 def _renamed(digest: str, names: Names, _raw: Demonstrations) -> Demonstrations:
     return renamed(_raw, names)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import streamlit as st
+from _cache import cached
 
 from sarl_core.reproducing.report import REPORT, Entry, Report, read_report
 from sarl_core.reproducing.studies import STUDIES
@@ -50,7 +51,7 @@ def stamp(path: Path) -> str:
         return ""
 
 
-@st.cache_resource(max_entries=4, show_spinner=False)
+@cached()
 def _report(folder: Path, digest: str) -> Report | None:
     return read_report(folder)
 
@@ -64,7 +65,7 @@ def report() -> Report | None:
     return _report(FOLDER, stamp(FOLDER / REPORT))
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _table(name: str, path: Path, digest: str) -> pd.DataFrame:
     return read_table(STUDIES[name], path)
 
@@ -79,7 +80,7 @@ def table(name: str, entry: Entry) -> pd.DataFrame:
     return _table(name, path, stamp(path))
 
 
-@st.cache_resource(max_entries=48, show_spinner="Drawing …")
+@cached(show_spinner="Drawing …")
 def _drawings(
     name: str, digest: str, part: str, dark: bool, _frame: pd.DataFrame
 ) -> tuple[Drawing, ...]:

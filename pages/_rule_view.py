@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import _tree_picture
 import streamlit as st
+from _cache import cached
 from _compact import Compact
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -150,7 +151,7 @@ def note_of(tree: PolicyTree, behind: Behind) -> str:
     )
 
 
-@st.cache_resource(max_entries=96, show_spinner=False)
+@cached()
 def features_of(
     key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
 ) -> str:

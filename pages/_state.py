@@ -17,6 +17,7 @@ import _hold_out
 import _names
 import numpy as np
 import streamlit as st
+from _cache import cached, visit
 from _hold_out import Parts
 from _url import set_url_choice, url_choice
 from numpy.typing import NDArray
@@ -80,6 +81,7 @@ def set_upload(demonstrations: Demonstrations, *, file_name: str = "") -> None:
         demonstrations: Read and checked.
         file_name: Shown where the data is named.
     """
+    visit().bring(demonstrations.digest)
     st.session_state["_upload"] = demonstrations
     st.session_state["_upload_name"] = file_name
     choose_dataset(UPLOAD)
@@ -221,7 +223,7 @@ def choose_divider(divider: int) -> None:
 # leading underscore and stands in the key by its digest.
 
 
-@st.cache_resource(max_entries=4, show_spinner="Reading the demonstrations …")
+@cached(show_spinner="Reading the demonstrations …")
 def shipped_demonstrations(name: str) -> Demonstrations:
     """A shipped set.
 
@@ -236,12 +238,12 @@ def shipped_demonstrations(name: str) -> Demonstrations:
     return load_demonstrations(DATA_FOLDER / f"{name}.parquet")
 
 
-@st.cache_resource(max_entries=12, show_spinner="Growing the decision tree …")
+@cached(show_spinner="Growing the decision tree …")
 def _grown(pairs: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
     return grow_policy_trees(_demonstrations, divider=divider)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _trees(digest: str, divider: int, _demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
     # Other names make no other tree.
     grown = _grown(digest_of_pairs(_demonstrations), divider, _demonstrations)
@@ -267,7 +269,7 @@ def _key(grown: tuple[PolicyTree, ...]) -> tuple[str, int]:
     return grown[0].source.digest, grown[0].divider
 
 
-@st.cache_resource(max_entries=16, show_spinner=False)  # a large set's boxes take 25 MB
+@cached()
 def _rule_set(
     key: tuple[str, int],
     thresholds: Thresholds,
@@ -314,7 +316,7 @@ def _digest(demonstrations: Demonstrations | None) -> str:
     return "" if demonstrations is None else demonstrations.digest
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _held_out_counts(
     key: tuple[str, int],
     digest: str,
@@ -324,7 +326,7 @@ def _held_out_counts(
     return count_held_out(_trees, _held_out)
 
 
-@st.cache_resource(max_entries=48, show_spinner=False)
+@cached()
 def _landscape(
     key: tuple[str, int],
     supports: tuple[float, ...],
@@ -368,7 +370,7 @@ def landscape(
     )
 
 
-@st.cache_resource(max_entries=24, show_spinner=False)
+@cached()
 def _pareto(
     key: tuple[str, int], lift: float, depth: int | None, _trees: tuple[PolicyTree, ...]
 ) -> tuple[ParetoPoint, ...]:
@@ -382,7 +384,7 @@ def pareto(
     return _pareto(_key(grown), lift, depth, grown)
 
 
-@st.cache_resource(max_entries=64, show_spinner=False)
+@cached()
 def _top_rules(
     key: tuple[str, int], thresholds: Thresholds, most: int, _trees: tuple[PolicyTree, ...]
 ) -> RuleSet:

@@ -7,6 +7,7 @@ from typing import Any
 import _state as state
 import numpy as np
 import streamlit as st
+from _cache import cached
 from numpy.typing import NDArray
 
 from sarl_core.explaining.rule_figures import tree_figure
@@ -90,7 +91,7 @@ def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
     return repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
 
 
-@st.cache_resource(max_entries=48, show_spinner=False)
+@cached()
 def _picture(
     told: str,
     node: int,
@@ -103,7 +104,7 @@ def _picture(
     return tree_figure(_tree, cut, node, dark=dark)
 
 
-@st.cache_resource(max_entries=96, show_spinner=False)
+@cached()
 def _place(
     told: str,
     node: int,
@@ -117,7 +118,7 @@ def _place(
     return place_html(_tree, cut, node, note=note, dark=dark)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def _cut(told: str, leaves: bool, _tree: PolicyTree, _thresholds: Thresholds) -> NDArray[np.int64]:
     """The nodes that are rules."""
     if leaves:

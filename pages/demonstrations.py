@@ -11,6 +11,7 @@ import _hold_out
 import _state as state
 import plotly.graph_objects as go
 import streamlit as st
+from _cache import cached
 from _upload import upload_section
 from _words import escaped, in_full
 
@@ -52,7 +53,7 @@ class Contents:
     warnings: tuple[str, ...]
 
 
-@st.cache_resource(max_entries=8, show_spinner="Counting …")
+@cached(show_spinner="Counting …")
 def contents(digest: str, _demonstrations: Demonstrations) -> Contents:
     """Numbers of a set, worked out once for each digest."""
     return Contents(
@@ -60,7 +61,7 @@ def contents(digest: str, _demonstrations: Demonstrations) -> Contents:
     )
 
 
-@st.cache_resource(max_entries=16, show_spinner="Counting …")
+@cached(show_spinner="Counting …")
 def feature_figures(
     digest: str,
     divider: int,
@@ -81,7 +82,7 @@ def feature_figures(
     )
 
 
-@st.cache_resource(max_entries=16, show_spinner=False)
+@cached()
 def action_figures(
     digest: str, divider: int, _demonstrations: Demonstrations
 ) -> tuple[go.Figure, ...]:
@@ -98,7 +99,7 @@ def action_figures(
     return tuple(figures)
 
 
-@st.cache_resource(max_entries=16, show_spinner=False)
+@cached()
 def episode_figures(
     digest: str, _demonstrations: Demonstrations
 ) -> tuple[go.Figure | None, go.Figure]:

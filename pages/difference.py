@@ -7,6 +7,7 @@ from typing import Any
 import _edits
 import _state as state
 import streamlit as st
+from _cache import cached
 from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, rules_for
 from _rule_table import action_column, table_height
 from _settings import offered_rule_sets
@@ -55,7 +56,7 @@ def side(key: str, label: str, default: str) -> tuple[RuleSet, str, str]:
     return rule_set, digest, file.name if file is not None else choice
 
 
-@st.cache_resource(max_entries=12, show_spinner="Comparing …")
+@cached(show_spinner="Comparing …")
 def compared(
     digests: tuple[str, str, str], _first: RuleSet, _second: RuleSet, _demonstrations: Any
 ) -> tuple[Disagreement, Any]:
@@ -69,7 +70,7 @@ def compared(
     return disagreement(ground_of(_first, states), ground_of(_second, states)), states
 
 
-@st.cache_resource(max_entries=24, show_spinner="Writing the rules in plain language …")
+@cached(show_spinner="Writing the rules in plain language …")
 def rules_frame(digests: tuple[str, str, str], kinds: tuple[str, ...], _found: Disagreement) -> Any:
     """The rules that differ, as a data frame."""
     import pandas as pd
@@ -81,7 +82,7 @@ def rules_frame(digests: tuple[str, str, str], kinds: tuple[str, ...], _found: D
     return pd.DataFrame(rows)
 
 
-@st.cache_resource(max_entries=24, show_spinner=False)
+@cached()
 def decisions(
     digests: tuple[str, str, str],
     names: tuple[str, str],

@@ -10,6 +10,7 @@ import _compact
 import _edits
 import _state as state
 import streamlit as st
+from _cache import cached
 from _rule_table import column_config, frame, table_height
 from _rule_view import Behind, make_ready, show_rule
 
@@ -47,7 +48,7 @@ class Listed:
     lower: tuple[float, ...]
 
 
-@st.cache_resource(max_entries=12, show_spinner="Writing the rules in plain language …")
+@cached(show_spinner="Writing the rules in plain language …")
 def listed_of(key: tuple[object, ...], _rule_set: RuleSet) -> Listed:
     """All rules, ready to be filtered."""
     import pyarrow as pa

@@ -9,6 +9,7 @@ import _edits
 import _state as state
 import numpy as np
 import streamlit as st
+from _cache import cached
 from _choices import PROJECTIONS
 from _replays import kept_replays
 from _settings import no_boxes_notice, outside_choice, projection_choice
@@ -37,7 +38,7 @@ FIRST = 8  # features whose sliders are not folded away
 STEPS = 400  # of a slider
 
 
-@st.cache_resource(max_entries=24, show_spinner="Laying out the rules …")
+@cached(show_spinner="Laying out the rules …")
 def prepared(
     key: str, projection: Projection, outside: Outside, _rule_set: RuleSet
 ) -> Neighbourhood:
@@ -45,7 +46,7 @@ def prepared(
     return Neighbourhood(Shield(_rule_set, projection=projection, outside=outside))
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def spans_of(
     digest: str, _demonstrations: Demonstrations
 ) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
@@ -55,13 +56,13 @@ def spans_of(
     )
 
 
-@st.cache_resource(max_entries=24, show_spinner=False)
+@cached()
 def order_of(key: str, _rule_set: RuleSet) -> tuple[int, ...]:
     """The features that most rules ask about first."""
     return by_use(_rule_set)
 
 
-@st.cache_resource(max_entries=12, show_spinner=False)
+@cached()
 def finder_of(key: str, _rule_set: RuleSet) -> PathFinder:
     """Follows a state through rules that are of no tree at hand."""
     return PathFinder(_rule_set)

@@ -23,7 +23,7 @@ from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, run_seeds
 from sarl_core.rollouts.packed_shield import PackedShield, pack, unpack
-from sarl_core.rollouts.workers import begin_process
+from sarl_core.rollouts.workers import beginning
 from sarl_core.shielding.shield import Shield
 
 _PIECE_SECONDS = 1.0  # what one piece should take: progress is told, and work ends, this often
@@ -197,9 +197,8 @@ class WorkerPool:
             self._processes = ProcessPoolExecutor(
                 self.workers,
                 timeout=_IDLE_SECONDS,
-                initializer=begin_process,
-                initargs=(self._gives_way,),
                 env={"OMP_NUM_THREADS": "1"},
+                **beginning(gives_way=self._gives_way),
             )
             return self._processes.submit(*work)
 

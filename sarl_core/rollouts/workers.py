@@ -37,20 +37,25 @@ def parallel(jobs: int) -> Any:
     """
     from joblib import Parallel
 
-    return Parallel(
-        n_jobs=jobs, backend="loky", initializer=begin_process, initargs=(_gives_way.get(),)
-    )
+    return Parallel(n_jobs=jobs, backend="loky", **beginning(gives_way=_gives_way.get()))
 
 
-def begin_process(gives_way: bool = True) -> None:
-    """End with the process that asks, and let others go first; for a new process.
+def beginning(*, gives_way: bool) -> dict[str, Any]:
+    """What processes are to do first: end with this one, and let others go first.
 
     Args:
         gives_way: Whether others go first.
+
+    Returns:
+        Arguments ``initializer`` and ``initargs`` of whatever starts processes.
     """
+    return {"initializer": _begin, "initargs": (os.getpid(), gives_way)}
+
+
+def _begin(parent: int, gives_way: bool) -> None:
     if gives_way and hasattr(os, "nice"):
         os.nice(_NICENESS)
-    Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def _end_with(parent: int) -> None:

@@ -6,7 +6,6 @@ from html import escape
 from typing import Any
 
 import pytest
-import streamlit as st
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, load_demonstrations, mine_rules
@@ -142,7 +141,7 @@ def test_what_the_buttons_lead_to_is_made_before_they_are_pressed(
     open_page("rules", data="cartpole")  # the page's modules are there from now on
     monkeypatch.setattr(sys.modules["_tree_picture"], "place_html", place)
     monkeypatch.setattr(sys.modules["_rule_view"], "examples_html", examples)
-    st.cache_resource.clear()
+    sys.modules["_cache"].RESULTS.clear()
     rules = mined("cartpole", 0.005, 0.95)
     ordered = [rule.id for rule in sorted(rules.rules, key=lambda one: -one.samples)]
     app = open_page("rules", data="cartpole")

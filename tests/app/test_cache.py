@@ -1,0 +1,147 @@
+"""What pages keep: bounded in bytes, and what a visitor brought goes with the visitor."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from tests.app.screens import open_page
+from tests.app.test_demonstrations_page import upload
+from tests.bad_inputs import ROWS, csv_bytes
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "pages"))
+
+import _cache  # found by the line above
+from _kept import Kept, size_of
+
+MEGABYTE = 2**20
+
+
+def megabytes(count: float) -> np.ndarray:
+    return np.zeros(int(count * MEGABYTE), dtype=np.uint8)
+
+
+@dataclass(frozen=True)
+class Pair:
+    left: np.ndarray
+    right: object
+
+
+@pytest.mark.parametrize(
+    ("value", "size"),
+    [
+        (megabytes(3), 3),
+        (Pair(megabytes(2), {"more": [megabytes(1)]}), 3),
+        ([megabytes(0.01) for _ in range(1_000)], 10),
+        (pd.DataFrame({"x": np.zeros(MEGABYTE // 8), "y": np.zeros(MEGABYTE // 8)}), 2),
+        ("x" * MEGABYTE, 1),
+        (tuple(float(i) for i in range(MEGABYTE // 40)), 1),
+        (megabytes(5)[:10], 5),  # a part keeps the whole
+    ],
+)
+def test_sizes_are_about_right(value: object, size: float) -> None:
+    assert size_of(value) == pytest.approx(size * MEGABYTE, rel=0.1)
+
+
+def test_what_is_in_a_thing_twice_is_counted_once() -> None:
+    whole = megabytes(1)
+    assert size_of([whole, whole, (whole,)]) == pytest.approx(MEGABYTE, rel=0.01)
+
+
+def test_what_was_not_used_for_longest_goes_first() -> None:
+    kept = Kept(None, 3 * MEGABYTE)
+    for name in "abc":
+        kept.put(name, megabytes(0.9))
+    kept.get("a")
+    kept.put("d", megabytes(0.9))
+    assert [name in kept for name in "abcd"] == [True, False, True, True]
+    kept.put("e", megabytes(5))  # larger than there is room for: alone
+    assert (len(kept), kept.size > kept.most_bytes) == (1, True)
+    kept.put("f", megabytes(0.1))
+    assert [name in kept for name in "ef"] == [False, True]
+    assert kept.size < MEGABYTE
+
+
+def test_a_function_works_once_for_all_who_ask_at_once() -> None:
+    made = []
+    begun, go_on = threading.Event(), threading.Event()
+
+    @_cache.cached()
+    def slow(number: int, _rest: object) -> np.ndarray:
+        made.append(number)
+        begun.set()
+        assert go_on.wait(30)
+        return megabytes(0.001)
+
+    found: list[object] = []
+    threads = [
+        threading.Thread(target=lambda rest=rest: found.append(slow(1, rest))) for rest in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    assert begun.wait(30)
+    go_on.set()
+    for thread in threads:
+        thread.join()
+    assert made == [1]
+    assert all(one is found[0] for one in found)
+
+
+def test_what_fails_is_not_kept_and_none_is() -> None:
+    calls = []
+
+    @_cache.cached()
+    def odd(number: int) -> None:
+        calls.append(number)
+        if len(calls) == 1:
+            raise ValueError("once")
+
+    with pytest.raises(ValueError, match="once"):
+        odd(1)
+    assert odd(1) is None
+    assert odd(number=1) is None
+    assert calls == [1, 1]
+
+
+def owners() -> set[str]:
+    """Whose the entries are that the dashboard keeps."""
+    entries = sys.modules["_cache"].RESULTS._entries.values()
+    return {entry.owner for entry in entries}
+
+
+def uploaded(content: bytes) -> tuple[AppTest, str]:
+    app = upload(open_page("demonstrations"), ("mine.csv", content))
+    assert not app.exception
+    return app, app.session_state["_upload"].digest
+
+
+def test_what_a_visitor_uploaded_goes_when_the_last_who_holds_it_has_gone() -> None:
+    cache = sys.modules["_cache"]
+    _app, digest = uploaded(csv_bytes(*ROWS))
+    assert digest in owners()
+    mine = cache.Visit()
+    cache._VISITS.add(mine)
+    mine.bring(digest)
+    visits = [visit for visit in cache._VISITS if visit.upload == digest and visit is not mine]
+    for visit in visits:
+        cache._end(visit)
+    assert digest in owners()
+    cache._end(mine)
+    assert digest not in owners()
+    assert "" in owners() or not owners()
+
+
+def test_a_second_upload_takes_the_place_of_the_first() -> None:
+    app, first = uploaded(csv_bytes("0,0,0.5,1.0,1", "0,1,0.25,1.0,0", "1,0,0.1,0.2,1"))
+    assert first in owners()
+    app = upload(app, ("other.csv", csv_bytes(*ROWS)))
+    second = app.session_state["_upload"].digest
+    assert second != first
+    assert first not in owners()
