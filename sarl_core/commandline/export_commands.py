@@ -9,7 +9,7 @@ import typer
 
 from sarl_core.commandline import terminal
 from sarl_core.commandline.inputs import read_demonstrations
-from sarl_core.commandline.options import EnvOfFile, Json, ProjectionName
+from sarl_core.commandline.options import EnvOfFile, Json, OnInvalidName, ProjectionName
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def export(
     ] = None,
     env: EnvOfFile = None,
     projection: ProjectionName = "centre",
+    on_invalid: OnInvalidName = "raise",
     as_json: Json = False,
 ) -> None:
     """Write rules as code or for reading, with test vectors at every threshold.
@@ -78,7 +79,7 @@ def export(
         rule_set = RuleSet.load(rules)
         given = None if demonstrations is None else read_demonstrations(demonstrations, env)
         prepared = prepare(rule_set, merged=merged, demonstrations=given)
-        vectors = save_export(prepared.rule_set, out, projection)
+        vectors = save_export(prepared.rule_set, out, projection, on_invalid)
     if as_json:
         terminal.print_json(_document(prepared, out, vectors))
     else:

@@ -79,6 +79,14 @@ OutsideName = Annotated[
         "all the same, or leave it to the agent.",
     ),
 ]
+OnInvalidName = Annotated[
+    Literal["raise", "pass"],
+    typer.Option(
+        "--on-invalid",
+        help="What to do where an observation is no state (a number is missing or infinite) or an "
+        "action none that there is: stop with an error, or let the action pass unchecked.",
+    ),
+]
 Divider = Annotated[
     int,
     typer.Option(

@@ -17,6 +17,7 @@ from sarl_core.explaining.language import action_text, conditions_text, counted
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
 
 _SIGNATURE = """\
 int shield_decide(const float state[SHIELD_FEATURES],
@@ -34,8 +35,11 @@ _HEAD = """\
  *   executed  the action to execute; may be the same array as proposed
  *   rule      for each action the index of the rule in force, -1 where none applies
  *
- *   It returns 1 if an action was changed, else 0. An action that breaks no rule is
+ *   It returns 1 if an action was changed, 0 if not. An action that breaks no rule is
  *   passed on as it is. It keeps nothing between calls and may run in several threads.
+ *
+ *   Where a number of the state is not finite, or an action is {none}, it
+ *   returns SHIELD_INVALID, and no rule is in force: {invalid}.
  *
  * Made by `python -m sarl_core export`: {rules}{projection}.
  * The rules were learned from examples and guarantee nothing.
@@ -53,12 +57,22 @@ _HEAD = """\
 """
 
 
-def rules_to_c(rule_set: RuleSet, projection: Projection = "centre") -> str:
+_INVALID: dict[OnInvalid, str] = {
+    "raise": "nothing\n *   is written to executed, and nothing should be done (on_invalid: raise)",
+    "pass": "the\n *   action is passed on as it is, unchecked (on_invalid: pass)",
+}
+
+
+def rules_to_c(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> str:
     """A rule set as C.
 
     Args:
         rule_set: The rules; those switched off are left out, and keep their index.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: Whether an action passes where it or the state is none, or nothing is given
+            to be executed; what is returned says so either way.
 
     Returns:
         A source file with the function `shield_decide`, which decides as a `Shield` does.
@@ -66,14 +80,21 @@ def rules_to_c(rule_set: RuleSet, projection: Projection = "centre") -> str:
     Raises:
         InputError: As `program_of`.
     """
-    program = program_of(rule_set, projection)
+    program = program_of(rule_set, projection, on_invalid)
     functions = [
         part
         for index, order in enumerate(program.orders)
         for part in _finders(index, order, rule_set)
     ]
     return "\n".join(
-        [_head(program), _names(program), _table(program), *functions, _decide(program)]
+        [
+            _head(program),
+            _names(program),
+            _table(program),
+            *functions,
+            _valid(program),
+            _decide(program),
+        ]
     )
 
 
@@ -113,6 +134,8 @@ def _head(program: Program) -> str:
         signature=f" *   {signature};",
         features=counted(len(rule_set.source.features), "number"),
         actions=counted(len(program.orders), "number"),
+        none="not, either" if program.continuous else "none that there is",
+        invalid=_INVALID[program.on_invalid],
         rules=f"{counted(len(rule_set), 'rule')} for "
         f"{comment(rule_set.source.env_id) or 'an unnamed environment'}",
         projection=projection,
@@ -140,7 +163,8 @@ def _names(program: Program) -> str:
             "enum {",
             f"    SHIELD_FEATURES = {len(features)},",
             f"    SHIELD_ACTIONS = {len(actions)},",
-            f"    SHIELD_RULES = {len(program.rule_set)}",
+            f"    SHIELD_RULES = {len(program.rule_set)},",
+            "    SHIELD_INVALID = -1",
             "};",
             "",
             f"{prototype};",
@@ -213,8 +237,7 @@ def _finders(index: int, order: Order, rule_set: RuleSet) -> list[str]:
     found = []
     for number in reversed(range(len(parts))):
         lines = [
-            f"/* {comment(order.dimension.name)}: the rule in force. A value that is not a number"
-            " counts as above. */"
+            f"/* {comment(order.dimension.name)}: the rule in force. */"
             if number == 0
             else "/* Further down. */",
             f"static int {_finder(index, number)}(const float *x)",
@@ -285,6 +308,39 @@ def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
     return comment(f"rule {rule.id}: {action}")
 
 
+def _valid(program: Program) -> str:
+    """Whether the rules can be asked at all."""
+    table = []
+    asked = "!isfinite(proposed[i])"
+    if not program.continuous:
+        asked = "proposed[i] < shield_label[i].first || proposed[i] > shield_label[i].last"
+        table = [
+            "/* The actions there are. */",
+            "static const struct {",
+            "    int64_t first, last;",
+            "} shield_label[SHIELD_ACTIONS] = {",
+            *(f"    {{INT64_C({first}), INT64_C({last})}}," for first, last in program.labels),
+            "};",
+            "",
+        ]
+    return "\n".join(
+        [
+            *table,
+            f"static int shield_is_valid(const float *state, const {_kind(program)} *proposed)",
+            "{",
+            "    for (int i = 0; i < SHIELD_FEATURES; i++)",
+            "        if (!isfinite(state[i]))",
+            "            return 0;",
+            "    for (int i = 0; i < SHIELD_ACTIONS; i++)",
+            f"        if ({asked})",
+            "            return 0;",
+            "    return 1;",
+            "}",
+            "",
+        ]
+    )
+
+
 def _decide(program: Program) -> str:
     calls = [
         f"    rule[{index}] = {_finder(index, 0)}(state);" for index in range(len(program.orders))
@@ -298,11 +354,19 @@ def _decide(program: Program) -> str:
         )
     else:
         keeps, becomes = "shield_keeps(rule[i], proposed[i])", "shield_rule[rule[i]].value"
+    passes = ["            executed[i] = proposed[i];"] if program.on_invalid == "pass" else []
     return "\n".join(
         [
             _SIGNATURE.format(kind=_kind(program)),
             "{",
             "    int changed = 0;",
+            "    if (!shield_is_valid(state, proposed)) {",
+            "        for (int i = 0; i < SHIELD_ACTIONS; i++) {",
+            *passes,
+            "            rule[i] = -1;",
+            "        }",
+            "        return SHIELD_INVALID;",
+            "    }",
             *calls,
             "    for (int i = 0; i < SHIELD_ACTIONS; i++) {",
             f"        if (rule[i] < 0 || {keeps}) {{",

@@ -17,6 +17,7 @@ from sarl_core.explaining.language import action_text, conditions_text, counted
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
 
 # No name from outside stands in the first two lines: there, Python looks for an encoding.
 _HEAD = '''\
@@ -24,12 +25,64 @@ _HEAD = '''\
 
 Made by `python -m sarl_core export`; it needs nothing but Python 3.
 The rules were learned from examples and guarantee nothing.
-"""
+{invalid}"""
 
 from array import array
+from math import isfinite
+'''
+
+_INVALID: dict[OnInvalid, tuple[str, str]] = {
+    "raise": (
+        """\
+Where the state is not so many finite numbers, or the action is none that there is, it
+raises ValueError (on_invalid: raise).
+""",
+        """\
+        raise ValueError("the state or the action is none that the rules can be asked about")
+""",
+    ),
+    "pass": (
+        """\
+Where the state is not so many finite numbers, or the action is none that there is, the
+action is passed on as it is, and no rule is in force (on_invalid: pass).
+""",
+        """\
+        return action, [-1] * len(FIND)
+""",
+    ),
+}
+
+_NUMBERS = '''\
+
+
+def numbers(values, count):
+    """So many finite numbers in 32-bit floating point, or None where they are something else."""
+    try:
+        found = array("f", [] if isinstance(values, (bytes, bytearray)) else values)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if len(found) == count and all(map(isfinite, found)) else None
 '''
 
 _DISCRETE = '''
+
+def is_label(value, first, last):
+    """Whether a value is one of the actions there are."""
+    try:
+        return bool(first <= value <= last) and int(value) == value
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def are_labels(actions):
+    """Whether each value is one of the actions there are."""
+    try:
+        return len(actions) == len(LABELS) and all(
+            is_label(value, first, last) for value, (first, last) in zip(actions, LABELS)
+        )
+    except TypeError:
+        return False
+
 
 def shield(state, action):
     """The action to execute, and the rule in force.
@@ -40,9 +93,9 @@ def shield(state, action):
     Returns (executed, rules). An action that breaks no rule is passed on as it is. For each
     action, rules holds the index of the rule in force, or -1 where none applies.
     """
-    x = array("f", state)
-    if len(x) != FEATURES:
-        raise ValueError(f"the state has {len(x)} numbers and the rules ask about {FEATURES}")
+    x = numbers(state, FEATURES)
+    if x is None or not are_labels((action,) if SINGLE else action):
+{answer}\
     rules = [find(x) for find in FIND]
     if SINGLE:
         value = VALUES[rules[0]] if rules[0] >= 0 else action
@@ -65,32 +118,35 @@ def shield(state, action):
     Returns (executed, rules). An action that breaks no rule is passed on as it is. For each
     action dimension, rules holds the index of the rule in force, or -1 where none applies.
     """
-    x = array("f", state)
-    if len(x) != FEATURES:
-        raise ValueError(f"the state has {len(x)} numbers and the rules ask about {FEATURES}")
+    x, proposed = numbers(state, FEATURES), numbers(action, len(FIND))
+    if x is None or proposed is None:
+{answer}\
     rules = [find(x) for find in FIND]
-    executed = list(array("f", action))
+    executed = list(proposed)
     for index, rule in enumerate(rules):
         if rule < 0:
             continue
         value, low, high, open_low, open_high = OUTCOMES[rule]
-        proposed = executed[index]
-        if (open_low or not proposed < low) and (open_high or proposed <= high):
+        wanted = executed[index]
+        if (open_low or wanted >= low) and (open_high or wanted <= high):
             continue
         if value is None:  # the nearest that is allowed
-            value = proposed if proposed > low else low
-            value = value if value < high else high
+            value = min(max(wanted, low), high)
         executed[index] = value
     return executed, rules
 '''
 
 
-def rules_to_python(rule_set: RuleSet, projection: Projection = "centre") -> str:
+def rules_to_python(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> str:
     """A rule set as Python.
 
     Args:
         rule_set: The rules; those switched off are left out, and keep their index.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: Whether a state or an action that is none raises an error or lets the action
+            pass.
 
     Returns:
         A module with the function `shield`, which decides as a `Shield` does.
@@ -98,23 +154,25 @@ def rules_to_python(rule_set: RuleSet, projection: Projection = "centre") -> str
     Raises:
         InputError: As `program_of`.
     """
-    program = program_of(rule_set, projection)
+    program = program_of(rule_set, projection, on_invalid)
     functions = [
         part
         for index, order in enumerate(program.orders)
         for part in _finders(index, order, rule_set)
     ]
+    said, answer = _INVALID[on_invalid]
+    body = _CONTINUOUS if program.continuous else _DISCRETE
     finders = ", ".join(_finder(index, 0) for index in range(len(program.orders)))
     return (
         "\n".join(
             [
-                _HEAD,
+                _HEAD.format(invalid=said),
                 *_names(program),
                 *_table(program),
                 *functions,
                 "",
                 f"FIND = ({finders},)",
-                _CONTINUOUS if program.continuous else _DISCRETE,
+                _NUMBERS + body.format(answer=answer),
             ]
         ).rstrip()
         + "\n"
@@ -140,6 +198,7 @@ def _names(program: Program) -> list[str]:
     lines.append(f"FEATURES = {len(rule_set.source.features)}")
     if not program.continuous:
         lines.append(f"SINGLE = {len(program.orders) == 1}")
+        lines.append(f"LABELS = {program.labels!r}")
     return [*lines, ""]
 
 
@@ -178,10 +237,7 @@ def _finders(index: int, order: Order, rule_set: RuleSet) -> list[str]:
     for number, part in enumerate([[]] if always else parts_of(order.nodes)):
         lines = ["", f"def {_finder(index, number)}(x):"]
         if number == 0:
-            lines.append(
-                f"    # {one_line(order.dimension.name)}: the rule in force. A value that is not a"
-                " number counts as above."
-            )
+            lines.append(f"    # {one_line(order.dimension.name)}: the rule in force.")
             for place, rule in order.scanned:
                 lines += _scan(place, rule, rule_set)
         lines += [line for step in part if (line := _line(step, index, rule_set)) is not None]

@@ -1,7 +1,8 @@
 """A rule set in the form that code is written from: what is asked in which order, and what follows.
 
 It does what a `Shield` does that acts everywhere (``outside="act"``), with float32 states and,
-where actions are continuous, float32 actions: those that environments give and take.
+where actions are continuous, float32 actions: those that environments give and take. What it
+does with a state or an action that is none is the choice that the program was made for.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tre
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection, replacements
+from sarl_core.shielding.shield import OnInvalid
 
 # Nested deeper than this, code goes on in a function of its own: Python ends at a hundred levels.
 _MOST_LEVELS = 20
@@ -33,7 +35,7 @@ class Outcome(NamedTuple):
         low: Least action that carries the rule's label.
         high: Largest such action.
         open_low: Whether all actions below carry it too.
-        open_high: Whether all actions above carry it too, and what is no number.
+        open_high: Whether all actions above carry it too.
     """
 
     value: float | None
@@ -69,12 +71,14 @@ class Program:
     Attributes:
         rule_set: Where it comes from.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
         orders: One an action dimension.
         outcomes: One a rule, in the order of the rule set.
     """
 
     rule_set: RuleSet
     projection: Projection
+    on_invalid: OnInvalid
     orders: tuple[Order, ...]
     outcomes: tuple[Outcome, ...]
 
@@ -82,6 +86,12 @@ class Program:
     def continuous(self) -> bool:
         """Whether the actions are numbers from intervals."""
         return self.orders[0].dimension.is_interval
+
+    @property
+    def labels(self) -> tuple[tuple[int, int], ...]:
+        """Of each discrete action the first and the last there is; () for numbers of intervals."""
+        dimensions = [order.dimension for order in self.orders if not self.continuous]
+        return tuple((each.first, each.first + each.n_labels - 1) for each in dimensions)
 
 
 class Step(NamedTuple):
@@ -118,12 +128,15 @@ def require_rules(rule_set: RuleSet) -> None:
         )
 
 
-def program_of(rule_set: RuleSet, projection: Projection = "centre") -> Program:
+def program_of(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> Program:
     """Arrange rules for writing code.
 
     Args:
         rule_set: The rules; those switched off are left out, and keep their index.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
 
     Returns:
         Placed rules first, the others as a tree.
@@ -141,6 +154,7 @@ def program_of(rule_set: RuleSet, projection: Projection = "centre") -> Program:
     return Program(
         rule_set,
         projection,
+        on_invalid,
         tuple(_order(rule_set, index) for index in range(len(rule_set.actions))),
         _outcomes(rule_set, projection),
     )

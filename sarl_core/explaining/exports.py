@@ -29,7 +29,7 @@ from sarl_core.mining.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.projection import Projection
-from sarl_core.shielding.shield import Shield
+from sarl_core.shielding.shield import OnInvalid, Shield
 
 FORMATS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
 """What a rule set is carried away as: endings of file names."""
@@ -123,13 +123,20 @@ def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstra
     return int(np.count_nonzero(differs.any(axis=1)))
 
 
-def export_rules(rule_set: RuleSet, suffix: str, projection: Projection = "centre") -> bytes:
+def export_rules(
+    rule_set: RuleSet,
+    suffix: str,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+) -> bytes:
     """A rule set in one of the formats.
 
     Args:
         rule_set: To carry away.
         suffix: One of `FORMATS`.
         projection: What a continuous action that breaks a rule becomes; for code.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none; for
+            code.
 
     Returns:
         The content of the file.
@@ -143,17 +150,20 @@ def export_rules(rule_set: RuleSet, suffix: str, projection: Projection = "centr
     if suffix == ".onnx":
         from sarl_core.explaining.onnx_export import rules_to_onnx
 
-        return rules_to_onnx(rule_set, projection)
+        return rules_to_onnx(rule_set, projection, on_invalid)
     # A file may have brought half of a pair that UTF-8 cannot write.
-    return _text(rule_set, suffix, projection).encode("utf-8", errors="replace")
+    return _text(rule_set, suffix, projection, on_invalid).encode("utf-8", errors="replace")
 
 
-def export_vectors(rule_set: RuleSet, projection: Projection = "centre") -> bytes:
+def export_vectors(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> bytes:
     """Test vectors for a rule set, as CSV.
 
     Args:
         rule_set: As it was exported.
         projection: As it was exported.
+        on_invalid: As it was exported.
 
     Returns:
         The content of the file that stands beside the export.
@@ -163,7 +173,7 @@ def export_vectors(rule_set: RuleSet, projection: Projection = "centre") -> byte
     """
     from sarl_core.explaining.test_vectors import make_vectors, vectors_to_csv
 
-    return vectors_to_csv(make_vectors(rule_set, projection)).encode()
+    return vectors_to_csv(make_vectors(rule_set, projection, on_invalid)).encode()
 
 
 def vectors_name(name: str) -> str:
@@ -178,13 +188,19 @@ def vectors_name(name: str) -> str:
     return f"{name}.vectors.csv"
 
 
-def save_export(rule_set: RuleSet, path: Path, projection: Projection = "centre") -> Path:
+def save_export(
+    rule_set: RuleSet,
+    path: Path,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+) -> Path:
     """Write a rule set in the format that the file's name ends in, and its test vectors beside it.
 
     Args:
         rule_set: To carry away.
         path: Ends in one of `FORMATS`.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
 
     Returns:
         Where the test vectors are.
@@ -193,8 +209,8 @@ def save_export(rule_set: RuleSet, path: Path, projection: Projection = "centre"
         InputError: As `export_rules`, or if the folder does not exist.
         WorkError: If it cannot be written to, or a package is missing.
     """
-    content = export_rules(rule_set, path.suffix.lower(), projection)
-    vectors = export_vectors(rule_set, projection)
+    content = export_rules(rule_set, path.suffix.lower(), projection, on_invalid)
+    vectors = export_vectors(rule_set, projection, on_invalid)
     beside = path.with_name(vectors_name(path.name))
     for place, data in ((beside, vectors), (path, content)):
         with whole_file(place) as unfinished:
@@ -202,7 +218,7 @@ def save_export(rule_set: RuleSet, path: Path, projection: Projection = "centre"
     return beside
 
 
-def _text(rule_set: RuleSet, suffix: str, projection: Projection) -> str:
+def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: OnInvalid) -> str:
     if suffix == ".json":
         from sarl_core.mining.rule_files import rules_to_json
 
@@ -216,11 +232,11 @@ def _text(rule_set: RuleSet, suffix: str, projection: Projection) -> str:
     if suffix == ".py":
         from sarl_core.explaining.code_python import rules_to_python
 
-        return rules_to_python(rule_set, projection)
+        return rules_to_python(rule_set, projection, on_invalid)
     if suffix == ".c":
         from sarl_core.explaining.code_c import rules_to_c
 
-        return rules_to_c(rule_set, projection)
+        return rules_to_c(rule_set, projection, on_invalid)
     raise InputError(f"the format {suffix!r} is none of {', '.join(FORMATS)}; choose one of them")
 
 

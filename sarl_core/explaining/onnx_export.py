@@ -16,30 +16,38 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import WorkError
 from sarl_core.explaining.export_program import Order, Program, largest_float32, program_of
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
 
 # Versions of the operators that runtimes have known for years.
 _OPERATORS, _TREES, _FORMAT = 13, 1, 7
 
 
-def rules_to_onnx(rule_set: RuleSet, projection: Projection = "centre") -> bytes:
+def rules_to_onnx(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> bytes:
     """A rule set as an ONNX model.
 
     Args:
         rule_set: The rules; those switched off are left out, and keep their index.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: Whether the action passes where it or the state is none (``pass``). A model
+            cannot stop with an error: for ``raise``, `executed` is then no action at all, NaN or
+            the least int64.
 
     Returns:
         A model with the inputs `state` (B, d) float32 and `proposed` (B, m), int64 or float32,
-        and the outputs `executed` (B, m), alike, and `rule` (B, m) int64, -1 where none applies.
+        and the outputs `executed` (B, m), alike, `rule` (B, m) int64, -1 where none applies, and
+        `invalid` (B, 1), whether a number is not finite or an action none that there is.
 
     Raises:
         InputError: As `program_of`.
         WorkError: If the package `onnx` is missing.
     """
-    program = program_of(rule_set, projection)
+    program = program_of(rule_set, projection, on_invalid)
     try:
         import onnx
         from onnx import TensorProto, helper
@@ -51,7 +59,11 @@ def rules_to_onnx(rule_set: RuleSet, projection: Projection = "centre") -> bytes
     graph = _Graph(helper)
     for index, order in enumerate(program.orders):
         _find(graph, index, order)
-    graph.add("Concat", [f"rule_of_{i}" for i in range(len(program.orders))], "rule", axis=1)
+    found = [f"rule_of_{i}" for i in range(len(program.orders))]
+    graph.add("Concat", found, "rule_found", axis=1)
+    graph.add("Not", [_valid(graph, program)], "invalid")
+    nothing = graph.table("no_rule", np.array([NO_RULE], dtype=np.int64))
+    graph.add("Where", ["valid", "rule_found", nothing], "rule")
     if program.continuous:
         _replace_continuous(graph, program)
     else:
@@ -64,7 +76,11 @@ def rules_to_onnx(rule_set: RuleSet, projection: Projection = "centre") -> bytes
             graph.nodes,
             "shield",
             [info("state", TensorProto.FLOAT, ["B", d]), info("proposed", kind, ["B", m])],
-            [info("executed", kind, ["B", m]), info("rule", TensorProto.INT64, ["B", m])],
+            [
+                info("executed", kind, ["B", m]),
+                info("rule", TensorProto.INT64, ["B", m]),
+                info("invalid", TensorProto.BOOL, ["B", 1]),
+            ],
             [onnx.numpy_helper.from_array(value, name) for name, value in graph.tables.items()],
         ),
         opset_imports=[
@@ -73,12 +89,14 @@ def rules_to_onnx(rule_set: RuleSet, projection: Projection = "centre") -> bytes
         ],
         ir_version=_FORMAT,
         producer_name="sarl_core",
-        doc_string="A shield of rules, learned from examples; it guarantees nothing.",
+        doc_string="A shield of rules, learned from examples; it guarantees nothing. "
+        + _INVALID[on_invalid],
     )
     helper.set_model_props(
         model,
         {
             "environment": rule_set.source.env_id,
+            "on_invalid": on_invalid,
             "features": json.dumps(
                 [{"name": f.name, "unit": f.unit} for f in rule_set.source.features]
             ),
@@ -89,6 +107,49 @@ def rules_to_onnx(rule_set: RuleSet, projection: Projection = "centre") -> bytes
     onnx.checker.check_model(model)
     content: bytes = model.SerializeToString()
     return content
+
+
+_INVALID: dict[OnInvalid, str] = {
+    "raise": "Where `invalid` is true, nothing should be done: `executed` is no action "
+    "(on_invalid: raise).",
+    "pass": "Where `invalid` is true, no rule was asked, and the action passes as it is "
+    "(on_invalid: pass).",
+}
+
+
+def _valid(graph: _Graph, program: Program) -> str:
+    """Add what tells whether the rules can be asked at all: `valid`, (B, 1)."""
+
+    def every(holds: str, name: str) -> str:
+        numbers = graph.add("Cast", [holds], f"{name}_as_number", to=1)  # float
+        least = graph.add("ReduceMin", [numbers], f"{name}_least", axes=[1], keepdims=1)
+        half = graph.table("half", np.array([0.5], dtype=np.float32))
+        return graph.add("Greater", [least, half], f"{name}_valid")
+
+    def finite(values: str) -> str:
+        # What is infinite or no number leaves no zero when it is taken from itself.
+        left = graph.add("Sub", [values, values], f"{values}_left")
+        nothing = graph.table("no_difference", np.array([0], dtype=np.float32))
+        return graph.add("Equal", [left, nothing], f"{values}_finite")
+
+    if program.continuous:
+        holds = finite("proposed")
+    else:
+        first, last = (np.array(ends, dtype=np.int64) for ends in zip(*program.labels, strict=True))
+        under = graph.add("Less", ["proposed", graph.table("first_label", first)], "under_first")
+        over = graph.add("Greater", ["proposed", graph.table("last_label", last)], "over_last")
+        holds = graph.add("Not", [graph.add("Or", [under, over], "no_label")], "is_label")
+    parts = [every(finite("state"), "state"), every(holds, "proposed")]
+    return graph.add("And", parts, "valid")
+
+
+def _execute(graph: _Graph, program: Program, decided: str) -> None:
+    """Add the action to execute: what was decided, where it could be."""
+    otherwise = "proposed"
+    if program.on_invalid == "raise":
+        none = np.float32(np.nan) if program.continuous else np.iinfo(np.int64).min
+        otherwise = graph.table("no_action", np.array([none]))
+    graph.add("Where", ["valid", decided, otherwise], "executed")
 
 
 @dataclass
@@ -141,7 +202,7 @@ class _Trees:
         self.target_weights: list[float] = []
 
     def query(self, node: int, feature: int, threshold: float, below: int, above: int) -> None:
-        """A node that leads on; what is no number goes to the side above, as it is not <=."""
+        """A node that leads on."""
         self._node(node, feature, float(largest_float32(threshold)), "BRANCH_LEQ", below, above)
 
     def leaf(self, node: int, weight: float) -> None:
@@ -231,7 +292,7 @@ def _replace_discrete(graph: _Graph, program: Program) -> None:
     values = np.array([int(outcome.low) for outcome in program.outcomes], dtype=np.int64)
     none, place = _none_and_place(graph)
     value = graph.add("Gather", [graph.table("values", values), place], "value")
-    graph.add("Where", [none, "proposed", value], "executed")
+    _execute(graph, program, graph.add("Where", [none, "proposed", value], "decided"))
 
 
 def _replace_continuous(graph: _Graph, program: Program) -> None:
@@ -258,4 +319,4 @@ def _replace_continuous(graph: _Graph, program: Program) -> None:
         value = graph.add("Where", [under_high, raised, high], "value")
     else:
         value = looked_up("value", np.float32)
-    graph.add("Where", [kept, "proposed", value], "executed")
+    _execute(graph, program, graph.add("Where", [kept, "proposed", value], "decided"))

@@ -134,7 +134,7 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     """
     rule_set = report_rules(rule_set, demonstrations).rule_set
     actions = demonstrations.action_columns
-    found = Shield(rule_set).decide_batch(demonstrations.observations, actions).rules
+    found = Shield(rule_set).rules_in_force(demonstrations.observations)
     labels = np.stack(
         [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
     )

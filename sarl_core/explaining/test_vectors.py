@@ -21,7 +21,7 @@ from sarl_core.mining.rule_tree import RuleNode
 from sarl_core.mining.rules import Condition, RuleSet
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
-from sarl_core.shielding.shield import Shield
+from sarl_core.shielding.shield import OnInvalid, Shield
 
 _INFINITY = np.float32(np.inf)
 _ODD = (np.nan, np.inf, -np.inf)
@@ -35,27 +35,35 @@ class Vectors:
         states: Shape (B, d), float32.
         proposed: Shape (B, m), int64 or float32.
         rules: Index of the rule in force or -1, (B, m) int64.
-        executed: Shape (B, m), int64 or float32.
+        executed: Shape (B, m), int64 or float32; where nothing is to be executed, as proposed.
+        invalid: Whether the state is no state, or the action none that there is, (B,).
+        on_invalid: What becomes of those; nothing is executed for ``raise``.
     """
 
     states: NDArray[np.float32]
     proposed: NDArray[Any]
     rules: NDArray[np.int64]
     executed: NDArray[Any]
+    invalid: NDArray[np.bool_]
+    on_invalid: OnInvalid
 
     def __len__(self) -> int:
         """Number of vectors."""
         return len(self.states)
 
 
-def make_vectors(rule_set: RuleSet, projection: Projection = "centre") -> Vectors:
-    """States at every threshold, one step above it and one below, and some that are no numbers.
+def make_vectors(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> Vectors:
+    """States at every threshold, one step above it and one below, and what is no state or action.
 
     The other features of a state are such that it reaches the threshold on the way to the rule.
+    Behind them come states with a number that is none or infinite, and actions that are none.
 
     Args:
         rule_set: The rules.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
 
     Returns:
         With what `Shield` decides; the same every time.
@@ -63,26 +71,28 @@ def make_vectors(rule_set: RuleSet, projection: Projection = "centre") -> Vector
     Raises:
         InputError: As `program_of`.
     """
-    program = program_of(rule_set, projection)
+    program = program_of(rule_set, projection, on_invalid)
     rng = np.random.default_rng(0)
     typical = _typical_values(rule_set)
     rows = [typical]
     for order in program.orders:
         for path, feature, threshold in _queries(order):
             rows += _at(path, feature, threshold, typical, rng)
-    for feature in sorted({c.feature for rule in rule_set.rules for c in rule.conditions}):
+    for feature in range(len(typical)):
         for value in _ODD:
             odd = typical.copy()
             odd[feature] = value
             rows.append(odd)
-    states = np.array(rows, dtype=np.float32)
-    proposed = proposed_actions(rule_set, len(states), rng)
-    return decided(rule_set, projection, states, proposed)
+    none = _no_actions(rule_set, rng)
+    states = np.array(rows + [typical] * len(none), dtype=np.float32)
+    proposed = np.concatenate([proposed_actions(rule_set, len(rows), rng), none])
+    return decided(rule_set, projection, on_invalid, states, proposed)
 
 
 def decided(
     rule_set: RuleSet,
     projection: Projection,
+    on_invalid: OnInvalid,
     states: NDArray[np.float32],
     proposed: NDArray[Any],
 ) -> Vectors:
@@ -91,15 +101,17 @@ def decided(
     Args:
         rule_set: The rules.
         projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
         states: Shape (B, d).
         proposed: Shape (B, m).
 
     Returns:
-        All four.
+        All of it.
     """
-    with np.errstate(invalid="ignore"):  # infinite states have no distance to a threshold
-        decision = Shield(rule_set, projection=projection).decide_batch(states, proposed)
-    return Vectors(states, proposed, decision.rules, decision.executed)
+    shield = Shield(rule_set, projection=projection, on_invalid="pass")
+    decision = shield.decide_batch(states, proposed)
+    invalid = np.array([why is not None for why in decision.invalid], dtype=np.bool_)
+    return Vectors(states, proposed, decision.rules, decision.executed, invalid, on_invalid)
 
 
 def proposed_actions(
@@ -120,6 +132,18 @@ def proposed_actions(
     return np.stack([rng.choice(values, count).astype(kind) for values in columns], axis=1)
 
 
+def _no_actions(rule_set: RuleSet, rng: np.random.Generator) -> NDArray[Any]:
+    """Actions one of whose values is none that there is: beyond all labels, or not finite."""
+    rows = []
+    for index, dimension in enumerate(rule_set.actions):
+        labels = (dimension.first - 1, dimension.first + dimension.n_labels)
+        for value in _ODD if dimension.is_interval else labels:
+            action = proposed_actions(rule_set, 1, rng)
+            action[0, index] = value
+            rows.append(action)
+    return np.concatenate(rows)
+
+
 def vectors_to_csv(vectors: Vectors) -> str:
     """Test vectors as CSV.
 
@@ -127,8 +151,9 @@ def vectors_to_csv(vectors: Vectors) -> str:
         vectors: B of them.
 
     Returns:
-        A header (state_0..., proposed_0..., rule_0..., executed_0...) and one line a vector; all
-        numbers read back as the same ones.
+        A header (state_0..., proposed_0..., rule_0..., executed_0..., invalid) and one line a
+        vector; all numbers read back as the same ones. `invalid` is 1 where the state is no state
+        or the action none; where that is an error, nothing is said to be executed.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -138,11 +163,13 @@ def vectors_to_csv(vectors: Vectors) -> str:
         "rule": vectors.rules,
         "executed": vectors.executed,
     }
-    writer.writerow(
-        f"{name}_{column}" for name, block in blocks.items() for column in range(block.shape[1])
-    )
-    for row in zip(*blocks.values(), strict=True):
-        writer.writerow([_cell(value) for part in row for value in part])
+    names = [f"{name}_{i}" for name, block in blocks.items() for i in range(block.shape[1])]
+    writer.writerow([*names, "invalid"])
+    for invalid, *row in zip(vectors.invalid.tolist(), *blocks.values(), strict=True):
+        cells = [_cell(value) for part in row for value in part]
+        if invalid and vectors.on_invalid == "raise":
+            cells[-vectors.executed.shape[1] :] = [""] * vectors.executed.shape[1]
+        writer.writerow([*cells, int(invalid)])
     return text.getvalue()
 
 
@@ -162,7 +189,7 @@ def _values(dimension: LabelledDimension) -> NDArray[Any]:
             np.nextafter(edges, _INFINITY),
             np.nextafter(edges, -_INFINITY),
             np.array([dimension.centre(label) for label in range(dimension.n_labels)]),
-            np.array([edges[0] - width, edges[-1] + width, np.nan, np.inf, -np.inf]),
+            np.array([edges[0] - width, edges[-1] + width]),
         ]
     ).astype(np.float32)
 

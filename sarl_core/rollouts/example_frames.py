@@ -203,7 +203,7 @@ def _play(
     steps = found.steps
     assert steps is not None
     if not player.shielded:
-        rules = shield.decide_batch(steps.observation, steps.executed).rules
+        rules = shield.rules_in_force(steps.observation)
         columns = {name: getattr(steps, name) for name in StepTable.__dataclass_fields__}
         steps = StepTable(**(columns | {"rules": rules}))
     return Played(player, found.seeds, steps)

@@ -50,6 +50,7 @@ class HandoverVecEnv(ShieldedVecEnv):
             intervened=decision.intervened & self.enforced,
             margin=decision.margin,
             outside=decision.outside & self.enforced,
+            invalid=decision.invalid,
         )
 
 

@@ -149,7 +149,7 @@ class Neighbourhood:
         nearest = np.argsort(distances, kind="stable")[:most]
         rows, distances = rows[nearest], distances[nearest]
         # The same states that the rules ask for, and not the rules' word for it.
-        found = self.shield.decide_batch(wanted[rows], self._any_action(len(rows))).rules
+        found = self.shield.rules_in_force(wanted[rows])
         return tuple(
             NearMiss(
                 rule=int(self._index[row]),
@@ -192,7 +192,8 @@ class Neighbourhood:
             at = np.repeat(here[None], len(found), axis=0)
             at[:, feature] = found
             # Before the first start: any value below it, so the one just below.
-            at[0, feature] = np.nextafter(found[1], _DOWN) if len(found) > 1 else here[feature]
+            below = np.nextafter(found[1], _DOWN) if len(found) > 1 else here[feature]
+            at[0, feature] = max(below, -_LARGEST)  # below that there is no state
             starts.append(found)
             states.append(at)
         decided = self._decide(np.concatenate(states), action)
@@ -222,9 +223,6 @@ class Neighbourhood:
         one = np.asarray(action)
         proposed = np.repeat(one.reshape(1, -1), len(states), axis=0)
         return self.shield.decide_batch(states, proposed)
-
-    def _any_action(self, count: int) -> NDArray[np.float32]:
-        return np.zeros((count, len(self.shield.rule_set.actions)), dtype=np.float32)
 
 
 def decision_changes(

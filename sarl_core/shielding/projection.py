@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +16,8 @@ from sarl_core.mining.rules import Rule, RuleSet
 
 Projection = Literal["centre", "clip", "expert"]
 
+_FLOAT32 = np.dtype(np.float32)
+
 
 @dataclass(frozen=True)
 class Replacements:
@@ -24,7 +28,7 @@ class Replacements:
 
     Attributes:
         target: One value a rule; NaN stands for the proposed action, (rules,) float64.
-        low: Least float32 value that carries the rule's label, (rules,).
+        low: Least value of the actions' dtype that carries the rule's label, (rules,).
         high: Largest such value, (rules,).
     """
 
@@ -37,80 +41,122 @@ class Replacements:
 
         Args:
             rules: The rule that each one breaks, (B,).
-            values: Proposed actions, (B,).
+            values: Proposed actions, finite, (B,).
 
         Returns:
             Actions that carry the rules' labels, (B,).
         """
         target = self.target[rules]
         target = np.where(np.isnan(target), values, target)
-        # A proposed action that is no number has no nearest value; it goes to the lower edge.
-        target = np.where(np.isnan(target), self.low[rules], target)
         return np.clip(target, self.low[rules], self.high[rules])
+
+    @cached_property
+    def entries(self) -> list[tuple[float, float, float]]:
+        """Target, low and high of each rule, for single actions."""
+        columns = (self.target.tolist(), self.low.tolist(), self.high.tolist())
+        return list(zip(*columns, strict=True))
 
     def one(self, rule: int, value: float) -> float:
         """Replace one action that breaks a rule.
 
         Args:
             rule: Its index.
-            value: Proposed action.
+            value: Proposed action, finite.
 
         Returns:
             An action that carries the rule's label.
         """
-        return float(self.many(np.array([rule]), np.array([value]))[0])
+        target, low, high = self.entries[rule]
+        if target != target:  # NaN, which stands for the proposed action
+            target = value
+        return min(max(target, low), high)
 
 
-def replacements(rule_set: RuleSet, projection: Projection) -> Replacements:
+def replacements(
+    rule_set: RuleSet, projection: Projection, dtype: np.dtype[Any] = _FLOAT32
+) -> Replacements:
     """Work out every rule's replacement once.
 
     Args:
         rule_set: The rules.
         projection: How continuous actions are replaced.
+        dtype: Of the actions that the environment takes.
 
     Returns:
         One entry a rule. A rule written by hand may have no demonstrated value, where the expert
         never was: ``expert`` then takes the centre of its interval.
 
     Raises:
-        InputError: If ``expert`` is asked of mined rules that hold no demonstrated values.
+        InputError: If ``expert`` is asked of mined rules that hold no demonstrated values, or
+            no number of the dtype lies in a rule's interval.
     """
+    if dtype.kind == "f" and dtype.itemsize > _FLOAT32.itemsize:
+        dtype = _FLOAT32  # each of its numbers is one of the wider kind, too
     entries = [
-        _of_rule(rule, rule_set.actions[rule.dimension], projection) for rule in rule_set.rules
+        _of_rule(rule, rule_set.actions[rule.dimension], projection, dtype)
+        for rule in rule_set.rules
     ]
     target, low, high = np.array(entries, dtype=np.float64).reshape(-1, 3).T
     return Replacements(target.copy(), low.copy(), high.copy())
 
 
 def _of_rule(
-    rule: Rule, dimension: LabelledDimension, projection: Projection
+    rule: Rule, dimension: LabelledDimension, projection: Projection, dtype: np.dtype[Any]
 ) -> tuple[float, float, float]:
     if not dimension.is_interval:
         value = float(rule.action + dimension.first)
         return value, value, value
     lower, upper = dimension.edges[rule.action], dimension.edges[rule.action + 1]
-    low, high = _float32_range(lower, upper, last=rule.action == dimension.n_labels - 1)
+    last = rule.action == dimension.n_labels - 1
+    if dtype.kind == "f":
+        low, high = _float_range(lower, upper, dtype, last=last)
+    else:
+        low, high = _whole_range(lower, upper, dtype, last=last)
+    if rule.enabled and not low <= high:
+        raise InputError(
+            f"rule {rule.id} asks for {dimension.label_names[rule.action][:60]}, and no number "
+            f"of the kind that the environment takes ({dtype}) lies there; mine with a smaller "
+            "divider"
+        )
     if projection == "clip":
         return np.nan, low, high
     undemonstrated = rule.origin == "manual" and rule.demonstrated_value is None
     if projection == "centre" or undemonstrated:
-        return dimension.centre(rule.action), low, high
-    if rule.demonstrated_value is None:
+        target = dimension.centre(rule.action)
+    elif rule.demonstrated_value is None:
         raise InputError(
             f"rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
             "mine the rules again, or choose centre or clip"
         )
-    return rule.demonstrated_value, low, high
+    else:
+        target = rule.demonstrated_value
+    # Rounded before it is moved into the interval, and not after: it might fall out of it.
+    with np.errstate(over="ignore"):
+        rounded = float(dtype.type(target)) if dtype.kind == "f" else float(round(target))
+    return min(max(rounded, low), high), low, high
 
 
-def _float32_range(lower: float, upper: float, *, last: bool) -> tuple[float, float]:
-    """Least and largest float32 number in [lower, upper), or [lower, upper] if it is the last.
+def _float_range(
+    lower: float, upper: float, dtype: np.dtype[Any], *, last: bool
+) -> tuple[float, float]:
+    """Least and largest float of a kind in [lower, upper), or [lower, upper] if it is the last.
 
-    Actions are float32: the nearest one to an edge may lie on the wrong side of it.
+    The nearest one to an edge may lie on the wrong side of it.
     """
-    low, high = np.float32(lower), np.float32(upper)
+    kind: Any = dtype.type
+    with np.errstate(over="ignore"):
+        low, high = kind(lower), kind(upper)
     if float(low) < lower:
-        low = np.nextafter(low, np.float32(np.inf))
+        low = np.nextafter(low, kind(np.inf))
     if float(high) > upper or (not last and float(high) >= upper):
-        high = np.nextafter(high, np.float32(-np.inf))
+        high = np.nextafter(high, kind(-np.inf))
     return float(low), float(high)
+
+
+def _whole_range(
+    lower: float, upper: float, dtype: np.dtype[Any], *, last: bool
+) -> tuple[float, float]:
+    """The same in whole numbers."""
+    reach = np.iinfo(dtype)
+    high = math.floor(upper) if last else math.ceil(upper) - 1
+    return float(max(math.ceil(lower), reach.min)), float(min(high, reach.max))

@@ -49,9 +49,7 @@ def random_state(
 def _first(
     shield: Shield, states: NDArray[np.float32], *, covered: bool
 ) -> NDArray[np.float32] | None:
-    any_action = np.zeros((len(states), len(shield.rule_set.actions)), dtype=np.float32)
-    rules = shield.decide_batch(states, any_action).rules
-    found = np.flatnonzero((rules >= 0).all(axis=1) == covered)
+    found = np.flatnonzero((shield.rules_in_force(states) >= 0).all(axis=1) == covered)
     return states[found[0]].copy() if len(found) else None
 
 

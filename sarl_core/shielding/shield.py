@@ -5,36 +5,48 @@ It is post-posed and learned from data: it guarantees nothing beyond doing what 
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple, get_args
+from copy import copy
+from math import isfinite
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.boxes import Boxes, leaves_out
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements
+from sarl_core.shielding.reading import ActionForm, ActionReader, StateReader, UnreadableError
 
-__all__ = ["BatchDecision", "Decision", "Outside", "Projection", "Shield"]
+__all__ = ["BatchDecision", "Decision", "OnInvalid", "Outside", "Projection", "Shield"]
 
 Outside = Literal["act", "abstain"]
 """What a rule does with a state that lies outside the data it was mined from."""
+OnInvalid = Literal["raise", "pass"]
+"""What becomes of a step whose state is no state, or whose action is none of the space."""
+
+_FLOAT32, _INT64 = np.dtype(np.float32), np.dtype(np.int64)
 
 
 class Decision(NamedTuple):
     """What the shield made of one action; the heart of the flight recorder.
 
     Attributes:
-        executed: The action to execute; the proposed object itself if it breaks no rule.
+        executed: The action to execute, in the environment's dtype; where it breaks no rule and
+            has that dtype (and, where the environment is known, that shape) already, the proposed
+            object itself. Where the action is `invalid` and passes, that object, too.
         proposed: The agent's action.
         rules: For each action dimension the index of the rule in force, in the rule set's
             order, or None.
         intervened: Whether the shield changed the action.
         margin: Distance of the state to the nearest threshold on the paths walked, in the
-            feature's own unit; inf where there is no threshold.
+            feature's own unit; inf where there is no threshold, NaN where no path was walked.
         outside: Whether the state lies outside the data of a rule that the proposed action
             breaks: of one that changed it, or, where rules abstain, would have.
+        invalid: Why no rule was asked, where the observation is no state or the action none of
+            the space; else None.
     """
 
     executed: Any
@@ -43,18 +55,22 @@ class Decision(NamedTuple):
     intervened: bool
     margin: float
     outside: bool = False
+    invalid: str | None = None
 
 
 class BatchDecision(NamedTuple):
     """What the shield made of B actions.
 
     Attributes:
-        executed: Shape and dtype of the proposed actions.
-        proposed: The agent's actions.
+        executed: In the environment's dtype, and in its shape where it is known, else in that
+            of the proposed actions. Where invalid actions pass that this dtype cannot hold,
+            B objects, each as `decide` gives it.
+        proposed: The agent's actions; B objects where they are no array of numbers.
         rules: Index of the rule in force or -1, (B, m) int64.
         intervened: Shape (B,).
         margin: Shape (B,).
         outside: Shape (B,).
+        invalid: Why no rule was asked, or None, (B,) objects.
     """
 
     executed: NDArray[Any]
@@ -63,6 +79,7 @@ class BatchDecision(NamedTuple):
     intervened: NDArray[np.bool_]
     margin: NDArray[np.float64]
     outside: NDArray[np.bool_]
+    invalid: NDArray[np.object_]
 
 
 class Shield:
@@ -74,6 +91,7 @@ class Shield:
         rule_set: The rules.
         projection: How a continuous action is replaced.
         outside: Whether a rule acts on states outside the data it was mined from.
+        on_invalid: What becomes of a step that no rule can be asked about.
     """
 
     def __init__(
@@ -82,6 +100,7 @@ class Shield:
         *,
         projection: Projection = "centre",
         outside: Outside = "act",
+        on_invalid: OnInvalid = "raise",
     ) -> None:
         """Prepare for deciding.
 
@@ -93,10 +112,13 @@ class Shield:
             outside: Whether a rule changes the action (``act``) or leaves it as it is
                 (``abstain``) in a state outside the rule's data box. A rule without a box acts
                 everywhere.
+            on_invalid: Whether an observation that is no state (NaN or infinite, masked, of
+                another length, no numbers), or an action that is none of the space, is an error
+                (``raise``) or lets the action ``pass`` unchecked, with the reason in the record.
 
         Raises:
-            InputError: If the projection or `outside` is unknown, or the rules hold no
-                demonstrated values that ``expert`` could use.
+            InputError: If one of the choices is unknown, or the rules hold no demonstrated
+                values that ``expert`` could use.
         """
         if projection not in get_args(Projection):
             raise InputError(
@@ -106,11 +128,16 @@ class Shield:
             raise InputError(
                 f"what to do outside the data, {outside!r}, is neither act nor abstain; choose one"
             )
+        if on_invalid not in get_args(OnInvalid):
+            raise InputError(
+                f"what to do with invalid steps, {on_invalid!r}, is neither raise nor pass; "
+                "choose one"
+            )
         self.rule_set = rule_set
-        self.projection = projection
+        self.projection: Projection = projection
         self.outside: Outside = outside
+        self.on_invalid: OnInvalid = on_invalid
         self._actions = rule_set.actions
-        self._n_features = len(rule_set.source.features)
         self._matchers = tuple(
             Matcher.of(
                 [
@@ -123,105 +150,255 @@ class Shield:
         )
         self._labels = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
         self._label_list: list[int] = self._labels.tolist()
-        self._replace = replacements(rule_set, projection)
-        self._boxes = Boxes(rule_set.rules, self._n_features)
+        self._boxes = Boxes(rule_set.rules, len(rule_set.source.features))
         self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
-        self._single = len(self._actions) == 1 and not self._actions[0].is_interval
-        self._first = self._actions[0].first
+        self._states = StateReader(rule_set)
+        self._state_shape = (len(rule_set.source.features),)
+        self._take_form(ActionForm.of_rules(rule_set))
+
+    def _take_form(self, form: ActionForm) -> None:
+        """Execute actions of this form from now on."""
+        self._form = form
+        self._reader = ActionReader(self._actions, form)
+        self._replace = replacements(self.rule_set, self.projection, form.dtype)
+        self._discrete = bool(form.labels)
+        self._single = len(form.labels) == 1 and form.shape in (None, ())
+        self._plain_label = self._single and form.dtype == _INT64
+        self._first, count = form.labels[0] if form.labels else (0, 0)
+        self._beyond = self._first + count
+        self._shape = (len(self._actions),) if form.shape is None else form.shape
+
+    def for_space(self, action_space: Any) -> Self:
+        """The same shield for an environment that is known.
+
+        Args:
+            action_space: That fits the rules.
+
+        Returns:
+            What it executes has the dtype and the shape of the space; an action is valid if it is
+            one of the space, also where rules know fewer.
+
+        Raises:
+            InputError: If no number of the space's dtype lies in a rule's interval.
+        """
+        form = ActionForm.of_space(action_space)
+        if form == self._form:
+            return self
+        other = copy(self)
+        other._take_form(form)
+        return other
 
     def decide(self, observation: ArrayLike, action: Any) -> Decision:
         """Check one action and replace it if it breaks a rule.
 
         Args:
             observation: Shape (d,); compared as float32.
-            action: In the environment's own form: an integer, or an array with m entries.
+            action: An integer, or m numbers in any container. What will be executed is judged:
+                the action in the environment's dtype (float32 where no environment is known).
+                Labels are whole numbers of any kind; a continuous action out of its bounds
+                carries the label of the outermost interval.
 
         Returns:
-            The decision. An action that breaks no rule is passed on as it is, bit for bit.
+            The decision. An action that breaks no rule is passed on as it is, bit for bit, if it
+            has the environment's dtype; else the same numbers in that dtype.
 
         Raises:
-            InputError: If the observation has another length than the rules' features.
+            InputError: If the observation is no state or the action none of the space, unless
+                `on_invalid` lets such actions pass.
         """
-        state = np.asarray(observation, dtype=np.float32).tolist()
-        if len(state) != self._n_features:
-            raise self._wrong_width(len(state))
-        if self._single:
-            rule, margin = self._matchers[0].match(state)
-            if rule is None:
-                return Decision(action, action, (None,), False, margin)
-            wanted = self._label_list[rule] + self._first
-            if action == wanted:
-                return Decision(action, action, (rule,), False, margin)
-            sides = self._sides[rule]
-            outside = sides is not None and leaves_out(sides, state)
-            if outside and self._abstains:
-                return Decision(action, action, (rule,), False, margin, True)
-            return Decision(_like(action, wanted), action, (rule,), True, margin, outside)
-        return self._decide_each(state, action)
+        # The plain cases are told by a few comparisons; everything else is read with care.
+        if (
+            type(observation) is np.ndarray
+            and observation.dtype == _FLOAT32
+            and observation.shape == self._state_shape
+        ):
+            state = observation.tolist()
+            if isfinite(sum(state)):  # a sum of float32 numbers does not overflow in float64
+                kind = type(action)
+                if self._plain_label:
+                    if (
+                        kind is int
+                        or kind is np.int64
+                        or (kind is np.ndarray and action.dtype == _INT64 and action.shape == ())
+                    ):
+                        value = int(action)
+                        if self._first <= value < self._beyond:
+                            return self._decide_label(state, action, action, value)
+                elif (
+                    kind is np.ndarray
+                    and action.dtype == self._form.dtype
+                    and action.shape == self._shape
+                    and not self._discrete
+                    and isfinite(sum(action.ravel().tolist()))
+                ):
+                    return self._decide_each(state, action, action, action.reshape(-1))
+        return self._decide_carefully(observation, action)
 
-    def _decide_each(self, state: list[float], action: Any) -> Decision:
-        values = np.asarray(action)
-        flat = values.reshape(-1)
+    def _decide_carefully(self, observation: Any, action: Any) -> Decision:
+        """As `decide`, for whatever may come."""
+        invalid, state, values, handed = None, None, None, action
+        try:
+            state = self._states.one(observation).tolist()
+        except UnreadableError as error:
+            invalid = str(error)
+        try:
+            values, shape = self._reader.one(action)
+            handed = self._handed(action, values, shape)
+        except UnreadableError as error:
+            invalid = invalid or str(error)
+        if invalid is not None or state is None or values is None:
+            if self.on_invalid == "raise":
+                raise InputError(f"{invalid}; {_CURE}")
+            nothing = (None,) * len(self._actions)
+            return Decision(handed, action, nothing, False, float("nan"), False, invalid)
+        if self._single:
+            return self._decide_label(state, action, handed, int(values[0]))
+        return self._decide_each(state, action, handed, values)
+
+    def _handed(self, action: Any, values: NDArray[Any], shape: tuple[int, ...]) -> Any:
+        """An action as it is executed if it breaks no rule."""
+        form = self._form
+        shape = shape if form.shape is None else form.shape
+        if isinstance(action, np.ndarray):
+            # No subclass: a matrix or a masked array behaves in other ways.
+            plain = type(action) is np.ndarray and action.dtype == form.dtype
+            return action if plain and action.shape == shape else values.reshape(shape)
+        if shape == () and (
+            type(action) is form.dtype.type or (self._single and type(action) is int)
+        ):
+            return action
+        return values.reshape(shape)[()]
+
+    def _decide_label(self, state: list[float], action: Any, handed: Any, value: int) -> Decision:
+        """Decide one discrete action, a valid one."""
+        rule, margin = self._matchers[0].match(state)
+        if rule is None:
+            return Decision(handed, action, (None,), False, margin)
+        wanted = self._label_list[rule] + self._actions[0].first
+        if value == wanted:
+            return Decision(handed, action, (rule,), False, margin)
+        sides = self._sides[rule]
+        outside = sides is not None and leaves_out(sides, state)
+        if outside and self._abstains:
+            return Decision(handed, action, (rule,), False, margin, True)
+        return Decision(_like(handed, wanted), action, (rule,), True, margin, outside)
+
+    def _decide_each(
+        self, state: list[float], action: Any, handed: Any, values: NDArray[Any]
+    ) -> Decision:
+        """Decide m action dimensions, each of them valid."""
         executed = None
         outside = False
         found: list[int | None] = []
         nearest = float("inf")
+        numbers = values.tolist()
         for dimension, matcher in enumerate(self._matchers):
             rule, margin = matcher.match(state)
             nearest = min(nearest, margin)
             found.append(rule)
             if rule is None:
                 continue
-            value = flat[dimension]
-            if self._actions[dimension].label_of(float(value)) != self._label_list[rule]:
+            value = numbers[dimension]
+            label = self._label_list[rule]
+            if self._actions[dimension].label_of(value) != label:
                 sides = self._sides[rule]
                 if sides is not None and leaves_out(sides, state):
                     outside = True
                     if self._abstains:
                         continue
-                executed = flat.copy() if executed is None else executed
-                executed[dimension] = self._replace.one(rule, float(value))
+                executed = values.copy() if executed is None else executed
+                executed[dimension] = (
+                    label + self._actions[dimension].first
+                    if self._discrete
+                    else self._replace.one(rule, value)
+                )
         if executed is None:
-            return Decision(action, action, tuple(found), False, nearest, outside)
-        changed = executed.reshape(values.shape)
+            return Decision(handed, action, tuple(found), False, nearest, outside)
+        changed = executed.reshape(np.shape(handed))
+        if not isinstance(handed, np.ndarray):
+            changed = changed[()]
         return Decision(changed, action, tuple(found), True, nearest, outside)
 
     def decide_batch(self, observations: ArrayLike, actions: ArrayLike) -> BatchDecision:
         """Check many actions at once, each exactly as `decide` would.
 
         Args:
-            observations: Shape (B, d); compared as float32.
-            actions: B actions in the environment's own form.
+            observations: B of them, as (B, d); compared as float32.
+            actions: B actions.
 
         Returns:
             The decisions.
 
         Raises:
-            InputError: If the observations have another length than the rules' features, or
-                the actions another number than the observations.
+            InputError: If there are not as many actions as observations; as `decide` if one of
+                them is invalid, then with the number of the row.
         """
-        states = np.ascontiguousarray(observations, dtype=np.float32)
-        if states.ndim != 2 or states.shape[1] != self._n_features:
-            raise self._wrong_width(states.shape[-1] if states.ndim else 0)
-        proposed = np.asarray(actions)
-        if proposed.size != len(states) * len(self._actions):
+        states, faults = self._states.many(observations)
+        proposed, values, shape, unread = self._reader.many(actions)
+        if len(proposed) != len(states):
             raise InputError(
                 f"there are {proposed.size} action values for {len(states)} states with "
                 f"{len(self._actions)} action dimensions; give one action a state"
             )
-        flat = proposed.reshape(len(states), len(self._actions))
-        rules = np.empty((len(states), len(self._actions)), dtype=np.int64)
-        margin = np.full(len(states), np.inf)
+        invalid = np.full(len(states), None, dtype=np.object_)
+        shape = shape if self._form.shape is None else self._form.shape
+        if not faults and not unread:
+            executed, rules, intervened, margin, outside = self._decide_rows(states, values)
+            executed = executed.reshape(len(states), *shape)
+            return BatchDecision(executed, proposed, rules, intervened, margin, outside, invalid)
+        faults = unread | faults
+        if self.on_invalid == "raise":
+            row = min(faults)
+            where = f" (row {row} of {len(states)})" if len(states) > 1 else ""
+            raise InputError(f"{faults[row]}{where}; {_CURE}")
+        bad = sorted(faults)
+        invalid[bad] = [faults[row] for row in bad]
+        valid = np.ones(len(states), dtype=np.bool_)
+        valid[bad] = False
+        rules = np.full(values.shape, NO_RULE, dtype=np.int64)
+        margin = np.full(len(states), np.nan)
+        executed = values.copy()
+        intervened, outside = np.zeros((2, len(states)), dtype=np.bool_)
+        found = self._decide_rows(np.ascontiguousarray(states[valid]), values[valid])
+        columns = (executed, rules, intervened, margin, outside)
+        for column, part in zip(columns, found, strict=True):
+            column[valid] = part
+        return BatchDecision(
+            _passed(executed.reshape(len(states), *shape), proposed, sorted(unread)),
+            proposed,
+            rules,
+            intervened,
+            margin,
+            outside,
+            invalid,
+        )
+
+    def _decide_rows(
+        self, states: NDArray[np.float32], flat: NDArray[Any]
+    ) -> tuple[
+        NDArray[Any],
+        NDArray[np.int64],
+        NDArray[np.bool_],
+        NDArray[np.float64],
+        NDArray[np.bool_],
+    ]:
+        """Decide valid rows.
+
+        Args:
+            states: Shape (B, d), contiguous.
+            flat: Shape (B, m), in the environment's dtype.
+
+        Returns:
+            Executed (B, m), rules (B, m), intervened, margin and outside (B,).
+        """
+        rules, margin = self._match(states)
         executed = flat
-        intervened = np.zeros(len(states), dtype=np.bool_)
-        outside = np.zeros(len(states), dtype=np.bool_)
-        for dimension, matcher in enumerate(self._matchers):
-            rules[:, dimension], near = matcher.match_batch(states)
-            margin = np.minimum(margin, near)
+        intervened, outside = np.zeros((2, len(states)), dtype=np.bool_)
+        for dimension, action in enumerate(self._actions):
             column = flat[:, dimension]
             ruled = np.flatnonzero(rules[:, dimension] >= 0)
-            labels = self._actions[dimension].labels_of(column[ruled])
+            labels = action.labels_of(column[ruled])
             broken = ruled[labels != self._labels[rules[ruled, dimension]]]
             beyond = self._boxes.leave_out(rules[broken, dimension], states[broken])
             outside[broken[beyond]] = True
@@ -229,13 +406,45 @@ class Shield:
                 broken = broken[~beyond]
             if len(broken):
                 executed = flat.copy() if executed is flat else executed
-                executed[broken, dimension] = self._replace.many(
-                    rules[broken, dimension], column[broken]
+                breaks = rules[broken, dimension]
+                executed[broken, dimension] = (
+                    self._labels[breaks] + action.first
+                    if self._discrete
+                    else self._replace.many(breaks, column[broken])
                 )
                 intervened[broken] = True
-        return BatchDecision(
-            executed.reshape(proposed.shape), proposed, rules, intervened, margin, outside
-        )
+        return executed, rules, intervened, margin, outside
+
+    def _match(self, states: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Rules in force (B, m) and margins (B,) of valid states."""
+        rules = np.empty((len(states), len(self._actions)), dtype=np.int64)
+        margin = np.full(len(states), np.inf)
+        for dimension, matcher in enumerate(self._matchers):
+            rules[:, dimension], near = matcher.match_batch(states)
+            margin = np.minimum(margin, near)
+        return rules, margin
+
+    def rules_in_force(self, observations: ArrayLike) -> NDArray[np.int64]:
+        """The rules that apply, whatever the action.
+
+        Args:
+            observations: Shape (B, d); compared as float32.
+
+        Returns:
+            Index of the rule in force or -1, (B, m); -1 in what is no state.
+
+        Raises:
+            InputError: As `decide_batch`.
+        """
+        states, faults = self._states.many(observations)
+        if faults and self.on_invalid == "raise":
+            raise InputError(f"{faults[min(faults)]}; {_CURE}")
+        bad = sorted(faults)
+        states = states.copy() if bad else states
+        states[bad] = 0.0
+        rules, _ = self._match(states)
+        rules[bad] = NO_RULE
+        return rules
 
     def with_rules(self, rule_set: RuleSet) -> Shield:
         """The same way to act with other rules.
@@ -246,7 +455,12 @@ class Shield:
         Returns:
             Another shield; this one stays what it is.
         """
-        return Shield(rule_set, projection=self.projection, outside=self.outside)
+        return Shield(
+            rule_set,
+            projection=self.projection,
+            outside=self.outside,
+            on_invalid=self.on_invalid,
+        )
 
     @property
     def scanned(self) -> tuple[int, ...]:
@@ -261,16 +475,34 @@ class Shield:
         """Whether any of the rules says where its pairs lay; else none is ever outside."""
         return self._boxes.count > 0
 
-    def _wrong_width(self, got: int) -> InputError:
-        env_id = self.rule_set.source.env_id or "another environment"
-        return InputError(
-            f"the rules ask about {self._n_features} features (of {env_id}) and the observation "
-            f"has {got}; use rules of this environment"
-        )
+
+_CURE = (
+    "give states and actions of the rules' environment, or let such steps pass unchecked "
+    "(on_invalid='pass', on the command line --on-invalid pass)"
+)
+
+
+def _passed(executed: NDArray[Any], proposed: NDArray[Any], unread: list[int]) -> NDArray[Any]:
+    """Executed actions, with those that pass as they are: B objects where they must be."""
+    if not unread:
+        return executed
+    if proposed.dtype != np.object_ and proposed.shape == executed.shape:
+        given = proposed[unread]
+        with np.errstate(over="ignore", invalid="ignore"):
+            held = given.astype(executed.dtype)
+        if np.all((held == given) | (np.isnan(held) & np.isnan(given))):
+            executed[unread] = held
+            return executed
+    objects = np.empty(len(executed), dtype=np.object_)
+    for row, action in enumerate(executed):
+        objects[row] = action
+    for row in unread:
+        objects[row] = proposed[row]
+    return objects
 
 
 def _like(action: Any, value: int) -> Any:
-    """A discrete action of the same kind as the one that was proposed."""
+    """A discrete action of the same kind as one of the environment's dtype."""
     if isinstance(action, np.ndarray):
         return np.full_like(action, value)
     return action.dtype.type(value) if isinstance(action, np.generic) else value

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces.utils import flatten
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from sarl_core.shielding.reading import state_vector
 from sarl_core.shielding.shield import BatchDecision, Shield
 from sarl_core.shielding.wrappers import StepRecord, fitted, is_flat, spec_id
 
@@ -42,7 +42,7 @@ class ShieldedVecEnv(VecEnvWrapper):
             shield, venv.observation_space, venv.action_space, _id_of(venv)
         )
         self.penalty = penalty
-        self._states = np.empty((0, 0), dtype=np.float32)
+        self._states: Any = []
         self._decision: BatchDecision | None = None
         self._episodes = np.full(self.num_envs, -1)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
@@ -91,6 +91,7 @@ class ShieldedVecEnv(VecEnvWrapper):
                 bool(decision.intervened[i]),
                 float(decision.margin[i]),
                 bool(decision.outside[i]),
+                decision.invalid[i],
             )
         if self.penalty:
             rewards = rewards - self.penalty * decision.intervened.astype(rewards.dtype)
@@ -105,11 +106,10 @@ class ShieldedVecEnv(VecEnvWrapper):
 
     def _remember(self, observations: Any) -> None:
         space = self.venv.observation_space
-        if is_flat(space):
-            self._states = np.array(observations, dtype=np.float32)
-            return
-        rows = [flatten(space, _row(observations, i)) for i in range(self.num_envs)]
-        self._states = np.array(rows, dtype=np.float32)
+        by = None if is_flat(space) else space
+        rows = [state_vector(_row(observations, i), by) for i in range(self.num_envs)]
+        shapes = {np.shape(row) if _is_float32(row) else None for row in rows}
+        self._states = np.array(rows) if len(shapes) == 1 and None not in shapes else rows
 
 
 def _id_of(venv: VecEnv) -> str:
@@ -127,3 +127,7 @@ def _row(observations: Any, i: int) -> Any:
     if isinstance(observations, tuple):
         return tuple(value[i] for value in observations)
     return observations[i]
+
+
+def _is_float32(row: Any) -> bool:
+    return isinstance(row, np.ndarray) and row.dtype == np.float32

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple, SupportsFloat
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces.utils import flatten
 
 from sarl_core.demonstrations.environments import catalogued
 from sarl_core.demonstrations.feature_order import Named
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import fitted_rules
+from sarl_core.shielding.reading import state_vector
 from sarl_core.shielding.shield import Shield
 
 
@@ -22,13 +22,15 @@ class StepRecord(NamedTuple):
         episode: Index of the episode, counted from the last reset with a seed, so that the same
             seed gives the same records.
         step: Index of the step within its episode.
-        observation: What the agent saw, (d,) float32.
+        observation: What the agent saw, (d,) float32; as it came where it is no such state.
         proposed: The agent's action.
-        executed: The action that was executed.
+        executed: The action that was executed, in the environment's dtype and shape.
         rules: For each action dimension the index of the rule in force, or None.
         intervened: Whether the shield changed the action.
-        margin: Distance to the nearest threshold on the paths walked.
+        margin: Distance to the nearest threshold on the paths walked; NaN where none was.
         outside: Whether the state lies outside the data of a rule that the action breaks.
+        invalid: Why no rule was asked, where the observation is no state or the action none of
+            the space; else None.
     """
 
     episode: int
@@ -40,6 +42,7 @@ class StepRecord(NamedTuple):
     intervened: bool
     margin: float
     outside: bool = False
+    invalid: str | None = None
 
 
 class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
@@ -66,7 +69,8 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
 
         Raises:
             InputError: If the rules are not for the spaces of this environment, or its features
-                have other names than theirs.
+                have other names than theirs. So does `step`, at an observation or an action that
+                is none, unless the shield lets them pass.
         """
         gymnasium.utils.RecordConstructorArgs.__init__(self, shield=shield, penalty=penalty)
         super().__init__(env)
@@ -74,7 +78,8 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         env_id = "" if _observes_otherwise(env) else spec_id(env.spec)
         self.shield, self.notes = fitted(shield, env.observation_space, env.action_space, env_id)
         self.penalty = penalty
-        self._flat = is_flat(env.observation_space)
+        space = env.observation_space
+        self._space = None if is_flat(space) else space
         self._observation: Any = None
         self._episode = -1
         self._step = 0
@@ -91,7 +96,7 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Check the action, execute what the shield makes of it, and record it."""
-        if self._observation is None:
+        if self._episode < 0:
             raise gymnasium.error.ResetNeeded("call reset before step")
         state = self._observation
         decision = self.shield.decide(state, action)
@@ -106,6 +111,7 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             decision.intervened,
             decision.margin,
             decision.outside,
+            decision.invalid,
         )
         if decision.intervened and self.penalty:
             reward = float(reward) - self.penalty
@@ -114,10 +120,8 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         return observation, reward, terminated, truncated, info
 
     def _remember(self, observation: Any) -> None:
-        if not self._flat:
-            observation = flatten(self.env.observation_space, observation)
         # A copy: an environment may write the next observation into the same array.
-        self._observation = np.array(observation, dtype=np.float32)
+        self._observation = state_vector(observation, self._space)
 
 
 def is_flat(space: gymnasium.Space[Any]) -> bool:
@@ -137,7 +141,7 @@ class FittedShield(NamedTuple):
 
     Attributes:
         shield: Its rules are in the order of the environment's features and actions, under the
-            numbers they had.
+            numbers they had; what it executes has the dtype and the shape of the action space.
         notes: What is to be said of that order, as clauses; none where it was the same.
     """
 
@@ -181,9 +185,9 @@ def fitted(
         ),
         names.actions,
     )
-    if found.rule_set is rule_set:
-        return FittedShield(shield, found.notes)
-    return FittedShield(shield.with_rules(found.rule_set), found.notes)
+    if found.rule_set is not rule_set:
+        shield = shield.with_rules(found.rule_set)
+    return FittedShield(shield.for_space(action_space), found.notes)
 
 
 def spec_id(spec: Any) -> str:

@@ -12,10 +12,11 @@ from sarl_core.cli import main
 from tests.commandline.conftest import CART
 
 
+@pytest.mark.parametrize("on_invalid", ["raise", "pass"])
 @pytest.mark.parametrize("ending", ["json", "csv", "md", "py", "c", "onnx"])
-def test_every_format_comes_with_its_vectors(run, cart_rules, tmp_path, ending):
+def test_every_format_comes_with_its_vectors(run, cart_rules, tmp_path, ending, on_invalid):
     out = tmp_path / f"shield.{ending}"
-    printed = run("export", cart_rules, "--out", out)
+    printed = run("export", cart_rules, "--out", out, "--on-invalid", on_invalid)
     assert out.stat().st_size > 100
     assert str(out) in printed
     rules = RuleSet.load(cart_rules)
@@ -23,10 +24,17 @@ def test_every_format_comes_with_its_vectors(run, cart_rules, tmp_path, ending):
         rows = list(csv.DictReader(file))
     states = np.array([[row[f"state_{i}"] for i in range(4)] for row in rows], dtype=np.float32)
     proposed = np.array([[row["proposed_0"]] for row in rows], dtype=np.int64)
-    with np.errstate(invalid="ignore"):
-        decision = Shield(rules).decide_batch(states, proposed)
+    decision = Shield(rules, on_invalid="pass").decide_batch(states, proposed)
     assert decision.rules[:, 0].tolist() == [int(row["rule_0"]) for row in rows]
-    assert decision.executed[:, 0].tolist() == [int(row["executed_0"]) for row in rows]
+    invalid = [why is not None for why in decision.invalid]
+    assert invalid == [row["invalid"] == "1" for row in rows]
+    assert any(invalid)
+    said = [str(done) for done in decision.executed[:, 0].tolist()]
+    if on_invalid == "raise":  # nothing is to be executed
+        said = ["" if bad else done for done, bad in zip(said, invalid, strict=True)]
+    assert [row["executed_0"] for row in rows] == said
+    if ending in ("py", "c", "onnx"):
+        assert f"(on_invalid: {on_invalid})".encode() in out.read_bytes()
 
 
 def test_rounding_is_counted_and_listed(run, cart_rules, tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from sarl_core.explaining.code_c import rules_to_c
 from sarl_core.explaining.code_python import rules_to_python
 from sarl_core.explaining.onnx_export import rules_to_onnx
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
 
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes", "-O0"]
 HARNESS = """
@@ -29,6 +30,8 @@ int main(void)
     while (fread(state, sizeof(float), {features}, stdin) == {features}) {{
         if (fread(proposed, sizeof(number), {actions}, stdin) != {actions})
             return 1;
+        for (int i = 0; i < {actions}; i++)
+            executed[i] = 77;
         int changed = shield_decide(state, proposed, executed, rule);
         fwrite(executed, sizeof(number), {actions}, stdout);
         fwrite(rule, sizeof(int), {actions}, stdout);
@@ -37,7 +40,23 @@ int main(void)
     return 0;
 }}
 """
-Answers = tuple[NDArray[Any], NDArray[np.int64]]
+
+
+class Answers(NamedTuple):
+    """What is said of B states; where it is `invalid`, `executed` may be anything."""
+
+    executed: NDArray[Any]
+    rules: NDArray[np.int64]
+    invalid: NDArray[np.bool_]
+
+
+class Said(NamedTuple):
+    """Likewise, with whether actions were changed."""
+
+    executed: NDArray[Any]
+    rules: NDArray[np.int64]
+    invalid: NDArray[np.bool_]
+    changed: NDArray[np.bool_]
 
 
 def run_c(
@@ -46,11 +65,13 @@ def run_c(
     states: NDArray[np.float32],
     proposed: NDArray[Any],
     folder: Path,
-) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[np.bool_]]:
+    on_invalid: OnInvalid = "raise",
+) -> Said:
     """Compile the export, warnings being errors, and decide every state with it."""
     d, m = states.shape[1], proposed.shape[1]
     continuous = proposed.dtype.kind == "f"
-    (folder / "shield.c").write_text(rules_to_c(rule_set, projection), encoding="utf-8")
+    source = rules_to_c(rule_set, projection, on_invalid)
+    (folder / "shield.c").write_text(source, encoding="utf-8")
     (folder / "main.c").write_text(
         HARNESS.format(kind="float" if continuous else "int64_t", features=d, actions=m)
     )
@@ -73,44 +94,94 @@ def run_c(
         [folder / "shield"], input=given.tobytes(), capture_output=True, check=True
     ).stdout
     found = np.frombuffer(said, dtype=answer)
-    return found["executed"], found["rule"].astype(np.int64), found["changed"].astype(np.bool_)
+    assert set(np.unique(found["changed"]).tolist()) <= {-1, 0, 1}
+    if on_invalid == "raise":  # nothing was written
+        assert (found["executed"][found["changed"] == -1] == 77).all()
+    return Said(
+        found["executed"],
+        found["rule"].astype(np.int64),
+        found["changed"] == -1,
+        found["changed"] == 1,
+    )
 
 
 def run_python(
-    rule_set: RuleSet, projection: Projection, states: NDArray[np.float32], proposed: NDArray[Any]
+    rule_set: RuleSet,
+    projection: Projection,
+    states: NDArray[np.float32],
+    proposed: NDArray[Any],
+    on_invalid: OnInvalid = "raise",
 ) -> Answers:
     """Execute the export and decide state by state."""
     names: dict[str, Any] = {}
-    exec(compile(rules_to_python(rule_set, projection), "shield.py", "exec"), names)
+    exec(compile(rules_to_python(rule_set, projection, on_invalid), "shield.py", "exec"), names)
     single = proposed.dtype.kind == "i" and proposed.shape[1] == 1
-    executed, rules = [], []
+    executed, rules, invalid = [], [], []
     for state, action in zip(states.tolist(), proposed.tolist(), strict=True):
-        done, rule = names["shield"](state, action[0] if single else action)
+        given = action[0] if single else action
+        try:
+            done, rule = names["shield"](state, given)
+            invalid.append(False)  # where actions pass, nothing else tells which did
+        except ValueError:
+            assert on_invalid == "raise"
+            done, rule = given, [-1] * proposed.shape[1]
+            invalid.append(True)
         executed.append([done] if single else done)
         rules.append(rule)
-    return np.array(executed, dtype=proposed.dtype), np.array(rules, dtype=np.int64)
+    return Answers(
+        np.array(executed, dtype=proposed.dtype),
+        np.array(rules, dtype=np.int64),
+        np.array(invalid),
+    )
 
 
 def run_onnx(
-    rule_set: RuleSet, projection: Projection, states: NDArray[np.float32], proposed: NDArray[Any]
+    rule_set: RuleSet,
+    projection: Projection,
+    states: NDArray[np.float32],
+    proposed: NDArray[Any],
+    on_invalid: OnInvalid = "raise",
 ) -> Answers:
     """Decide every state with the model."""
     import onnxruntime
 
     session = onnxruntime.InferenceSession(
-        rules_to_onnx(rule_set, projection), providers=["CPUExecutionProvider"]
+        rules_to_onnx(rule_set, projection, on_invalid), providers=["CPUExecutionProvider"]
     )
-    executed, rules = session.run(["executed", "rule"], {"state": states, "proposed": proposed})
-    return executed, rules
+    executed, rules, invalid = session.run(
+        ["executed", "rule", "invalid"], {"state": states, "proposed": proposed}
+    )
+    if on_invalid == "raise":
+        nothing = executed[invalid[:, 0]]
+        none = np.isnan(nothing) if nothing.dtype.kind == "f" else nothing == -(2**63)
+        assert none.all()
+    return Answers(executed, rules, invalid[:, 0])
 
 
 def expected(
     rule_set: RuleSet, projection: Projection, states: NDArray[np.float32], proposed: NDArray[Any]
-) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[np.bool_]]:
-    """What the shield itself decides."""
-    with np.errstate(invalid="ignore"):  # of states that are infinite
-        decision = Shield(rule_set, projection=projection).decide_batch(states, proposed)
-    return decision.executed, decision.rules, decision.intervened
+) -> Said:
+    """What the shield itself decides, which lets pass what is invalid."""
+    shield = Shield(rule_set, projection=projection, on_invalid="pass")
+    decision = shield.decide_batch(states, proposed)
+    invalid = np.array([why is not None for why in decision.invalid])
+    return Said(decision.executed, decision.rules, invalid, decision.intervened)
+
+
+def agree(ours: Answers | Said, theirs: Said, *, passing: bool = False, told: bool = True) -> None:
+    """Whether an export says what the shield says.
+
+    Args:
+        ours: Of the export.
+        theirs: Of the shield.
+        passing: Whether invalid actions pass; else nothing is said to be executed.
+        told: Whether the export tells what is invalid.
+    """
+    rows = slice(None) if passing else ~theirs.invalid
+    assert same(ours.executed[rows], theirs.executed[rows])
+    assert same(ours.rules, theirs.rules)
+    if told:
+        assert same(ours.invalid, theirs.invalid)
 
 
 def same(ours: NDArray[Any], theirs: NDArray[Any]) -> bool:
@@ -121,7 +192,7 @@ def same(ours: NDArray[Any], theirs: NDArray[Any]) -> bool:
 
 
 def random_states(rule_set: RuleSet, count: int, rng: np.random.Generator) -> NDArray[np.float32]:
-    """States far and wide, near the thresholds and on them, some with what is no number."""
+    """States far and wide, near the thresholds and on them, one in 20 with what is no number."""
     d = len(rule_set.source.features)
     states = rng.normal(size=(count, d)) * 10.0 ** rng.integers(-3, 3, size=(count, 1))
     asked: dict[int, list[float]] = {}
@@ -136,6 +207,6 @@ def random_states(rule_set: RuleSet, count: int, rng: np.random.Generator) -> ND
             at = np.where(side == 1, np.nextafter(at, np.float32(np.inf)), at)
             at = np.where(side == 2, np.nextafter(at, np.float32(-np.inf)), at)
         states[:, feature] = np.where(near[:, feature], at, states[:, feature])
-    odd = rng.random((count, d)) < 0.01
+    odd = rng.random((count, d)) < 0.05 / d
     states[odd] = rng.choice([np.nan, np.inf, -np.inf], int(odd.sum()))
     return states.astype(np.float32)

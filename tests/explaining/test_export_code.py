@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import io
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core import (
+    Demonstrations,
+    InputError,
+    RuleSet,
+    Shield,
+    load_demonstrations,
+    mine_rules,
+)
 from sarl_core.explaining.code_c import rules_to_c
 from sarl_core.explaining.code_python import rules_to_python
 from sarl_core.explaining.export_program import largest_float32
@@ -23,7 +32,10 @@ from sarl_core.mining.rounding import merged_rules
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
 from tests.explaining.exported import (
+    Said,
+    agree,
     expected,
     random_states,
     run_c,
@@ -107,31 +119,34 @@ CASES: list[tuple[str, Projection]] = [
 ]
 
 
+@pytest.mark.parametrize("on_invalid", ["raise", "pass"])
 @pytest.mark.parametrize(("name", "projection"), CASES)
-def test_every_vector_and_a_hundred_thousand_states(
-    name: str, projection: Projection, tmp_path: Path
+def test_every_vector_and_fifty_thousand_states(
+    name: str, projection: Projection, on_invalid: OnInvalid, tmp_path: Path
 ) -> None:
     rules = SETS[name]()
-    vectors = make_vectors(rules, projection)
+    vectors = make_vectors(rules, projection, on_invalid)
     rng = np.random.default_rng(5)
-    states = np.concatenate([vectors.states, random_states(rules, 100_000, rng)])
-    proposed = np.concatenate([vectors.proposed, proposed_actions(rules, 100_000, rng)])
-    executed, found, changed = expected(rules, projection, states, proposed)
-    assert 0 < np.count_nonzero(changed) < len(changed)
-    assert same(vectors.rules, found[: len(vectors)])
-    assert same(vectors.executed, executed[: len(vectors)])
+    states = np.concatenate([vectors.states, random_states(rules, 50_000, rng)])
+    proposed = np.concatenate([vectors.proposed, proposed_actions(rules, 50_000, rng)])
+    wanted = expected(rules, projection, states, proposed)
+    assert 0 < np.count_nonzero(wanted.changed) < len(wanted.changed)
+    assert 0 < np.count_nonzero(wanted.invalid) < len(wanted.invalid) / 2
+    few = Said(*(column[: len(vectors)] for column in wanted))
+    assert same(vectors.rules, few.rules)
+    assert same(vectors.executed, few.executed)
+    assert same(vectors.invalid, few.invalid)
 
-    in_c = run_c(rules, projection, states, proposed, tmp_path)
-    assert same(in_c[0], executed)
-    assert same(in_c[1], found)
-    assert np.array_equal(in_c[2], changed)
-    as_model = run_onnx(rules, projection, states, proposed)
-    assert same(as_model[0], executed)
-    assert same(as_model[1], found)
-    few = slice(0, len(vectors) + 3_000)
-    in_python = run_python(rules, projection, states[few], proposed[few])
-    assert same(in_python[0], executed[few])
-    assert same(in_python[1], found[few])
+    passing = on_invalid == "pass"
+    in_c = run_c(rules, projection, states, proposed, tmp_path, on_invalid)
+    agree(in_c, wanted, passing=passing)
+    assert same(in_c.changed, wanted.changed)
+    as_model = run_onnx(rules, projection, states, proposed, on_invalid)
+    agree(as_model, wanted, passing=passing)
+    count = len(vectors) + 3_000
+    in_python = run_python(rules, projection, states[:count], proposed[:count], on_invalid)
+    few = Said(*(column[:count] for column in wanted))
+    agree(in_python, few, passing=passing, told=not passing)
 
 
 @given(st.integers(0, 10_000), st.integers(1, 25), st.booleans())
@@ -165,13 +180,9 @@ def test_any_rules_in_any_order(seed: int, count: int, by_hand: bool) -> None:
     vectors = make_vectors(rule_set)
     states = np.concatenate([vectors.states, random_states(rule_set, 100, rng)])
     proposed = proposed_actions(rule_set, len(states), rng)
-    executed, found, _ = expected(rule_set, "centre", states, proposed)
-    for answer in (
-        run_python(rule_set, "centre", states, proposed),
-        run_onnx(rule_set, "centre", states, proposed),
-    ):
-        assert same(answer[0], executed)
-        assert same(answer[1], found)
+    wanted = expected(rule_set, "centre", states, proposed)
+    agree(run_python(rule_set, "centre", states, proposed), wanted)
+    agree(run_onnx(rule_set, "centre", states, proposed), wanted)
 
 
 def test_a_path_deeper_than_python_can_nest(tmp_path: Path) -> None:
@@ -189,15 +200,11 @@ def test_a_path_deeper_than_python_can_nest(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     states = (rng.random((500, 4)) * 80).astype(np.float32)
     proposed = proposed_actions(rule_set, len(states), rng)
-    executed, found, _ = expected(rule_set, "centre", states, proposed)
-    assert len(np.unique(found)) > 50
-    for answer in (
-        run_c(rule_set, "centre", states, proposed, tmp_path),
-        run_python(rule_set, "centre", states, proposed),
-        run_onnx(rule_set, "centre", states, proposed),
-    ):
-        assert same(answer[0], executed)
-        assert same(answer[1], found)
+    wanted = expected(rule_set, "centre", states, proposed)
+    assert len(np.unique(wanted.rules)) > 50
+    agree(run_c(rule_set, "centre", states, proposed, tmp_path), wanted)
+    agree(run_python(rule_set, "centre", states, proposed), wanted)
+    agree(run_onnx(rule_set, "centre", states, proposed), wanted)
 
 
 def test_vectors_stand_at_every_threshold_and_a_step_either_side() -> None:
@@ -230,16 +237,71 @@ def test_every_node_is_reached_and_every_rule_applies_somewhere() -> None:
     assert reached == {place for place, node in enumerate(nodes) if node.feature != LEAF}
 
 
-def test_vectors_read_back_as_the_same_numbers() -> None:
-    vectors = make_vectors(mined("pendulum", 0.005, 0.95), "clip")
-    rows = list(csv.reader(io.StringIO(vectors_to_csv(vectors))))
-    assert rows[0] == ["state_0", "state_1", "state_2", "proposed_0", "rule_0", "executed_0"]
-    read = np.array(rows[1:], dtype=np.float64)
+@pytest.mark.parametrize("on_invalid", ["raise", "pass"])
+def test_vectors_read_back_as_the_same_numbers(on_invalid: OnInvalid) -> None:
+    vectors = make_vectors(mined("pendulum", 0.005, 0.95), "clip", on_invalid)
+    header, *rows = csv.reader(io.StringIO(vectors_to_csv(vectors)))
+    assert header == [
+        *("state_0", "state_1", "state_2", "proposed_0", "rule_0", "executed_0", "invalid")
+    ]
+    nothing = [row[5] == "" for row in rows]
+    assert nothing == (vectors.invalid & (on_invalid == "raise")).tolist()
+    read = np.array([[cell or "nan" for cell in row] for row in rows], dtype=np.float64)
     assert same(read[:, :3].astype(np.float32), vectors.states)
     assert same(read[:, 3:4].astype(np.float32), vectors.proposed)
     assert same(read[:, 4:5].astype(np.int64), vectors.rules)
-    assert same(read[:, 5:].astype(np.float32), vectors.executed)
+    said = ~np.array(nothing)
+    assert same(read[said, 5:6].astype(np.float32), vectors.executed[said])
+    assert same(read[:, 6].astype(np.bool_), vectors.invalid)
     assert np.isnan(vectors.states).any()
+    assert np.isinf(vectors.states).any()
+    assert np.isnan(vectors.proposed).any()
+
+
+@pytest.mark.parametrize("on_invalid", ["raise", "pass"])
+def test_an_export_says_which_choice_it_is_for(on_invalid: OnInvalid) -> None:
+    import onnx
+
+    rules = mined("cartpole", 0.005, 0.95)
+    said = f"(on_invalid: {on_invalid})"
+    assert said in rules_to_c(rules, "centre", on_invalid).split("*/")[0]
+    head = ast.get_docstring(ast.parse(rules_to_python(rules, "centre", on_invalid)))
+    assert head is not None
+    assert said in head
+    model = onnx.load_model_from_string(rules_to_onnx(rules, "centre", on_invalid))
+    assert said in model.doc_string
+    assert {entry.key: entry.value for entry in model.metadata_props}["on_invalid"] == on_invalid
+
+
+@pytest.mark.parametrize("name", ["one discrete action", "several continuous actions"])
+def test_python_refuses_what_the_shield_refuses(name: str) -> None:
+    rules = SETS[name]()
+    good = [0.0] * len(rules.source.features)
+    fits: object = [0.0] * len(rules.actions) if rules.actions[0].is_interval else 1
+    names: dict[str, Any] = {}
+    exec(compile(rules_to_python(rules), "shield.py", "exec"), names)
+    passing: dict[str, Any] = {}
+    exec(compile(rules_to_python(rules, "centre", "pass"), "shield.py", "exec"), passing)
+    shield = Shield(rules)
+    bad: list[tuple[object, object]] = [
+        *((state, fits) for state in (good[1:], [*good, 0.0], ["0", *good[1:]], None, "text")),
+        *(
+            (state, fits)
+            for state in ([1e300, *good[1:]], [10**400, *good[1:]], b"\0" * 4 * len(good))
+        ),
+        *(
+            (good, action)
+            for action in (None, "text", [], [fits, fits], -0.9, float("nan"), 10**30)
+        ),
+    ]
+    for state, action in bad:
+        with pytest.raises(InputError):
+            shield.decide(state, action)
+        with pytest.raises(ValueError, match="is none that the rules can be asked about"):
+            names["shield"](state, action)
+        executed, rule = passing["shield"](state, action)
+        assert executed is action
+        assert rule == [-1] * len(rules.actions)
 
 
 HOSTILE = (
@@ -271,13 +333,9 @@ def test_names_stay_names(hostile: str, tmp_path: Path) -> None:
         rng = np.random.default_rng(0)
         states = random_states(rule_set, 200, rng)
         proposed = proposed_actions(rule_set, 200, rng)
-        executed, found, _ = expected(rule_set, "centre", states, proposed)
-        for answer in (
-            run_c(rule_set, "centre", states, proposed, tmp_path),
-            run_python(rule_set, "centre", states, proposed),
-        ):
-            assert same(answer[0], executed)
-            assert same(answer[1], found)
+        wanted = expected(rule_set, "centre", states, proposed)
+        agree(run_c(rule_set, "centre", states, proposed, tmp_path), wanted)
+        agree(run_python(rule_set, "centre", states, proposed), wanted)
         source = rules_to_python(rule_set).encode(errors="replace")
         plain = rules_to_python(rules)
         # As a file, which Python decodes itself: nothing but comments differs.

@@ -181,7 +181,9 @@ def test_merged_rules_apply_where_they_did(lander_like: Demonstrations) -> None:
     states = np.random.default_rng(1).normal(size=(3_000, 8)).astype(np.float32)
     states[:50] = np.nan
     actions = np.zeros(len(states), dtype=np.int64)
-    before, after = (Shield(one).decide_batch(states, actions) for one in (rules, merged))
+    before, after = (
+        Shield(one, on_invalid="pass").decide_batch(states, actions) for one in (rules, merged)
+    )
     assert np.array_equal(before.rules, after.rules)
     assert max(rule.length for rule in merged.rules) < max(rule.length for rule in rules.rules)
     assert all(rule.length <= 2 * rule.merged_length for rule in merged.rules)

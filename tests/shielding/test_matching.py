@@ -1,31 +1,31 @@
-"""A state with a missing number: one by one and in a batch, it takes the same way."""
+"""Which rule applies: where a number is missing, and where a rule is taken out."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from sarl_core import Shield, mine_rules
+from sarl_core import InputError, Shield, mine_rules
 
 
-def test_a_missing_number_is_above_every_threshold_one_by_one_and_in_a_batch(lander_like):
+def test_a_state_with_a_missing_number_has_no_rule(lander_like):
     rule_set = mine_rules(lander_like, supp_min=0.0, conf_min=1.0)
-    shield = Shield(rule_set)
+    shield = Shield(rule_set, on_invalid="pass")
     states = lander_like.observations[:300].copy()
-    holes = np.random.default_rng(0).random(states.shape) < 0.2
+    holes = np.random.default_rng(0).random(states.shape) < 0.1
     states[holes] = np.nan
-    actions = np.zeros(len(states), dtype=np.int64)
+    broken = holes.any(axis=1)
+    assert 0 < broken.sum() < len(states)
 
-    together = shield.decide_batch(states, actions)
+    found = shield.rules_in_force(states)
 
     applies = np.array([rule.applies(states) for rule in rule_set.rules])
     expected = np.where(applies.any(axis=0), applies.argmax(axis=0), -1)
-    assert np.array_equal(together.rules[:, 0], expected)
-    for row, state in enumerate(states):
-        alone = shield.decide(state, 0)
-        assert alone.rules == (None if expected[row] < 0 else int(expected[row]),)
-        assert alone.margin == together.margin[row]
+    assert np.array_equal(found[:, 0], np.where(broken, -1, expected))
+    with pytest.raises(InputError, match="is not a number"):
+        Shield(rule_set).rules_in_force(states)
 
 
 def test_where_a_rule_is_taken_out_another_applies_only_if_it_was_scanned(lander_like):

@@ -244,15 +244,27 @@ def test_a_compliant_action_is_passed_on_untouched(joints, lander_like):
             assert decision.executed is action
 
 
-@pytest.mark.parametrize("kind", [int, np.int64, np.int32, np.array])
-def test_a_replaced_label_is_of_the_proposed_kind(lander_like, kind):
+@pytest.mark.parametrize(
+    ("kind", "becomes"),
+    [
+        (int, int),
+        (np.int64, np.int64),
+        (np.int32, np.int64),
+        (np.uint8, np.int64),
+        (float, np.int64),
+        (np.array, np.ndarray),
+    ],
+)
+def test_a_label_is_executed_in_the_environments_dtype(lander_like, kind, becomes):
     shield = Shield(mine_rules(lander_like, supp_min=0.0, conf_min=1.0))
     state = lander_like.observations[0]
     wanted = shield.decide(state, 0).executed
-    decision = shield.decide(state, kind((int(wanted) + 1) % 4))
-    assert decision.intervened
-    assert type(decision.executed) is type(decision.proposed)
-    assert decision.executed == wanted
+    for label in range(4):
+        decision = shield.decide(state, kind(label))
+        assert decision.intervened == (label != wanted)
+        assert type(decision.executed) is becomes
+        assert np.asarray(decision.executed).dtype == np.int64
+        assert decision.executed == wanted
 
 
 def test_bad_input_is_said_in_a_sentence(lander_like):
@@ -266,7 +278,7 @@ def test_bad_input_is_said_in_a_sentence(lander_like):
     with pytest.raises(InputError, match="3 action values for 2 states"):
         Shield(rules).decide_batch(np.zeros((2, 8)), [0, 1, 0])
     empty = RuleSet((), rules.actions, rules.source, rules.thresholds)
-    assert Shield(empty).decide(np.zeros(8), 1) == (1, 1, (None,), False, float("inf"), False)
+    assert Shield(empty).decide(np.zeros(8), 1) == (1, 1, (None,), False, float("inf"), False, None)
     assert len(Shield(empty).decide_batch(np.zeros((0, 8)), np.zeros(0, dtype=int)).executed) == 0
 
 
