@@ -263,9 +263,12 @@ def choose(
         never = np.zeros(len(states), dtype=np.bool_)
         return Choice(proposed, proposed, none, never, np.full(len(states), np.inf), never)
     decision = shield.decide_batch(states, adapter.shaped(proposed))
+    executed: Any = decision.executed
+    if executed.dtype != proposed.dtype:  # what is executed is a number of the agents' kind, too
+        executed = np.array(executed.tolist(), dtype=proposed.dtype)
     return Choice(
         proposed,
-        adapter.columns(decision.executed),
+        adapter.columns(executed),
         decision.rules,
         decision.intervened,
         decision.margin,
