@@ -24,6 +24,7 @@ from _choices import (
     continuous,
     demonstrated,
     environment_of,
+    policy_upload,
     rules_for,
 )
 from _compact import THRESHOLDS
@@ -108,9 +109,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
             outside = outside_choice()
         policy_file = rule_file = None
         if agent == OWN_FILE:
-            policy_file = st.file_uploader(
-                "Policy: .npz, or a Stable-Baselines3 .zip (PPO, A2C or DQN)", key="policy_file"
-            )
+            policy_file = policy_upload("Policy", "policy_file", env)
         if rules == OWN_FILE:
             rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
 

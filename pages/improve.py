@@ -13,16 +13,17 @@ import _state as state
 import streamlit as st
 from _choices import (
     OWN_FILE,
+    PolicyFile,
     agent_for,
     digest_of,
     environment_of,
     has_expert,
+    policy_upload,
 )
 from _improve_view import show_outcome, show_shipped
 from _improving import Order, Outcome, Working, kept_outcomes
 from _settings import environment_choice
 from _words import in_full
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import describe_environment
@@ -48,7 +49,7 @@ class Choices:
 
     env: str | None
     expert: str
-    policy_file: UploadedFile | None
+    policy_file: PolicyFile | None
     max_rules: int
     cut: str
     rounds: int
@@ -152,10 +153,7 @@ def settings(demonstrations: Demonstrations) -> Choices:
                     help="Number of equal intervals each continuous action is divided into.",
                 )
         if expert == OWN_FILE:
-            policy_file = st.file_uploader(
-                "The expert: .npz, or a Stable-Baselines3 .zip (PPO, A2C or DQN)",
-                key="expert_file",
-            )
+            policy_file = policy_upload("The expert", "expert_file", env)
     return Choices(
         env,
         expert,
@@ -238,11 +236,13 @@ def command_for(
     """The same on the command line, for the card."""
     name = state.chosen_dataset()
     file = f"data/demonstrations/{name}.parquet" if name in state.SHIPPED else upload_name()
+    statistics = choices.policy_file.statistics if choices.policy_file else None
     words = ["python", "-m", "sarl_core", "aggregate", file]
     for option, value, usual in (
         ("--max-rules", choices.max_rules, None),
         ("--env", env_id, demonstrations.env_id),
         ("--expert", choices.policy_file.name if choices.policy_file else "expert", "expert"),
+        ("--normalise", statistics.name if statistics else None, None),
         ("--rounds", choices.rounds, None),
         ("--episodes", choices.episodes, None),
         ("--support", thresholds and thresholds.support, None),

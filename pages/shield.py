@@ -19,10 +19,12 @@ from _choices import (
     OWN_FILE,
     PAPERS,
     PROJECTIONS,
+    PolicyFile,
     agent_for,
     continuous,
     demonstrated,
     environment_of,
+    policy_uploads,
     rules_for,
 )
 from _comparisons import Row, row_key
@@ -65,7 +67,7 @@ class Choices:
     outside: Outside
     agents: list[str]
     shields: list[str]
-    policy_files: list[UploadedFile]
+    policy_files: list[PolicyFile]
     rule_file: UploadedFile | None
 
 
@@ -133,13 +135,9 @@ def settings() -> Choices:
             "Untrained: a fresh network, its actions sampled, which is nearly the same as random. "
             "Own file: policies of yours.",
         )
-        policy_files: list[UploadedFile] = []
+        policy_files: list[PolicyFile] = []
         if OWN_FILE in agents:
-            policy_files = st.file_uploader(
-                "Policies: .npz, or Stable-Baselines3 .zip (PPO, A2C or DQN)",
-                accept_multiple_files=True,
-                key="policy_files",
-            )
+            policy_files = policy_uploads("Policies", "policy_files", env)
         offered = offered_rule_sets([NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE])
         shields = st.pills(
             "Shields",

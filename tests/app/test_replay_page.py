@@ -4,7 +4,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium
 import pytest
+from gymnasium.wrappers import NormalizeObservation
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules, save_demonstrations
@@ -152,6 +156,41 @@ def test_an_uploaded_policy_acts() -> None:
     assert not errors(app)
     assert metrics(app)["Return"] == "500.0"
     assert "Mine" in texts(app)
+
+
+def trained_under_vec_normalize(folder: Path) -> tuple[bytes, bytes]:
+    """A model that pushes a cart, and its statistics."""
+    env = VecNormalize(DummyVecEnv([lambda: gymnasium.make("CartPole-v1")]))
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, seed=0, device="cpu").learn(64)
+    model.save(folder / "mine.zip")
+    env.save(str(folder / "statistics.pkl"))
+    return (folder / "mine.zip").read_bytes(), (folder / "statistics.pkl").read_bytes()
+
+
+def test_a_policy_is_uploaded_with_its_statistics(tmp_path: Path) -> None:
+    model, statistics = trained_under_vec_normalize(tmp_path)
+    app = open_page("replay", data="cartpole", agent="own file", rules="none")
+    app.file_uploader(key="policy_file").set_value(("mine.zip", model, "")).run()
+    run(app)
+    (sentence,) = errors(app)
+    assert "mine.zip was trained under a VecNormalize" in sentence
+    uploader = app.file_uploader(key="policy_file_statistics")
+    uploader.set_value(("statistics.pkl", statistics, "")).run()
+    run(app)
+    assert not errors(app)
+    assert float(metrics(app)["Return"]) > 0
+
+
+def test_what_looks_odd_in_a_policy_is_said(tmp_path: Path) -> None:
+    env = NormalizeObservation(gymnasium.make("CartPole-v1"))
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, seed=0, device="cpu")
+    model.save(tmp_path / "mine.zip")
+    app = open_page("replay", data="cartpole", agent="own file", rules="none")
+    content = (tmp_path / "mine.zip").read_bytes()
+    app.file_uploader(key="policy_file").set_value(("mine.zip", content, "")).run()
+    (warning,) = [entry.value for entry in app.warning if "mine.zip" in entry.value]
+    assert "NormalizeObservation" in warning
+    assert "/tmp" not in warning
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from typing import Any
 
 import gymnasium
 import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
@@ -237,6 +239,30 @@ def test_a_policy_and_rules_of_one_s_own(tmp_path: Path) -> None:
     assert rows(app)["mine, own file"]["Rules"] == f"{len(rules):,}"
     assert rows(app)["novice (2), no shield"]["Mean return"] < 50.0
     assert not any(name.startswith("again") for name in rows(app))  # one file, uploaded twice
+
+
+def test_statistics_go_to_the_policy_whose_name_they_have(tmp_path: Path) -> None:
+    env = VecNormalize(DummyVecEnv([lambda: gymnasium.make("CartPole-v1")]))
+    model = PPO("MlpPolicy", env, n_steps=64, batch_size=64, seed=0, device="cpu").learn(64)
+    model.save(tmp_path / "mine.zip")
+    env.save(str(tmp_path / "statistics.pkl"))
+    content = (tmp_path / "mine.zip").read_bytes()
+    statistics = (tmp_path / "statistics.pkl").read_bytes()
+    app = open_page("shield", data="cartpole", episodes="2", first_seed="5000")
+    app.pills(key="agents").set_value(["own file"]).run()
+    app.pills(key="shields").set_value(["no shield"]).run()
+    zips = [("mine.zip", content, ""), ("other.zip", content + b"\0", "")]
+    files = [("mine_vecnormalize.pkl", statistics, ""), ("stray.pkl", statistics, "")]
+    app.file_uploader(key="policy_files").set_value([*zips, *files]).run()
+    run(app)
+    assert list(rows(app)) == ["mine, no shield"]
+    (sentence,) = errors(app)
+    assert "other.zip was trained under a VecNormalize" in sentence
+    assert any("stray.pkl was not used" in entry.value for entry in app.warning)
+    app.file_uploader(key="policy_files").set_value([zips[1], files[1]]).run()
+    run(app)
+    assert not errors(app)
+    assert list(rows(app)) == ["other, no shield"]
 
 
 def test_a_rule_file_of_another_version_and_a_foreign_policy_are_named() -> None:
