@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -11,9 +12,11 @@ import _state as state
 import streamlit as st
 from _cache import cached
 from _evidence_work import worked_out
+from _hold_out import Parts
 from _rule_table import table_height
 
 from sarl_core.explaining import evidence_figures as figures
+from sarl_core.explaining.cross_fit_words import influence_sentences, judged_sentence
 from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
 from sarl_core.explaining.evidence_tables import (
     enough_columns,
@@ -23,6 +26,9 @@ from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS, verdi
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.explaining.number_cards import Number, number_cards
 from sarl_core.explaining.prose import note
+from sarl_core.mining.cross_fitting import Judged, judge
+from sarl_core.mining.episode_counts import Influence, count_rules, most_influential
+from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.holding_out import Verdict, more_episodes
 from sarl_core.mining.learning_curve import LearningCurve, learning_curve
 from sarl_core.mining.progress import Progress
@@ -30,6 +36,12 @@ from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.stability import SAME_RULE, Stability, rule_stability
 
 MOST_DRAWN = 600
+MEANINGS: tuple[tuple[Verdict, str], ...] = (
+    ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
+    ("open", "The minimum confidence lies within the interval: not enough is known"),
+    ("below", "The whole interval lies below the minimum confidence"),
+    ("unknown", f"The rule applied in fewer than {FEWEST_EPISODES} of the held-out episodes"),
+)
 TABLE_ROWS = 12
 ORDERS = 6
 PLAIN = {"displayModeBar": False}
@@ -43,19 +55,30 @@ class Found:
         rules: The most support first.
         missing: Episodes that each still misses.
         threshold: The minimum confidence.
+        judged: All of them together on the episodes held out; None where there are none.
+        influences: The held-out episode that moves the share of each rule most.
     """
 
     rules: tuple[Rule, ...]
     missing: tuple[float, ...]
     threshold: float
+    judged: Judged | None
+    influences: tuple[Influence | None, ...]
 
 
 @cached(show_spinner="Weighing the evidence …")
-def _found(key: tuple[object, ...], episodes: int, _rule_set: RuleSet) -> Found:
+def _found(key: tuple[object, ...], _parts: Parts, _rule_set: RuleSet) -> Found:
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
     threshold = _rule_set.thresholds.confidence
-    missing = tuple(more_episodes(rule, episodes, threshold) for rule in rules)
-    return Found(rules, missing, threshold)
+    missing = more_episodes(rules, _parts.remaining.n_episodes, threshold)
+    if _parts.held_out is None:
+        return Found(rules, missing, threshold, None, (None,) * len(rules))
+    counts = count_rules(replace(_rule_set, rules=rules), _parts.held_out)
+    influences = tuple(
+        most_influential(*counts.of(place), counts.numbers, counts.lengths)
+        for place in range(len(rules))
+    )
+    return Found(rules, missing, threshold, judge(_rule_set, counts), influences)
 
 
 @cached()
@@ -67,7 +90,9 @@ def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> str
 def _enough(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
     import pandas as pd
 
-    return pd.DataFrame(enough_columns(_found.rules, _rule_set, _found.missing, _found.threshold))
+    return pd.DataFrame(
+        enough_columns(_found.rules, _rule_set, _found.missing, _found.threshold, _found.influences)
+    )
 
 
 class Evidence:
@@ -83,59 +108,66 @@ class Evidence:
         self.thresholds = self.rule_set.thresholds
         held = "" if parts.held_out is None else parts.held_out.digest
         self.key = (parts.mined.digest, held, self.thresholds, self.rule_set.divider)
-        self.found = _found(self.key, parts.remaining.n_episodes, self.rule_set)
+        self.found = _found(self.key, parts, self.rule_set)
 
 
 def show_overview(evidence: Evidence) -> None:
-    """All rules with their intervals, and how many of them reach the minimum confidence."""
-    found, held_out = evidence.found, evidence.parts.held_out
-    counts = verdict_counts(found.rules, found.threshold)
+    """All rules with what is known of them, and how many reach the minimum confidence."""
+    found, judged = evidence.found, evidence.found.judged
     numbers = [Number("Rules", f"{len(found.rules):,}")]
-    if held_out is not None:
-        tried = [rule.held_out for rule in found.rules if rule.held_out is not None]
-        samples = sum(one.samples for one in tried)
-        right = sum(one.correct for one in tried) / samples if samples else float("nan")
-        meaning = "Share of the held-out states with a rule in which the expert did what it says"
-        numbers.append(Number("Held-out fidelity", share_text(right, decimals=1), meaning))
-    meanings: tuple[tuple[Verdict, str], ...] = (
-        ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
-        ("open", "The minimum confidence lies within the interval: not enough is known"),
-        ("below", "The whole interval lies below the minimum confidence"),
-    )
-    numbers += [
-        Number(VERDICTS[name].capitalize(), f"{counts[name]:,}", meaning)
-        for name, meaning in meanings
-    ]
+    told = []
+    if judged is not None:
+        counts = verdict_counts(found.rules, found.threshold)
+        share = judged.fidelity.share
+        numbers.append(
+            Number(
+                "Held-out fidelity",
+                share_text(math.nan if share is None else share, decimals=1),
+                "Share of the states with a rule in which the expert did what it says, on average "
+                "over the held-out episodes",
+            )
+        )
+        numbers += [
+            Number(VERDICTS[name].capitalize(), f"{counts[name]:,}", meaning)
+            for name, meaning in MEANINGS
+        ]
+        told = [judged_sentence(judged), *influence_sentences(judged)]
     ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
-    words = (
-        f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
-        + ("grey: on what it was mined from &ensp; " if held_out is not None else "")
-        + f"dotted: minimum confidence {found.threshold:g}"
-    )
-    told = (
-        "The intervals count every state for itself. Steps of one episode are alike, so what is "
-        "known is a little less than they say."
-    )
+    words = f"dotted: minimum confidence {share_text(found.threshold)}"
+    if judged is not None:
+        words = (
+            f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
+            "a dot alone: too few episodes &ensp; grey: on what it was mined from &ensp; " + words
+        )
     if len(found.rules) > MOST_DRAWN:
-        told += f" Drawn: the {MOST_DRAWN} rules with the most support, of {len(found.rules):,}."
+        told.append(
+            f"Drawn: the {MOST_DRAWN} rules with the most support, of {len(found.rules):,}."
+        )
     with st.container(key="overview"):  # one piece: each element of its own takes its time
         st.html(
             f"{number_cards(numbers)}<div style='height:1.2rem'></div>"
             + _overview(evidence.key, found, evidence.rule_set)
             + f"<div style='font-size:0.85rem;opacity:0.9;margin:0.6rem 0 0.9rem'>{words}</div>"
-            + note(told)
+            + "".join(map(note, told))
         )
 
 
 def show_enough(evidence: Evidence) -> None:
     """How many more episodes each rule would take."""
     found = evidence.found
+    if found.judged is None:
+        st.info(
+            "Whether the demonstrations are enough, only episodes can say that the rules were not "
+            "mined from. Hold some out above.",
+            icon=":material/info:",
+        )
+        return
     st.html(
         note(
             "How many more episodes until the lower end of a rule's interval would reach the "
-            "minimum confidence, if every further episode brought as many states of it as one did "
-            "so far, as often right. Where the confidence itself does not lie above the minimum, "
-            "no number is enough."
+            "minimum confidence, if the same share of them was held out, and the rule applied as "
+            "often and was right as often, and as unevenly, as so far. Where the confidence itself "
+            "does not lie above the minimum, no number is enough."
         )
     )
     left, right = st.columns([2, 3], gap="medium")
@@ -148,12 +180,24 @@ def show_enough(evidence: Evidence) -> None:
             hide_index=True,
             height=table_height(len(found.rules), 6),
             key="enough_table",
-            column_order=("Action", "Still missing", "Evidence", "Interval", "When"),
+            column_order=(
+                "Action",
+                "Still missing",
+                "Evidence",
+                "Interval",
+                "Moved most by",
+                "When",
+            ),
             column_config={
                 "Action": column.TextColumn(width=130),
-                "Still missing": column.TextColumn(width=125),
-                "Evidence": column.TextColumn(width=215),
-                "Interval": column.TextColumn(width=230),
+                "Still missing": column.TextColumn(width=150),
+                "Evidence": column.TextColumn(width=350),
+                "Interval": column.TextColumn(
+                    width=125, help="What so few or so many episodes can tell (95 %)"
+                ),
+                "Moved most by": column.TextColumn(
+                    width=380, help="The one episode without which the share would differ most"
+                ),
                 "When": column.TextColumn(width=420),
             },
             alt="What each rule still misses",

@@ -12,6 +12,7 @@ from sarl_core.explaining.evidence_tables import held_out_columns
 from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.tables import rule_columns
+from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, RuleSet
 
@@ -70,20 +71,20 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         ),
         "Length": column.NumberColumn(width=68, help="Number of conditions on the way to the rule"),
         "Held out": column.TextColumn(
-            width=106, help="Confidence on the episodes held out, and on how many of their states"
+            width=130, help="How often it was right in an episode held out, on average over those"
         ),
         "Verdict": column.MultiselectColumn(
             width=90,
             help="Where the 95 % interval of the held-out confidence lies: at or above the minimum "
-            "confidence (reached), below it (too low), or on both sides (open)",
+            "confidence (reached), below it (too low), or on both sides (open); none with fewer "
+            f"than {FEWEST_EPISODES} episodes",
             options=list(VERDICTS.values()),
             color=[VERDICT_COLOURS[name] for name in VERDICTS],
         ),
         "Lower bound": column.NumberColumn(
             width=95,
             format="%.3f",
-            help="Lower end of the 95 % interval of the held-out confidence; of the confidence "
-            "itself where no held-out state is the rule's",
+            help="Lower end of the 95 % interval of the held-out confidence",
         ),
     }
 

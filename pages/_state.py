@@ -28,8 +28,9 @@ from sarl_core.errors import SarlError
 from sarl_core.explaining.tables import top_rules
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.episode_counts import EpisodeCounts
 from sarl_core.mining.holding_out import count_held_out, with_held_out
-from sarl_core.mining.landscape import Landscape, NodeCounts, threshold_landscape
+from sarl_core.mining.landscape import Landscape, threshold_landscape
 from sarl_core.mining.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.rule_names import renamed_trees
 from sarl_core.mining.rules import FILTERED, RuleSet, Thresholds
@@ -322,7 +323,7 @@ def _held_out_counts(
     digest: str,
     _trees: tuple[PolicyTree, ...],
     _held_out: Demonstrations,
-) -> tuple[NodeCounts, ...]:
+) -> tuple[EpisodeCounts, ...]:
     return count_held_out(_trees, _held_out)
 
 
@@ -335,7 +336,7 @@ def _landscape(
     depth: int | None,
     held_out: str,
     _trees: tuple[PolicyTree, ...],
-    _counts: tuple[NodeCounts, ...] | None,
+    _counts: tuple[EpisodeCounts, ...] | None,
 ) -> Landscape:
     return threshold_landscape(
         _trees, supports, confidences, lift_min=lift, max_depth=depth, held_out=_counts

@@ -60,8 +60,8 @@ def hold_out_choice(whole: Demonstrations) -> None:
         st.warning(in_full(parts.problem), icon=":material/warning:")
     if parts.held_out is None:
         st.caption(
-            "Nothing is held out, so the intervals below are of what the rules were mined from. "
-            "They flatter: each rule was chosen for being right there."
+            "Nothing is held out, so the dots below are of what the rules were mined from. They "
+            "flatter: each rule was chosen for being right there."
         )
         return
     numbers = parts.held_out.episodes[parts.held_out.episode_starts].tolist()
@@ -74,8 +74,8 @@ def hold_out_choice(whole: Demonstrations) -> None:
 
 st.title("Evidence")
 st.caption(
-    "How sure each rule is: how often it was right, on how many states, and on episodes that it "
-    "was not mined from."
+    "How sure each rule is: how often it was right, and in how many episodes that it was not mined "
+    "from. Each episode counts once, because its steps are alike."
 )
 state.require_demonstrations()
 demonstrations = state.all_demonstrations()

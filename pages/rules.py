@@ -156,7 +156,7 @@ def matching(listed: Listed, rule_set: RuleSet) -> list[int]:
             width=220,
             label_visibility="collapsed",
         )
-        least = lower_bound_choice() if compact is None else 0.0
+        least = lower_bound_choice() if compact is None and state.held_out_digest() else 0.0
         sure = [at for at, low in enumerate(listed.lower) if low >= least]
         if compact is not None:
             downloads(len(compact.shipped), lambda: compact.shipped)
@@ -185,8 +185,8 @@ def lower_bound_choice() -> float:
         key="lower",
         bind="query-params",
         width=150,
-        help="Only rules whose 95 % interval of confidence lies at or above this, on the held-out "
-        "episodes where there are some. The downloads hold these rules. 0: all.",
+        help="Only rules whose 95 % interval of confidence, over the held-out episodes, lies at or "
+        "above this. The downloads hold these rules. 0: all.",
     )
     return float(least or 0.0)
 

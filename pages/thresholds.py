@@ -230,7 +230,8 @@ def metrics(point: Landscape) -> None:
             st.metric(
                 "Held-out fidelity",
                 share_text(float(point.held_out_fidelity[0, 0]), decimals=1),
-                help="The same on the episodes held out, which no rule was mined from",
+                help="The same on the episodes held out, which no rule was mined from; on average, "
+                "so that each episode counts once",
             )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from sarl_core.commandline.evidence_answers import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+    from sarl_core.mining.cross_fitting import Judged
     from sarl_core.mining.rules import RuleSet
     from sarl_core.rollouts.rendering import Replay
     from sarl_core.shielding.shield import Shield
@@ -225,18 +226,21 @@ def _numbers(spread: dict[str, float]) -> tuple[str, str, str]:
     return least, median, largest
 
 
-def describe_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) -> dict[str, Any]:
+def describe_rules(
+    rule_set: RuleSet, path: Path, tried: Tried | None = None, judged: Judged | None = None
+) -> dict[str, Any]:
     """What was mined, without the rules themselves.
 
     Args:
         rule_set: The rules.
         path: Their file.
         tried: Which episodes were held out, if any were.
+        judged: What the rules are worth elsewhere, if that was asked.
 
     Returns:
         A document for JSON.
     """
-    from sarl_core.commandline.evidence_answers import describe_tried
+    from sarl_core.commandline.evidence_answers import describe_judged, describe_tried
 
     thresholds = rule_set.thresholds
     return {
@@ -259,11 +263,17 @@ def describe_rules(rule_set: RuleSet, path: Path, tried: Tried | None = None) ->
             for index, action in enumerate(rule_set.actions)
         },
         **({"held_out": describe_tried(rule_set, tried)} if tried is not None else {}),
+        **({"cross_fitted": describe_judged(judged, rule_set)} if judged is not None else {}),
     }
 
 
 def print_rules(
-    rule_set: RuleSet, path: Path, tried: Tried | None = None, *, lower_bound: float | None = None
+    rule_set: RuleSet,
+    path: Path,
+    tried: Tried | None = None,
+    judged: Judged | None = None,
+    *,
+    lower_bound: float | None = None,
 ) -> None:
     """Print what was mined, and the rules that apply most often, in words.
 
@@ -271,9 +281,11 @@ def print_rules(
         rule_set: The rules.
         path: Their file.
         tried: Which episodes were held out, if any were.
+        judged: What the rules are worth elsewhere, if that was asked.
         lower_bound: That rules had to reach, if they had to.
     """
-    from sarl_core.commandline.evidence_answers import rule_line, tried_facts
+    from sarl_core.commandline.evidence_answers import judged_facts, rule_line, tried_facts
+    from sarl_core.explaining.cross_fit_words import parting_text
     from sarl_core.explaining.language import share_text
 
     facts = [
@@ -287,8 +299,20 @@ def print_rules(
         )
     if tried is not None:
         facts += tried_facts(rule_set, tried)
+    if judged is not None:
+        facts += judged_facts(judged)
     terminal.print_lines([f"Wrote {path}"])
     terminal.print_facts(facts)
+    others = [one for one in (judged, tried and tried.judged) if one is not None]
+    warnings = [text for one in others if (text := parting_text(rule_set.fidelity, one))]
+    terminal.print_lines([f"warning: {text}" for text in warnings[:1]])
+    if not others and len(rule_set):
+        terminal.print_lines(
+            [
+                "Coverage and fidelity are of the states that the rules were mined from, which "
+                "flatters; --cross-fit says what they are elsewhere."
+            ]
+        )
     if not len(rule_set):
         what = "these thresholds" if lower_bound is None else "these thresholds and lower bound"
         terminal.print_lines([f"No rule reaches {what}; lower one of them."])

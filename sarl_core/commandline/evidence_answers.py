@@ -1,17 +1,20 @@
-"""What `mine` answers about episodes held out."""
+"""What `mine` answers about episodes that rules were not mined from."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from sarl_core.explaining.cross_fit_words import parting_text
 from sarl_core.explaining.evidence_words import (
-    decimal_text,
     evidence_text,
+    influence_text,
     interval_text,
     verdict_counts,
 )
-from sarl_core.explaining.language import counted, sentence
-from sarl_core.mining.evidence import wilson
+from sarl_core.explaining.language import counted, sentence, share_text
+from sarl_core.mining.cross_fitting import Judged
+from sarl_core.mining.episode_counts import Influence
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.holding_out import Split
 from sarl_core.mining.rules import Rule, RuleSet
 
@@ -23,11 +26,13 @@ class Tried(NamedTuple):
         share: Of the episodes, held out.
         seed: That drew them.
         split: Both parts.
+        judged: The rule set on those held out.
     """
 
     share: float
     seed: int
     split: Split
+    judged: Judged
 
 
 def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
@@ -40,23 +45,57 @@ def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
     Returns:
         A document for JSON.
     """
-    held = tried.split.held_out
-    samples, correct = _totals(rule_set)
-    interval = wilson(correct, samples)
+    fidelity = tried.judged.fidelity
     counts = verdict_counts(rule_set.rules, rule_set.thresholds.confidence)
     return {
         "share": tried.share,
         "seed": tried.seed,
-        "episodes": sorted(set(held.episodes.tolist())),
-        "steps": len(held),
-        "samples": samples,
-        "correct": correct,
-        "fidelity": correct / samples if samples else None,
-        "interval": list(interval),
+        "episodes": sorted(set(tried.split.held_out.episodes.tolist())),
+        "steps": len(tried.split.held_out),
+        "samples": fidelity.samples,
+        "correct": fidelity.correct,
+        "fidelity": fidelity.share,
+        "interval": None if fidelity.interval is None else list(fidelity.interval),
+        "coverage": tried.judged.coverage._asdict(),
+        **_influences(tried.judged),
         "rules_below": counts["below"],
         "rules_open": counts["open"],
         "rules_reached": counts["reached"],
+        "rules_unknown": counts["unknown"],
     }
+
+
+def describe_judged(judged: Judged, rule_set: RuleSet) -> dict[str, Any]:
+    """What a rule set is worth on episodes that it was not mined from.
+
+    Args:
+        judged: Cross-fitted.
+        rule_set: Mined from all of them.
+
+    Returns:
+        A document for JSON.
+    """
+    warning = parting_text(rule_set.fidelity, judged)
+    return {
+        "folds": judged.folds,
+        "whole_episodes": judged.whole_episodes,
+        "episodes": len(judged.numbers),
+        "fidelity": judged.fidelity._asdict(),
+        "coverage": judged.coverage._asdict(),
+        **_influences(judged),
+        "warnings": [warning] if warning else [],
+    }
+
+
+def _influences(judged: Judged) -> dict[str, Any]:
+    return {
+        "most_influential": _described(judged.influence),
+        "most_influential_by_states": _described(judged.influence_by_states),
+    }
+
+
+def _described(found: Influence | None) -> dict[str, Any] | None:
+    return None if found is None else found._asdict()
 
 
 def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
@@ -70,7 +109,6 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
         To be printed below the other facts.
     """
     held = tried.split.held_out
-    samples, correct = _totals(rule_set)
     facts = [
         (
             "held out",
@@ -79,32 +117,69 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
             f"{counted(len(held), 'state')} (seed {tried.seed})",
         )
     ]
-    if samples:
-        facts.append(
-            (
-                "right on these",
-                f"{decimal_text(correct / samples)} of {counted(samples, 'state')} with a rule "
-                f"(95 % interval {interval_text(wilson(correct, samples))})",
-            )
-        )
+    facts += _facts(tried.judged, "these")
     counts = verdict_counts(rule_set.rules, rule_set.thresholds.confidence)
     facts.append(
         (
             "by rule",
             f"{counts['reached']:,} reach the minimum confidence with their whole interval, "
-            f"{counts['open']:,} open, {counts['below']:,} below it",
+            f"{counts['open']:,} open, {counts['below']:,} below it, {counts['unknown']:,} met in "
+            "too few of these episodes",
         )
     )
     return facts
+
+
+def judged_facts(judged: Judged) -> list[tuple[str, str]]:
+    """What `describe_judged` says, as names and values for people.
+
+    Args:
+        judged: Cross-fitted.
+
+    Returns:
+        To be printed below the other facts.
+    """
+    kind = "episode" if judged.whole_episodes else "stretch"
+    return [
+        (
+            "cross-fitted",
+            f"every {kind} judged by rules mined without it, in {counted(judged.folds, 'part')}",
+        ),
+        *_facts(judged, "others"),
+    ]
+
+
+def _facts(judged: Judged, where: str) -> list[tuple[str, str]]:
+    facts = [
+        (
+            f"coverage on {where}",
+            f"{_told(judged.coverage)} of the states of an episode, on average",
+        ),
+    ]
+    if judged.fidelity.share is not None:
+        facts.append(
+            (f"fidelity on {where}", f"{_told(judged.fidelity)} of those with a rule, on average")
+        )
+    moves = influence_text(judged.influence)
+    if moves:
+        facts.append(("one episode", moves))
+    by_states = influence_text(judged.influence_by_states)
+    if by_states and judged.influence_by_states is not None:
+        share = share_text(judged.influence_by_states.share)
+        facts.append(("counting states", f"fidelity would be {share}; {by_states}"))
+    return facts
+
+
+def _told(found: HeldOut) -> str:
+    share = "none" if found.share is None else share_text(found.share)
+    return f"{share} ({interval_text(found)})"
 
 
 def rule_line(rule: Rule, rule_set: RuleSet) -> str:
     """A rule in words, with its counts where episodes were held out."""
     if rule.held_out is None:
         return sentence(rule, rule_set)
-    return f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}."
-
-
-def _totals(rule_set: RuleSet) -> tuple[int, int]:
-    tried = [rule.held_out for rule in rule_set.rules if rule.held_out is not None]
-    return sum(one.samples for one in tried), sum(one.correct for one in tried)
+    told = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}"
+    if not rule.held_out.samples:
+        return f"{told}."
+    return f"{told}, {interval_text(rule.held_out)}."

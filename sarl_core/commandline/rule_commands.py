@@ -75,7 +75,12 @@ def mine(
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Draws the episodes that are held out.")
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Draws the episodes that are held out, and the parts for --cross-fit.",
+        ),
     ] = 0,
     lower_bound: Annotated[
         float | None,
@@ -85,10 +90,18 @@ def mine(
             min=0.0,
             max=1.0,
             show_default=False,
-            help="Keep only rules whose 95 % interval of confidence lies at or above this, on "
-            "what was held out if anything was.",
+            help="Keep only rules whose 95 % interval of confidence, over the episodes held out, "
+            "lies at or above this; with --hold-out.",
         ),
     ] = None,
+    cross_fit: Annotated[
+        bool,
+        typer.Option(
+            "--cross-fit",
+            help="Also say what the rules are worth elsewhere: judge every episode by rules mined "
+            "without it.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Mine a rule set and write it to a rule file.
@@ -100,6 +113,11 @@ def mine(
     given = [value is not None for value in (support, confidence, setting)]
     if given not in ([True, True, False], [False, False, True]):
         raise InputError("give both --support and --confidence, or --setting instead of them")
+    if lower_bound and hold_out is None:
+        raise InputError(
+            "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
+            "out; give --hold-out as well, as --hold-out 0.2"
+        )
     from sarl_core.commandline.answers import (
         describe_oddities,
         describe_rules,
@@ -109,8 +127,9 @@ def mine(
 
     with terminal.working("Mining"):
         from sarl_core.commandline.evidence_answers import Tried
-        from sarl_core.mining import holding_out
+        from sarl_core.mining import cross_fitting, holding_out
         from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.mining.episode_counts import count_rules
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
 
         pair = (support or 0.0, confidence or 0.0)
@@ -119,10 +138,10 @@ def mine(
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
         demonstrations = read_demonstrations(file, env)
         oddities = describe_oddities(demonstrations)
-        tried = None
+        tried = split = None
         if hold_out is not None:
-            tried = Tried(hold_out, seed, holding_out.hold_out(demonstrations, hold_out, seed=seed))
-            demonstrations = tried.split.mined
+            split = holding_out.hold_out(demonstrations, hold_out, seed=seed)
+            demonstrations = split.mined
         rule_set = mine_rules(
             demonstrations,
             supp_min=pair[0],
@@ -131,16 +150,23 @@ def mine(
             max_depth=max_depth,
             divider=divider,
         )
-        if tried is not None:
-            rule_set = holding_out.with_held_out(rule_set, tried.split.held_out)
+        judged = None
+        if cross_fit:
+            fit = cross_fitting.cross_fit(demonstrations, divider=divider, seed=seed)
+            judged = fit.at(rule_set.thresholds)
+        if split is not None:
+            rule_set = holding_out.with_held_out(rule_set, split.held_out)
         if lower_bound is not None:
             rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
+        if hold_out is not None and split is not None:
+            counts = count_rules(rule_set, split.held_out)
+            tried = Tried(hold_out, seed, split, cross_fitting.judge(rule_set, counts))
         rule_set.save(out)
     if as_json:
-        terminal.print_json(describe_rules(rule_set, out, tried) | oddities)
+        terminal.print_json(describe_rules(rule_set, out, tried, judged) | oddities)
     else:
         print_oddities(oddities)
-        print_rules(rule_set, out, tried, lower_bound=lower_bound)
+        print_rules(rule_set, out, tried, judged, lower_bound=lower_bound)
 
 
 def landscape(

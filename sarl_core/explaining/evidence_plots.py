@@ -11,7 +11,7 @@ from sarl_core.explaining.evidence_words import (
     VERDICT_COLOURS,
     VERDICTS,
     evidence_text,
-    intervals_text,
+    interval_text,
     verdict_counts,
 )
 from sarl_core.explaining.html_plot import (
@@ -25,7 +25,7 @@ from sarl_core.explaining.html_plot import (
 )
 from sarl_core.explaining.language import action_text, counted, share_text
 from sarl_core.mining.evidence import Interval
-from sarl_core.mining.holding_out import held_out_interval, mined_interval, verdict
+from sarl_core.mining.holding_out import verdict
 from sarl_core.mining.rules import Rule, RuleSet
 
 _ASIDE = 0.17  # of a rule's place: what it was mined from to the left, held out to the right
@@ -46,7 +46,7 @@ _STYLE = (
 
 
 def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> str:
-    """The intervals of many rules side by side.
+    """What is known of many rules, side by side.
 
     Args:
         rules: In the order in which they stand from left to right; at least one.
@@ -54,32 +54,30 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
         threshold: The minimum confidence, drawn as a line.
 
     Returns:
-        HTML without script. Grey: on what each was mined from. In colour: held out, or, where
-        nothing was, the same by its verdict.
+        HTML without script. Grey: the confidence on what each was mined from, a dot. In colour:
+        held out, with the interval where there is one.
     """
-    tried = any(rule.held_out is not None for rule in rules)
     few = len(rules) <= _FEW
-    drawn: list[tuple[float, Interval, float, str]] = []
+    drawn: list[tuple[float, Interval | None, float, str]] = []
     for place, rule in enumerate(rules, 1):
-        if not rule.samples:
-            continue
-        colour = VERDICT_COLOURS[verdict(rule, threshold)]
-        mined = mined_interval(rule)
-        if not tried:
-            drawn.append((place, mined, rule.confidence, colour))
-            continue
-        drawn.append((place - _ASIDE * few, mined, rule.confidence, _MINED))
-        held = held_out_interval(rule)
-        if held is not None and rule.held_out is not None:
-            drawn.append((place + _ASIDE * few, held, rule.held_out.confidence, colour))
-    floor = max(min([threshold, *(interval.low for _, interval, _, _ in drawn)]) - 0.03, 0.0)
+        held = rule.held_out
+        aside = _ASIDE * few if held is not None else 0.0
+        if rule.samples:
+            drawn.append((place - aside, None, rule.confidence, _MINED))
+        if held is not None and held.share is not None:
+            colour = VERDICT_COLOURS[verdict(rule, threshold)]
+            drawn.append((place + aside, held.interval, held.share, colour))
+    ends = [interval.low if interval is not None else share for _, interval, share, _ in drawn]
+    floor = max(min([threshold, *ends]) - 0.03, 0.0)
     across, upwards = Scale(0.5, len(rules) + 0.5), Scale(floor, 1.01)
-    whiskers = "".join(
-        f'<b style="left:{across.place(place)};bottom:{upwards.place(interval.low)};'
-        f"height:{upwards.length(interval.low, interval.high)};background:{colour};"
-        f'--at:{_within(share, interval)}"></b>'
-        for place, interval, share, colour in drawn
-    )
+    whiskers = ""
+    for at, found, share, colour in drawn:
+        interval = found or Interval(share, share)
+        whiskers += (
+            f'<b style="left:{across.place(at)};bottom:{upwards.place(interval.low)};'
+            f"height:{upwards.length(interval.low, interval.high)};background:{colour};"
+            f'--at:{_within(share, interval)}"></b>'
+        )
     line = (
         f'<i style="left:0;right:0;bottom:{upwards.place(threshold)};'
         f'border-top:2px dotted {MARKER_COLOUR}"></i>'
@@ -103,8 +101,8 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
                 "Rules, the most support first",
             ),
             Axis(upwards, heights, list(map(tick_text, heights)), "Confidence"),
-            label=f"The 95 % interval of the confidence of {counted(len(rules), 'rule')} against "
-            f"the minimum confidence of {threshold:g}: {told}",
+            label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
+            f"of {threshold:g}, with the 95 % intervals of what was held out: {told}",
             height=262,
             tips=[_tip(rule, rule_set) for rule in rules],
         )
@@ -120,7 +118,7 @@ def _within(share: float, interval: Interval) -> str:
 
 def _tip(rule: Rule, rule_set: RuleSet) -> str:
     does = action_text(rule.action, rule_set.actions[rule.dimension])
-    lines = (f"rule {rule.id}: {does}", evidence_text(rule), intervals_text(rule))
+    lines = (f"rule {rule.id}: {does}", evidence_text(rule), interval_text(rule.held_out))
     return "\n".join(line for line in lines if line)
 
 

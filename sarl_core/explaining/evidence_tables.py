@@ -12,12 +12,14 @@ from sarl_core.explaining.evidence_words import (
     band_text,
     evidence_text,
     held_out_text,
-    intervals_text,
+    influence_text,
+    interval_text,
     more_text,
 )
 from sarl_core.explaining.language import action_text, conditions_text, label_text
 from sarl_core.mining.contradictions import Contradictions, EpisodeContradictions
-from sarl_core.mining.holding_out import lower_bound, verdict
+from sarl_core.mining.episode_counts import Influence
+from sarl_core.mining.holding_out import verdict
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.stability import Stability
@@ -38,14 +40,18 @@ def held_out_columns(rules: Sequence[Rule], threshold: float) -> Columns:
     if not any(rule.held_out is not None for rule in rules):
         return {}
     return {
-        "Held out": [held_out_text(rule) for rule in rules],
+        "Held out": [held_out_text(rule.held_out) for rule in rules],
         "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
-        "Lower bound": [lower_bound(rule) for rule in rules],
+        "Lower bound": [None if rule.held_out is None else rule.held_out.low for rule in rules],
     }
 
 
 def enough_columns(
-    rules: Sequence[Rule], rule_set: RuleSet, missing: Sequence[float], threshold: float
+    rules: Sequence[Rule],
+    rule_set: RuleSet,
+    missing: Sequence[float],
+    threshold: float,
+    influences: Sequence[Influence | None],
 ) -> Columns:
     """What is still missing of each rule.
 
@@ -54,6 +60,7 @@ def enough_columns(
         rule_set: Knows the names.
         missing: What `more_episodes` gives of each.
         threshold: The minimum confidence.
+        influences: The episode that moves the share of each most.
 
     Returns:
         Column name to one value a rule.
@@ -62,9 +69,10 @@ def enough_columns(
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
         "Evidence": [evidence_text(rule) for rule in rules],
-        "Interval": [intervals_text(rule).removeprefix("95 % interval ") for rule in rules],
+        "Interval": [interval_text(rule.held_out) for rule in rules],
         "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
         "Still missing": [more_text(more) for more in missing],
+        "Moved most by": [influence_text(one) for one in influences],
     }
 
 

@@ -7,69 +7,58 @@ from collections.abc import Sequence
 from html import escape
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, MUTED_COLOUR
-from sarl_core.explaining.language import counted, number_text
-from sarl_core.mining.evidence import Interval
-from sarl_core.mining.holding_out import (
-    Verdict,
-    held_out_interval,
-    mined_interval,
-    verdict,
-)
+from sarl_core.explaining.language import counted, number_text, share_text
+from sarl_core.mining.episode_counts import Influence
+from sarl_core.mining.evidence import HeldOut, Interval
+from sarl_core.mining.holding_out import Verdict, verdict
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.stability import Band, RuleStability
 
-VERDICTS: dict[Verdict, str] = {"below": "too low", "open": "open", "reached": "reached"}
+VERDICTS: dict[Verdict, str] = {
+    "below": "too low",
+    "open": "open",
+    "reached": "reached",
+    "unknown": "too few episodes",
+}
 """What each verdict is called on screen."""
 VERDICT_COLOURS: dict[Verdict, str] = {
     "below": INTERVENTION_COLOUR,
     "open": "#4A6FA5",
     "reached": "#2E8B6F",
+    "unknown": MUTED_COLOUR,
 }
-_DIGITS = 4
+MOVES = 0.02
+"""How far one episode has to move a share for it to be worth a word."""
 
 
-def decimal_text(share: float) -> str:
-    """A share as a decimal that never rounds up to one or down to nought.
-
-    Args:
-        share: 0 to 1.
-
-    Returns:
-        As "0.97" or "0.996"; "1" and "0" only where it is that.
-    """
-    if share in (0.0, 1.0):
-        return f"{share:.0f}"
-    for digits in range(2, _DIGITS + 1):
-        text = f"{share:.{digits}f}"
-        if float(text) not in (0.0, 1.0):
-            return text
-    return f"< {10**-_DIGITS:.{_DIGITS}f}" if share < 0.5 else f"> {1 - 10**-_DIGITS:.{_DIGITS}f}"
-
-
-def interval_text(interval: Interval) -> str:
+def range_text(interval: Interval) -> str:
     """An interval of a share.
 
     Args:
         interval: Its ends.
 
     Returns:
-        As "0.84 to 0.95".
+        As "78 to 99 %".
     """
-    return f"{decimal_text(interval.low)} to {decimal_text(interval.high)}"
+    return f"{share_text(interval.low).removesuffix(' %')} to {share_text(interval.high)}"
 
 
 def mined_text(rule: Rule) -> str:
-    """A rule's confidence on what it was mined from, as "0.97 of 412"."""
-    return f"{decimal_text(rule.confidence)} of {rule.samples:,}" if rule.samples else "no states"
+    """A rule's confidence on what it was mined from, as "97 % of 412 states"."""
+    states = counted(rule.samples, "state")
+    return f"{share_text(rule.confidence)} of {states}" if rule.samples else "no states"
 
 
-def held_out_text(rule: Rule) -> str:
-    """A rule's confidence on what was held out, as "0.91 of 96"; "" where nothing was."""
-    if rule.held_out is None:
+def held_out_text(held_out: HeldOut | None) -> str:
+    """What other episodes say, as "91 % in 14 episodes"; "" where nothing was held out."""
+    if held_out is None:
         return ""
-    if not rule.held_out.samples:
+    if not held_out.samples:
         return "no states"
-    return f"{decimal_text(rule.held_out.confidence)} of {rule.held_out.samples:,}"
+    if held_out.share is None:  # an older file counted states alone
+        share = share_text(held_out.correct / held_out.samples)
+        return f"{share} of {counted(held_out.samples, 'state')}"
+    return f"{share_text(held_out.share)} in {counted(held_out.episodes, 'episode')}"
 
 
 def evidence_text(rule: Rule) -> str:
@@ -79,26 +68,78 @@ def evidence_text(rule: Rule) -> str:
         rule: With what was held out, if anything was.
 
     Returns:
-        As "0.97 of 412, held out 0.91 of 96".
+        As "97 % of 412 states; held out: 91 % in 14 episodes (96 states)".
     """
-    held = held_out_text(rule)
-    return f"{mined_text(rule)}, held out {held}" if held else mined_text(rule)
+    held = held_out_text(rule.held_out)
+    if not held:
+        return mined_text(rule)
+    states = ""
+    if rule.held_out is not None and rule.held_out.episodes:
+        states = f" ({counted(rule.held_out.samples, 'state')})"
+    return f"{mined_text(rule)}; held out: {held}{states}"
 
 
-def intervals_text(rule: Rule) -> str:
-    """The 95 % intervals behind `evidence_text`.
+def interval_text(held_out: HeldOut | None) -> str:
+    """The 95 % interval of a mean over episodes.
 
     Args:
-        rule: With what was held out, if anything was.
+        held_out: What was counted, None where nothing was.
 
     Returns:
-        As "95 % interval 0.95 to 0.98, held out 0.84 to 0.95"; "" without a pair.
+        As "78 to 99 %"; "too few episodes" where there is none, "" where nothing was held out.
     """
-    if not rule.samples:
+    if held_out is None:
         return ""
-    text = f"95 % interval {interval_text(mined_interval(rule))}"
-    held = held_out_interval(rule)
-    return f"{text}, held out {interval_text(held)}" if held is not None else text
+    found = held_out.interval
+    return "too few episodes" if found is None else range_text(found)
+
+
+def told_by_episodes(held_out: HeldOut, *, what: str, its: str = "its states") -> str:
+    """What other episodes say, for whoever has never heard of an interval.
+
+    Args:
+        held_out: What was counted.
+        what: Was observed of each episode, as "it was right".
+        its: Of what.
+
+    Returns:
+        As "In 14 episodes that it was not mined from, it was right in 91 % of its states on
+        average, and between 78 and 99 % is what that can tell."
+    """
+    if held_out.share is None:
+        if held_out.samples:
+            share = share_text(held_out.correct / held_out.samples)
+            return (
+                f"Of {counted(held_out.samples, 'state')} that it was not mined from, {what} in "
+                f"{share}; the file does not say in how many episodes."
+            )
+        return "There was no state for it in the episodes that it was not mined from."
+    text = (
+        f"In {counted(held_out.episodes, 'episode')} that it was not mined from, {what} in "
+        f"{share_text(held_out.share)} of {its} on average"
+    )
+    if held_out.interval is None:
+        return f"{text}; {'that is' if held_out.episodes > 1 else 'one is'} too few to say more."
+    low, high = (share_text(end) for end in held_out.interval)
+    return f"{text}, and between {low.removesuffix(' %')} and {high} is what that can tell."
+
+
+def influence_text(found: Influence | None) -> str:
+    """The episode that alone moves a share.
+
+    Args:
+        found: The one that moves it most; None where there are fewer than two.
+
+    Returns:
+        As "without episode 41 (1,000 steps) it would be 71 % instead of 97 %"; "" where none moves
+        it by `MOVES`.
+    """
+    if found is None or found.moves < MOVES:
+        return ""
+    return (
+        f"without episode {found.episode} ({counted(found.steps, 'step')}) it would be "
+        f"{share_text(found.without)} instead of {share_text(found.share)}"
+    )
 
 
 def more_text(more: float) -> str:
@@ -110,6 +151,8 @@ def more_text(more: float) -> str:
     Returns:
         As "12 more episodes".
     """
+    if math.isnan(more):
+        return "too few episodes to say"
     if more == 0:
         return "enough"
     if math.isinf(more):
@@ -127,7 +170,7 @@ def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int
     Returns:
         One count a verdict.
     """
-    counts: dict[Verdict, int] = {"below": 0, "open": 0, "reached": 0}
+    counts: dict[Verdict, int] = dict.fromkeys(VERDICTS, 0)
     for rule in rules:
         counts[verdict(rule, threshold)] += 1
     return counts
@@ -182,43 +225,55 @@ _STYLE = """<style>
 
 
 def evidence_bar(rule: Rule, threshold: float) -> str:
-    """The intervals of a rule as whiskers over one scale, with the minimum confidence marked.
+    """What is known of a rule over one scale, with the minimum confidence marked.
 
     Args:
         rule: With what was held out, if anything was.
         threshold: The minimum confidence.
 
     Returns:
-        HTML without script, styled in place; "" where no pair is the rule's.
+        HTML without script, styled in place: a dot for each share, and for what was held out a
+        whisker, its interval; "" where no pair is the rule's.
     """
     if not rule.samples:
         return ""
-    own, held = mined_interval(rule), held_out_interval(rule)
-    colour = VERDICT_COLOURS[verdict(rule, threshold)]
-    lowest = min(threshold, own.low, *(held[:1] if held is not None else ()))
-    # To the next tenth below, so that whiskers can be told apart where all is near to one.
-    floor = max(math.floor(lowest * 10 - 0.5) / 10, 0.0)
+    held = rule.held_out
+    share = None if held is None else held.share
+    interval = None if held is None else held.interval
+    lowest = min(
+        value
+        for value in (threshold, rule.confidence, share, *(interval or ()))
+        if value is not None
+    )
+    # To the next tenth below, so that dots can be told apart where all is near to one.
+    floor = float(max(math.floor(lowest * 10 - 0.5) / 10, 0.0))
 
     def place(value: float) -> float:
         return 100 * (value - floor) / (1 - floor)
 
-    def line(name: str, interval: Interval, share: float, ink: str, text: str) -> str:
-        low, high = place(interval.low), place(interval.high)
+    def line(name: str, share: float, interval: Interval | None, ink: str, text: str) -> str:
+        whisker = ""
+        if interval is not None:
+            low, high = place(interval.low), place(interval.high)
+            whisker = (
+                f'<i class="w" style="left:{low:.2f}%;width:{high - low:.2f}%;'
+                f'background:{ink}"></i>'
+            )
         return (
             f"<div><b>{escape(name)}</b>"
-            f'<span class="t" title="{escape(interval_text(interval))}">'
-            f'<i class="m" style="left:{place(threshold):.2f}%"></i>'
-            f'<i class="w" style="left:{low:.2f}%;width:{high - low:.2f}%;background:{ink}"></i>'
+            f'<span class="t" title="{escape(text)}">'
+            f'<i class="m" style="left:{place(threshold):.2f}%"></i>{whisker}'
             f'<i class="p" style="left:{place(share):.2f}%;background:{ink}"></i></span>'
             f"<em>{escape(text)}</em></div>"
         )
 
-    mined_ink = MUTED_COLOUR if held is not None else colour
-    lines = [line("mined from", own, rule.confidence, mined_ink, interval_text(own))]
-    if held is not None and rule.held_out is not None:
-        lines.append(line("held out", held, rule.held_out.confidence, colour, interval_text(held)))
+    lines = [line("mined from", rule.confidence, None, MUTED_COLOUR, share_text(rule.confidence))]
+    if share is not None:
+        ink = VERDICT_COLOURS[verdict(rule, threshold)]
+        lines.append(line("held out", share, interval, ink, interval_text(held)))
     scale = (
         f'<div style="opacity:0.6"><b></b><span class="t" style="display:flex;justify-content:'
-        f'space-between;height:auto"><small>{floor:g}</small><small>1</small></span><em></em></div>'
+        f'space-between;height:auto"><small>{share_text(floor)}</small><small>100 %</small></span>'
+        "<em></em></div>"
     )
     return f'{_STYLE}<div class="sarl-sure">{"".join(lines)}{scale}</div>'

@@ -25,6 +25,7 @@ from sarl_core.explaining.language import (
     share_text,
 )
 from sarl_core.files import whole_file
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
@@ -49,8 +50,7 @@ CSV_COLUMNS = (
     "enabled",
     "origin",
     "pinned",
-    "held_out_samples",
-    "held_out_correct",
+    *(f"held_out_{name}" for name in HeldOut._fields),
 )
 
 
@@ -275,8 +275,7 @@ def rules_to_csv(rule_set: RuleSet) -> str:
                 "yes" if rule.enabled else "no",
                 rule.origin,
                 "yes" if rule.pinned else "no",
-                "" if held_out is None else held_out.samples,
-                "" if held_out is None else held_out.correct,
+                *(held_out or [None] * len(HeldOut._fields)),
             )
         )
     return text.getvalue()

@@ -8,6 +8,7 @@ from html import escape
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.edited_sets import edits_counted, is_plain, reading_order
+from sarl_core.explaining.evidence_words import held_out_text, interval_text
 from sarl_core.explaining.export_program import one_line
 from sarl_core.explaining.language import action_text, counted, share_text, threshold_text
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
@@ -95,11 +96,8 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     ]
     if held_out:
         found = rule.held_out
-        cells.append(
-            f"{share_text(found.correct / found.samples)} of {found.samples:,}"
-            if found is not None and found.samples
-            else "–"
-        )
+        told = "–" if found is None or not found.samples else held_out_text(found)
+        cells.append(f"{told} ({interval_text(found)})" if found and found.episodes else told)
     return cells
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.distributions import FeatureRow
+from sarl_core.explaining.evidence_words import range_text
 from sarl_core.explaining.language import (
     action_text,
     counted,
@@ -25,6 +26,7 @@ from sarl_core.explaining.language import (
 from sarl_core.explaining.report_counts import Share, Tally
 from sarl_core.explaining.report_demonstrations import within
 from sarl_core.explaining.report_svg import Scale, evidence_bar, interval_bar
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
 from sarl_core.rollouts.example_frames import ExampleFrame, Examples
 
@@ -38,7 +40,7 @@ class Evidence:
     Attributes:
         source: Of which states, as "that the rule was made from".
         text: As "412 of 425 states (97 %)".
-        interval: In words.
+        interval: What other episodes can tell, in words; "" of those that the rule was made from.
         bar: SVG.
         below: Whether the interval lies below the threshold.
     """
@@ -150,7 +152,7 @@ def rule_card(
         action=action_text(rule.action, dimension),
         tags=tags(rule),
         support=_support(rule, applying, decided, tally),
-        evidence=_evidence(rule, rule_set, tally.shares[index], tally, applying),
+        evidence=_evidence(rule, rule_set, index, tally, applying),
         conditions=tuple(
             _condition(
                 bounds,
@@ -206,46 +208,66 @@ def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
 
 
 def _evidence(
-    rule: Rule, rule_set: RuleSet, here: Share, tally: Tally, applying: int
+    rule: Rule, rule_set: RuleSet, index: int, tally: Tally, applying: int
 ) -> tuple[Evidence, ...]:
     threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
     found = []
     if rule.origin == "mined":
-        found.append(("that the rule was made from", Share(rule.correct, rule.samples)))
+        found.append(_mined(Share(rule.correct, rule.samples), threshold))
     if rule.held_out is not None:
-        held = Share(rule.held_out.correct, rule.held_out.samples)
-        found.append(("of episodes kept aside, which it was not made from", held))
+        source = "of episodes kept aside, which it was not made from"
+        found.append(_tried(source, rule.held_out, threshold))
     if not (tally.same or tally.split) or rule.origin != "mined":
-        decided = "that it decides " if here.whole != applying else ""
-        found.append((f"{decided}of this report's demonstrations", here))
-    return tuple(_evidence_of(name, share, threshold) for name, share in found)
+        here = tally.by_episode[index]
+        decided = "that it decides " if here.samples != applying else ""
+        found.append(_tried(f"{decided}of this report's demonstrations", here, threshold))
+    return tuple(found)
 
 
-def _evidence_of(source: str, share: Share, threshold: float | None) -> Evidence:
-    if not share.whole:
-        return Evidence(source, "0 of 0 states", "nothing is known there", "", below=False)
-    low, high = share.interval
-    below = threshold is not None and high < threshold
+def _states(share: Share) -> str:
     states = "1 state" if share.whole == 1 else f"{share.whole:,} states"
+    return f"{share.part:,} of {states} ({share_text(share.value)})"
+
+
+def _nothing(source: str) -> Evidence:
+    return Evidence(source, "0 of 0 states", "nothing is known there", "", below=False)
+
+
+def _mined(share: Share, threshold: float | None) -> Evidence:
+    """No interval: a rule was chosen for being right there."""
+    source = "that the rule was made from"
+    if not share.whole:
+        return _nothing(source)
+    bar = evidence_bar(share.value, None, below=False, threshold=threshold)
+    return Evidence(source, _states(share), "", bar, below=False)
+
+
+def _tried(source: str, found: HeldOut, threshold: float | None) -> Evidence:
+    if not found.samples:
+        return _nothing(source)
+    interval = found.interval
+    below = threshold is not None and interval is not None and interval.high < threshold
+    if found.share is None:  # an older file counted states alone
+        told, share = (
+            "the file does not say in how many episodes they lie",
+            found.correct / found.samples,
+        )
+    else:
+        share = found.share
+        told = f"{share_text(share)} of its states in an episode, on average over "
+        told += f"{counted(found.episodes, 'episode')}; "
+        told += (
+            "these are too few to say more"
+            if interval is None
+            else f"between {range_text(interval).replace(' to ', ' and ')} is what that can tell"
+        )
     return Evidence(
         source=source,
-        text=f"{share.part:,} of {states} ({share_text(share.value)})",
-        interval=f"the true share probably lies between {_share(low)} and {_share(high)}"
-        + (", below the threshold" if below else ""),
-        bar=evidence_bar(
-            share.value,
-            low,
-            high,
-            below=below,
-            threshold=threshold,
-        ),
+        text=_states(Share(found.correct, found.samples)),
+        interval=f"{told}{', below the threshold' if below else ''}",
+        bar=evidence_bar(share, interval, below=below, threshold=threshold),
         below=below,
     )
-
-
-def _share(value: float) -> str:
-    """An end of an interval: with one decimal, unless that says nothing."""
-    return share_text(value, decimals=1) if 0.0 < value < 1.0 else share_text(value)
 
 
 def _condition(

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.explaining.edited_sets import is_plain
-from sarl_core.mining.evidence import wilson
+from sarl_core.mining.episode_counts import count_applied
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rule_order import Fitted, rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.shielding.shield import Shield
@@ -34,12 +35,6 @@ class Share(NamedTuple):
         """0 to 1; NaN of nothing."""
         return self.part / self.whole if self.whole else float("nan")
 
-    @property
-    def interval(self) -> tuple[float, float]:
-        """The 95 % Wilson interval of the true share; 0 to 1 where nothing was counted."""
-        low, high = wilson(self.part, self.whole)
-        return low, high
-
 
 @dataclass(frozen=True, eq=False)
 class Tally:
@@ -51,6 +46,7 @@ class Tally:
         rules: Index of the rule in force or -1, (N, m) int64.
         labels: What the expert did, (N, m) int64.
         shares: Of each rule, in how many of its states the expert did what it says.
+        by_episode: The same of each rule, counted by episodes.
     """
 
     same: bool
@@ -58,6 +54,7 @@ class Tally:
     rules: NDArray[np.int64]
     labels: NDArray[np.int64]
     shares: tuple[Share, ...]
+    by_episode: tuple[HeldOut, ...]
 
     def covered(self, dimension: int) -> Share:
         """In how many states a rule of a dimension applies."""
@@ -142,15 +139,16 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     inside = found >= 0
     right = inside & (said[np.maximum(found, 0)] == labels)
     count = len(rule_set.rules)
-    samples = np.bincount(found[inside], minlength=count)
-    correct = np.bincount(found[right], minlength=count)
-    shares = tuple(map(Share, correct.tolist(), samples.tolist()))
+    row, _ = np.nonzero(inside)
+    by_episode = count_applied(count, found[inside], row, right[inside], demonstrations).held_out()
+    shares = tuple(Share(one.correct, one.samples) for one in by_episode)
     return Tally(
         same=rule_set.source.digest == demonstrations.digest,
         split=_is_split(rule_set, demonstrations, shares),
         rules=found,
         labels=labels,
         shares=shares,
+        by_episode=tuple(by_episode),
     )
 
 

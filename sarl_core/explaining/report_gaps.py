@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import counted, share_text
-from sarl_core.explaining.report_counts import Share, Tally
+from sarl_core.explaining.report_counts import Tally
 from sarl_core.explaining.report_demonstrations import ActionShares, action_shares
 from sarl_core.explaining.report_svg import NEUTRAL, share_bar
 from sarl_core.mining.contradictions import NEAR, find_contradictions
+from sarl_core.mining.evidence import FEWEST_EPISODES
+from sarl_core.mining.holding_out import verdict
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.example_frames import Examples, Played
 
@@ -117,7 +119,7 @@ def gaps(
             _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
         ),
         contradictions=_contradictions(demonstrations, rule_set.divider),
-        doubts=_doubts(rule_set, numbers),
+        doubts=_doubts(rule_set, demonstrations, tally, numbers),
         beyond=tuple(
             _beyond(one, rule_set, demonstrations, boxed=boxed)
             for one in (examples.played if examples is not None else ())
@@ -160,7 +162,9 @@ def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
     )
 
 
-def _doubts(rule_set: RuleSet, numbers: dict[int, int]) -> tuple[Doubt, ...]:
+def _doubts(
+    rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally, numbers: dict[int, int]
+) -> tuple[Doubt, ...]:
     rules = [
         (index, rule) for index, rule in enumerate(rule_set.rules) if rule.enabled and rule.samples
     ]
@@ -178,27 +182,23 @@ def _doubts(rule_set: RuleSet, numbers: dict[int, int]) -> tuple[Doubt, ...]:
         f"rests on fewer than {FEW_STATES} states: it may be chance.",
         f"rest on fewer than {FEW_STATES} states each: they may be chance.",
     )
+    if tally.same:
+        apart = [
+            index
+            for index, rule in rules
+            if rule.origin == "mined"
+            and 0 < tally.by_episode[index].episodes < FEWEST_EPISODES <= demonstrations.n_episodes
+        ]
+        lie = f"fewer than {FEWEST_EPISODES} of the {demonstrations.n_episodes:,} episodes"
+        doubt(
+            apart,
+            f"has its states in {lie}: it may know those and no other.",
+            f"have their states in {lie}: they may know those and no others.",
+        )
     if rule_set.cut == "thresholds":
         needed = rule_set.thresholds.confidence
-        unsure = [
-            index
-            for index, rule in rules
-            if rule.origin == "mined" and Share(rule.correct, rule.samples).interval[0] < needed
-        ]
         wanted = share_text(needed)
-        doubt(
-            unsure,
-            f"reaches {wanted} in the states it was mined from, but so few that its true share "
-            "may lie lower.",
-            f"reach {wanted} in the states they were mined from, but in so few that their true "
-            "share may lie lower.",
-        )
-        failed = [
-            index
-            for index, rule in rules
-            if rule.held_out is not None
-            and Share(rule.held_out.correct, rule.held_out.samples).interval[1] < needed
-        ]
+        failed = [index for index, rule in rules if verdict(rule, needed) == "below"]
         doubt(
             failed,
             f"does not reach {wanted} in the episodes kept aside.",

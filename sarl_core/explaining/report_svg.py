@@ -66,14 +66,13 @@ def share_bar(share: float, colour: str) -> str:
 
 
 def evidence_bar(
-    share: float, low: float, high: float, *, below: bool, threshold: float | None
+    share: float, interval: tuple[float, float] | None, *, below: bool, threshold: float | None
 ) -> str:
     """A share with its interval, and the threshold it had to reach; said in words beside it.
 
     Args:
         share: 0 to 1.
-        low: Lower end of its interval.
-        high: Upper end.
+        interval: Its lower and upper end; None for none.
         below: Whether the interval lies below the threshold.
         threshold: Marked by a line, None for no line.
 
@@ -83,7 +82,9 @@ def evidence_bar(
     parts = [_box(0, 1, 5, 8, "track"), _box(0, share, 5, 8, fill=BAD if below else NEUTRAL)]
     if threshold is not None:
         parts.append(_line(threshold, 0, 18, "mark"))
-    parts += [_across(low, high, 9, "ink"), _line(low, 5, 13, "ink"), _line(high, 5, 13, "ink")]
+    if interval is not None:
+        low, high = interval
+        parts += [_across(low, high, 9, "ink"), _line(low, 5, 13, "ink"), _line(high, 5, 13, "ink")]
     return _picture("bar", 18, "".join(parts))
 
 

@@ -7,8 +7,8 @@ from html import escape
 from sarl_core.explaining.evidence_words import (
     VERDICT_COLOURS,
     evidence_bar,
-    evidence_text,
-    intervals_text,
+    mined_text,
+    told_by_episodes,
 )
 from sarl_core.explaining.language import counted, sentence, share_text
 from sarl_core.explaining.number_cards import meanings
@@ -78,9 +78,12 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> str:
 
 def _sureness(rule: Rule, threshold: float) -> str:
     """How sure the rule is, on what it was mined from and on what was held out."""
-    words = escape(f"{evidence_text(rule)} · {intervals_text(rule)}")
-    if rule.held_out is not None and verdict(rule, threshold) == "below":
+    told = f"{mined_text(rule)} that it was mined from."
+    if rule.held_out is None:
+        return f'<p class="quiet">{escape(told)}</p>'
+    told += f" {told_by_episodes(rule.held_out, what='it was right')}"
+    if verdict(rule, threshold) == "below":
         # Mixed with the ink of the page, so that it can be read on white and on black.
         ink = f"color-mix(in srgb, {VERDICT_COLOURS['below']} 75%, currentColor)"
-        return f'<p style="color:{ink}">{words}; too low</p>'
-    return f'<p class="quiet">{words}</p>'
+        return f'<p style="color:{ink}">{escape(told)} That is too low.</p>'
+    return f'<p class="quiet">{escape(told)}</p>'

@@ -1,15 +1,25 @@
-"""What a rule carries of the pairs behind it: where they lay, and what others say of it."""
+"""What a rule carries of the pairs behind it: where they lay, and what others say of it.
+
+Others count by episodes. Steps of one episode are alike, and one long episode can outweigh all the
+rest, so no interval over steps can know how the next episode will be. Of each episode there is one
+number, the share of its states in which the expert did what the rule says; the mean of these
+numbers is what is told, and how far they spread says how sure it is.
+"""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Z_95 = 1.959963984540054
-"""The normal distribution's 97.5 % quantile: 95 % lie within so many standard deviations."""
+FEWEST_EPISODES = 5
+"""Episodes below which nothing is said of where a share lies."""
+_PSEUDO = 0.5
+"""Share of the one episode that is added to those there are. Ten episodes of one share would else
+leave no doubt at all about the eleventh."""
+
+Floats = NDArray[np.float64]
 
 
 class DataBox(NamedTuple):
@@ -28,23 +38,6 @@ class DataBox(NamedTuple):
     most: tuple[float, ...]
 
 
-class HeldOut(NamedTuple):
-    """A rule on episodes that it was not mined from.
-
-    Attributes:
-        samples: Pairs to which it applies.
-        correct: Those of them that carry its label.
-    """
-
-    samples: int
-    correct: int
-
-    @property
-    def confidence(self) -> float:
-        """Share of its pairs that carry its label, NaN where there are none."""
-        return self.correct / self.samples if self.samples else float("nan")
-
-
 class Interval(NamedTuple):
     """Where a share probably lies.
 
@@ -57,48 +50,135 @@ class Interval(NamedTuple):
     high: float
 
 
-def wilson_bounds(
-    correct: ArrayLike, samples: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The 95 % Wilson score intervals of many shares at once.
+class HeldOut(NamedTuple):
+    """A rule, or a whole rule set, on episodes that it was not mined from.
+
+    Attributes:
+        samples: Pairs that count: to which it applies.
+        correct: Those of them that it is right about.
+        episodes: In how many episodes they lie; 0 beside pairs where an older file did not say.
+        share: The mean over these episodes of the share that is right in each; None without any.
+        low: Lower end of the 95 % interval of that mean over all episodes there could be; None
+            where there are fewer than `FEWEST_EPISODES`.
+        high: Upper end.
+    """
+
+    samples: int
+    correct: int
+    episodes: int
+    share: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def interval(self) -> Interval | None:
+        """Both ends; None where there are too few episodes."""
+        return None if self.low is None or self.high is None else Interval(self.low, self.high)
+
+
+class EpisodeSums(NamedTuple):
+    """What is added up over episodes, of many things at once; arrays of one shape.
+
+    Attributes:
+        episodes: Number of episodes that count.
+        total: Sum of their shares.
+        squares: Sum of the squares of these.
+    """
+
+    episodes: NDArray[np.int64]
+    total: Floats
+    squares: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Mean share of an episode; NaN without any."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.total / self.episodes)
+
+    def bounds(self, *, widened: float = 1.0) -> tuple[Floats, Floats]:
+        """The 95 % t interval of the mean, with one pseudo-episode at 0.5.
+
+        Args:
+            widened: How many times wider, where the shares depend on one another.
+
+        Returns:
+            Lower and upper ends within 0 and 1; NaN with fewer than `FEWEST_EPISODES`.
+        """
+        n = np.asarray(self.episodes + 1.0)
+        mean = np.asarray((self.total + _PSEUDO) / n)
+        spread: Floats = np.maximum(self.squares + _PSEUDO**2 - n * mean**2, 0.0)
+        reach = widened * t_reach(n, spread)
+        enough = self.episodes >= FEWEST_EPISODES
+        low = np.where(enough, np.clip(mean - reach, 0.0, 1.0), np.nan)
+        high = np.where(enough, np.clip(mean + reach, 0.0, 1.0), np.nan)
+        return low, high
+
+
+def t_reach(n: Floats, spread: Floats) -> Floats:
+    """How far a 95 % t interval reaches to either side of a mean.
 
     Args:
-        correct: Hits, any shape; a fraction of a hit is allowed.
-        samples: Trials, likewise.
+        n: How many numbers it is the mean of, any shape.
+        spread: Sum of their squared distances from it.
 
     Returns:
-        Lower and upper ends; 0 and 1 where there is no trial, since nothing is known then.
+        The same shape; infinity with one number.
     """
-    hits, trials = (np.asarray(values, dtype=np.float64) for values in (correct, samples))
-    n = np.maximum(trials, 1.0)
-    share = hits / n
-    square = Z_95**2
-    centre = (share + square / (2 * n)) / (1 + square / n)
-    reach = Z_95 / (1 + square / n) * np.sqrt(share * (1 - share) / n + square / (4 * n**2))
-    # All or none of them: that end is the share itself, whatever the rounding says.
-    low = np.where(hits <= 0, 0.0, np.maximum(centre - reach, 0.0))
-    high = np.where(hits >= trials, 1.0, np.minimum(centre + reach, 1.0))
-    return np.where(trials > 0, low, 0.0), np.where(trials > 0, high, 1.0)
+    from scipy.special import stdtrit  # takes its time; most programs need none
+
+    freedom = np.maximum(n - 1.0, 1.0)
+    reach = stdtrit(freedom, 0.975) * np.sqrt(spread / freedom / np.maximum(n, 1.0))
+    return np.where(n > 1.0, reach, np.inf)
 
 
-def wilson(correct: float, samples: float) -> Interval:
-    """The 95 % Wilson score interval of one share, as `wilson_bounds`.
+def held_out_of(samples: ArrayLike, correct: ArrayLike, *, widened: float = 1.0) -> HeldOut:
+    """Count one thing by episodes.
 
     Args:
-        correct: Hits.
-        samples: Trials.
+        samples: Pairs that count in each episode, (E,); where there are none, it does not count.
+        correct: Those of them that are right, (E,).
+        widened: As of `EpisodeSums.bounds`.
 
     Returns:
-        0 to 1 without a trial.
+        The mean over the episodes with its interval.
     """
-    if not samples > 0:
-        return Interval(0.0, 1.0)
-    # Written again for single numbers: arrays of one take thirty times as long.
-    share, square = correct / samples, Z_95**2
-    centre = (share + square / (2 * samples)) / (1 + square / samples)
-    spread = share * (1 - share) / samples + square / (4 * samples**2)
-    reach = Z_95 / (1 + square / samples) * math.sqrt(spread)
-    return Interval(
-        0.0 if correct <= 0 else max(centre - reach, 0.0),
-        1.0 if correct >= samples else min(centre + reach, 1.0),
+    pairs, right = np.asarray(samples, dtype=np.int64), np.asarray(correct, dtype=np.int64)
+    shares = right[pairs > 0] / pairs[pairs > 0]
+    sums = EpisodeSums(
+        np.array([len(shares)]), np.array([shares.sum()]), np.array([np.square(shares).sum()])
     )
+    return held_outs([int(pairs.sum())], [int(right.sum())], sums, widened=widened)[0]
+
+
+def held_outs(
+    samples: list[int], correct: list[int], sums: EpisodeSums, *, widened: float = 1.0
+) -> list[HeldOut]:
+    """Count many things by episodes.
+
+    Args:
+        samples: Pairs that count for each, R numbers.
+        correct: Those of them that are right.
+        sums: Over the episodes of each, (R,).
+        widened: As of `EpisodeSums.bounds`.
+
+    Returns:
+        One entry each.
+    """
+    low, high = sums.bounds(widened=widened)
+    return [
+        HeldOut(
+            all_pairs,
+            right,
+            episodes,
+            min(total / episodes, 1.0) if episodes else None,
+            *((None, None) if episodes < FEWEST_EPISODES else ends),
+        )
+        for all_pairs, right, episodes, total, ends in zip(
+            samples,
+            correct,
+            sums.episodes.tolist(),
+            sums.total.tolist(),
+            zip(low.tolist(), high.tolist(), strict=True),
+            strict=True,
+        )
+    ]

@@ -11,17 +11,20 @@ from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.applying import applications, labels_of
-from sarl_core.mining.evidence import Z_95, HeldOut, Interval, wilson
-from sarl_core.mining.landscape import NodeCounts
+from sarl_core.mining.episode_counts import EpisodeCounts, count_nodes, count_rules
+from sarl_core.mining.evidence import FEWEST_EPISODES, HeldOut, t_reach
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.tree import PolicyTree
 
-Verdict = Literal["below", "open", "reached"]
+Verdict = Literal["below", "open", "reached", "unknown"]
+Floats = NDArray[np.float64]
+
+_MOST_EPISODES = 2.0**30
 
 
 class Split(NamedTuple):
@@ -84,23 +87,11 @@ def with_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
         InputError: If the rules are for other features or actions.
     """
     rule_set = rules_for(rule_set, held_out).rule_set
-    shown = labels_of(rule_set, held_out)
-    found = applications(rule_set, held_out.observations)
-    count = len(rule_set.rules)
-    dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
-    says = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
-    right = shown[found.row, dimension[found.rule]] == says[found.rule]
-    samples = np.bincount(found.rule, minlength=count)
-    correct = np.bincount(found.rule[right], minlength=count)
+    found = count_rules(rule_set, held_out).held_out()
     return replace(
         rule_set,
         rules=tuple(
-            replace(rule, held_out=HeldOut(*numbers))
-            for rule, numbers in zip(
-                rule_set.rules,
-                zip(samples.tolist(), correct.tolist(), strict=True),
-                strict=True,
-            )
+            replace(rule, held_out=one) for rule, one in zip(rule_set.rules, found, strict=True)
         ),
     )
 
@@ -129,7 +120,9 @@ def with_untried_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSe
     )
 
 
-def count_held_out(trees: Sequence[PolicyTree], held_out: Demonstrations) -> tuple[NodeCounts, ...]:
+def count_held_out(
+    trees: Sequence[PolicyTree], held_out: Demonstrations
+) -> tuple[EpisodeCounts, ...]:
     """Send other pairs down trees and count them at every node, for the landscape.
 
     Args:
@@ -139,57 +132,32 @@ def count_held_out(trees: Sequence[PolicyTree], held_out: Demonstrations) -> tup
     Returns:
         One entry a tree.
     """
-    return tuple(_count(tree, held_out) for tree in trees)
-
-
-def _count(tree: PolicyTree, held_out: Demonstrations) -> NodeCounts:
-    n, n_labels = tree.n_nodes, tree.dimension.n_labels
-    labels = tree.dimension.labels_of(held_out.action_columns[:, tree.index])
-    counts = np.bincount(
-        tree.apply(held_out.observations) * n_labels + labels, minlength=n * n_labels
-    ).reshape(n, n_labels)
-    for depth in range(int(tree.depth.max()), 0, -1):
-        level = np.flatnonzero(tree.depth == depth)
-        np.add.at(counts, tree.parent[level], counts[level])
-    correct = np.take_along_axis(counts, tree.label[:, None], axis=1)[:, 0]
-    return NodeCounts(counts.sum(axis=1), correct)
+    return tuple(count_nodes(tree, held_out) for tree in trees)
 
 
 # --- how sure one can be ------------------------------------------------------------------------
-
-
-def mined_interval(rule: Rule) -> Interval:
-    """The 95 % Wilson interval of a rule's confidence on what it was mined from.
-
-    It flatters: the rule was chosen for this confidence.
-    """
-    return wilson(rule.correct, rule.samples)
-
-
-def held_out_interval(rule: Rule) -> Interval | None:
-    """The same on what was held out; None where nothing was, or no pair of it is the rule's."""
-    if rule.held_out is None or not rule.held_out.samples:
-        return None
-    return wilson(rule.held_out.correct, rule.held_out.samples)
+# What a rule was mined from says nothing here: the rule was chosen for being right there.
 
 
 def lower_bound(rule: Rule) -> float:
-    """Lower end of the held-out interval; where there is none, of that of the mined pairs."""
-    return (held_out_interval(rule) or mined_interval(rule)).low
+    """Lower end of the held-out interval; 0 where there is none, since nothing is known then."""
+    return 0.0 if rule.held_out is None else rule.held_out.low or 0.0
 
 
 def verdict(rule: Rule, threshold: float) -> Verdict:
-    """What the evidence says of a rule's confidence.
+    """What the held-out episodes say of a rule's confidence.
 
     Args:
         rule: With what was held out, if anything was.
         threshold: The minimum confidence.
 
     Returns:
-        "below" if the whole interval lies below the threshold, "reached" if none of it does, and
-        "open" between the two. Without held-out pairs it is the mined pairs' interval.
+        "below" if the whole interval lies below the threshold, "reached" if none of it does,
+        "open" between the two, and "unknown" where there is no interval.
     """
-    interval = held_out_interval(rule) or mined_interval(rule)
+    interval = None if rule.held_out is None else rule.held_out.interval
+    if interval is None:
+        return "unknown"
     if interval.high < threshold:
         return "below"
     return "reached" if interval.low >= threshold else "open"
@@ -199,11 +167,11 @@ def with_lower_bound(rule_set: RuleSet, least: float) -> RuleSet:
     """Keep the rules of whose confidence one can be sure.
 
     Args:
-        rule_set: With what was held out, if anything was.
+        rule_set: With what was held out.
         least: Of the `lower_bound`, 0 to 1.
 
     Returns:
-        The rules that reach it, in their order.
+        The rules that reach it, in their order; all of them at 0.
 
     Raises:
         InputError: If the bound is no share.
@@ -215,46 +183,78 @@ def with_lower_bound(rule_set: RuleSet, least: float) -> RuleSet:
     )
 
 
-def pairs_needed(confidence: float, threshold: float) -> float:
-    """Pairs after which the lower end of the interval reaches a threshold.
-
-    Wilson's ends are where (confidence - end)^2 = z^2 end (1 - end) / n, which gives n.
+def episodes_needed(share: Floats, spread: Floats, threshold: float) -> Floats:
+    """Episodes after which the lower end of the interval reaches a threshold.
 
     Args:
-        confidence: Share of the pairs that are right, and stays so.
+        share: Mean share of an episode, which stays so, (R,).
+        spread: Variance of these shares between episodes, which stays so too, (R,).
         threshold: To be reached.
 
     Returns:
-        A number that need not be whole; infinity where it is never reached.
+        Whole numbers; infinity where it is never reached, or not within `_MOST_EPISODES`.
     """
-    if threshold <= 0.0:
-        return 0.0
-    if confidence <= threshold:
-        return float("inf")
-    return Z_95**2 * threshold * (1.0 - threshold) / (confidence - threshold) ** 2
+    apart = np.square(share - 0.5)
+
+    def reached(n: Floats) -> NDArray[np.bool_]:
+        mean = (n * share + 0.5) / (n + 1.0)
+        squares = (n - 1.0) * spread + n / (n + 1.0) * apart
+        return np.asarray(mean - t_reach(n + 1.0, squares) >= threshold)
+
+    low = np.full(share.shape, float(FEWEST_EPISODES - 1))  # never enough
+    high = np.full(share.shape, _MOST_EPISODES)
+    never = ~reached(high)
+    while (high - low > 1.0).any():
+        middle = np.floor((low + high) / 2.0)
+        enough = reached(middle)
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.where(never, np.inf, high)
 
 
-def more_episodes(rule: Rule, episodes: int, threshold: float) -> float:
-    """Episodes still missing until the `lower_bound` reaches a threshold, at the present rate.
+def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tuple[float, ...]:
+    """Episodes still missing until each `lower_bound` reaches a threshold, at the present rate.
 
-    Every further episode is taken to bring as many pairs of the rule as one did so far, as often
-    right as so far. Of episodes held out, only the same share is held out again.
+    Of every further episodes, the same share is held out, and a rule applies in the same share of
+    those; it is right in them as often as so far, and as unevenly.
 
     Args:
-        rule: With what was held out, if anything was.
+        rules: With what was held out.
         episodes: Demonstrated so far, the held-out ones among them.
         threshold: The minimum confidence.
 
     Returns:
-        A whole number; infinity where it is never reached at this rate.
+        Whole numbers, 0 where it is reached; infinity where it never is at this rate, and NaN
+        where too few episodes were held out to say.
     """
-    tried = rule.held_out if rule.held_out is not None and rule.held_out.samples else None
-    samples, correct = tried if tried is not None else (rule.samples, rule.correct)
-    if not samples:
-        return float("inf")
-    if lower_bound(rule) >= threshold:
-        return 0.0
-    missing = pairs_needed(correct / samples, threshold) - samples
-    if not np.isfinite(missing):
-        return float("inf")
-    return max(float(np.ceil(missing * episodes / samples)), 1.0)
+    found = np.full(len(rules), np.nan)
+    known = [
+        (place, rule.held_out, rule.held_out.share)
+        for place, rule in enumerate(rules)
+        if rule.held_out is not None
+        and rule.held_out.share is not None
+        and rule.held_out.interval is not None
+    ]
+    if not known:
+        return tuple(found.tolist())
+    place = [at for at, _, _ in known]
+    share = np.array([share for _, _, share in known])
+    there = np.array([held.episodes for _, held, _ in known], dtype=np.float64)
+    spread = np.array([_spread(held) for _, held, _ in known])
+    missing = episodes_needed(share, spread, threshold) - there
+    more = np.maximum(np.ceil(missing * episodes / there), 1.0)
+    sure = np.array([(held.low or 0.0) >= threshold for _, held, _ in known])
+    found[place] = np.where(sure, 0.0, more)
+    return tuple(found.tolist())
+
+
+def _spread(held: HeldOut) -> float:
+    """Variance between the shares of the episodes, which its interval tells."""
+    n, share = float(held.episodes), float(held.share or 0.0)
+    low, high = float(held.low or 0.0), 1.0 if held.high is None else held.high
+    mean = (n * share + 0.5) / (n + 1.0)
+    if low <= 0.0 and high >= 1.0:
+        return share * (1.0 - share) * n / (n - 1.0)  # both ends are cut off: the most there can be
+    reach = mean - low if low > 0.0 else high - mean
+    one = float(t_reach(np.array(n + 1.0), np.array(1.0)))
+    squares = (reach / one) ** 2 - n / (n + 1.0) * (share - 0.5) ** 2
+    return max(squares, 0.0) / (n - 1.0)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.episode_counts import EpisodeCounts
+from sarl_core.mining.evidence import EpisodeSums
 from sarl_core.mining.tree import PolicyTree, highest_above
 
 Floats = NDArray[np.float64]
@@ -22,6 +25,8 @@ Floats = NDArray[np.float64]
 # The grid of the paper's Figures 2 and 3. Written as quotients, so that 0.15 is 0.15.
 PAPER_SUPPORTS: Floats = np.arange(11) / 20
 PAPER_CONFIDENCES: Floats = np.arange(21) / 20
+
+_CELLS_AT_ONCE = 2_000_000  # of the planes of some episodes: 32 MB
 
 
 class Rectangles(NamedTuple):
@@ -55,7 +60,10 @@ class Landscape:
         fidelity: Share of the covered pairs whose label the rule gives; NaN where none is
             covered.
         dimensions: The same for each action dimension alone; () in such a part itself.
-        held_out_fidelity: As `fidelity`, over pairs held out; None where none were given.
+        held_out_fidelity: The same over pairs held out, as a mean over their episodes; None where
+            none were given.
+        held_out_low: Lower end of its 95 % interval, NaN where too few episodes are covered.
+        held_out_high: Upper end.
     """
 
     supports: Floats
@@ -66,6 +74,8 @@ class Landscape:
     fidelity: Floats
     dimensions: tuple[Landscape, ...] = ()
     held_out_fidelity: Floats | None = None
+    held_out_low: Floats | None = None
+    held_out_high: Floats | None = None
 
 
 def rule_rectangles(
@@ -111,7 +121,7 @@ def threshold_landscape(
     *,
     lift_min: float = 0.0,
     max_depth: int | None = None,
-    held_out: Sequence[NodeCounts] | None = None,
+    held_out: Sequence[EpisodeCounts] | None = None,
 ) -> Landscape:
     """Count, measure and test the rule sets of every cell of a threshold grid, in one pass.
 
@@ -135,32 +145,24 @@ def threshold_landscape(
         raise InputError("there is no tree to draw a landscape of; grow the trees first")
     supports = _axis(supports, "supports")
     confidences = _axis(confidences, "confidences")
-    counted = [None] * len(trees) if held_out is None else list(held_out)
-    sums = [
-        _sums(tree, supports, confidences, lift_min, max_depth, other)
-        for tree, other in zip(trees, counted, strict=True)
+    places = [
+        _places(tree, supports, confidences, lift_min=lift_min, max_depth=max_depth)
+        for tree in trees
     ]
+    shape = len(supports), len(confidences)
+    sums = [_sums(tree, one, shape) for tree, one in zip(trees, places, strict=True)]
+    tried: list[EpisodeSums] | list[None] = [None] * (len(trees) + 1)
+    if held_out is not None:
+        tried = _tried(trees, places, held_out, shape)
     parts = tuple(
-        _layers(supports, confidences, one, tree.source.steps)
-        for one, tree in zip(sums, trees, strict=True)
+        _layers(supports, confidences, one, tree.source.steps, other)
+        for one, tree, other in zip(sums, trees, tried[1:], strict=True)
     )
     if len(parts) == 1:
         return replace(parts[0], dimensions=parts)
     total = np.sum(sums, axis=0)
     steps = sum(tree.source.steps for tree in trees)
-    return replace(_layers(supports, confidences, total, steps), dimensions=parts)
-
-
-class NodeCounts(NamedTuple):
-    """Other pairs at the nodes of a tree.
-
-    Attributes:
-        samples: Pairs that reach each node, (n,).
-        correct: Those of them that carry its label, (n,).
-    """
-
-    samples: NDArray[np.int64]
-    correct: NDArray[np.int64]
+    return replace(_layers(supports, confidences, total, steps, tried[0]), dimensions=parts)
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:
@@ -171,48 +173,133 @@ def _axis(values: ArrayLike, name: str) -> Floats:
     return axis
 
 
-def _sums(
+class _Places(NamedTuple):
+    """Where on the grid k nodes are rules: cells of a plane that is one column wider than it.
+
+    Attributes:
+        node: Node numbers, (k,).
+        enters: Cell of the largest support from which on the node counts, (k,).
+        leaves: Cell from which on it does no longer, (k,).
+    """
+
+    node: NDArray[np.int64]
+    enters: NDArray[np.int64]
+    leaves: NDArray[np.int64]
+
+
+def _places(
     tree: PolicyTree,
     supports: Floats,
     confidences: Floats,
+    *,
     lift_min: float,
     max_depth: int | None,
-    held_out: NodeCounts | None,
-) -> NDArray[np.int64]:
-    """Rules, queries, pairs covered and right; these two held out, if any; (4 or 6, S, C)."""
+) -> _Places:
     rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
     # Row s is inside while s <= support; column c while above < c <= confidence.
     rows = np.searchsorted(supports, rectangles.support, side="right")
     first = np.searchsorted(confidences, rectangles.above, side="right")
     last = np.searchsorted(confidences, rectangles.confidence, side="right")
     inside = (rows > 0) & (first < last)
-    node, rows = rectangles.node[inside], rows[inside] - 1
-    first, last = first[inside], last[inside]
-    width = len(confidences) + 1  # one more column, for rectangles that reach the right edge
-    enters, leaves = rows * width + first, rows * width + last
-    each = np.ones(len(node), dtype=np.int64)
-    weights = [each, tree.depth[node], tree.samples[node], tree.correct[node]]
-    if held_out is not None:
-        weights += [held_out.samples[node], held_out.correct[node]]
-    planes = np.zeros((len(weights), len(supports), width), dtype=np.int64)
-    for plane, weight in zip(planes.reshape(len(weights), -1), weights, strict=True):
-        np.add.at(plane, enters, weight)
-        np.subtract.at(plane, leaves, weight)
+    row = (rows[inside] - 1) * (len(confidences) + 1)  # room for those that reach the right edge
+    return _Places(rectangles.node[inside], row + first[inside], row + last[inside])
+
+
+def _summed(planes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sum what enters and leaves over the last two axes, (..., S, C + 1) to (..., S, C)."""
     # Along confidence from the left; along support from the largest downwards, because every
     # rectangle begins at support 0. In place: fresh memory is what would cost the time.
-    np.cumsum(planes, axis=2, out=planes)
-    from_top = planes[:, ::-1]
-    np.cumsum(from_top, axis=1, out=from_top)
-    return planes[:, :, :-1]
+    np.cumsum(planes, axis=-1, out=planes)
+    from_top = planes[..., ::-1, :]
+    np.cumsum(from_top, axis=-2, out=from_top)
+    return planes[..., :-1]
+
+
+def _sums(tree: PolicyTree, places: _Places, shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Rules, queries, pairs covered and right, (4, S, C)."""
+    node = places.node
+    each = np.ones(len(node), dtype=np.int64)
+    weights = [each, tree.depth[node], tree.samples[node], tree.correct[node]]
+    planes = np.zeros((len(weights), shape[0], shape[1] + 1), dtype=np.int64)
+    for plane, weight in zip(planes.reshape(len(weights), -1), weights, strict=True):
+        np.add.at(plane, places.enters, weight)
+        np.subtract.at(plane, places.leaves, weight)
+    return _summed(planes)
+
+
+def _tried(
+    trees: Sequence[PolicyTree],
+    places: Sequence[_Places],
+    held_out: Sequence[EpisodeCounts],
+    shape: tuple[int, int],
+) -> list[EpisodeSums]:
+    """What other episodes say of every cell: of all dimensions together, and of each."""
+    layers = [
+        EpisodeSums(np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape))
+        for _ in range(len(trees) + 1)
+    ]
+    entries = []
+    for tree, one, counts in zip(trees, places, held_out, strict=True):
+        place = np.full(tree.n_nodes, -1)
+        place[one.node] = np.arange(len(one.node))
+        found = place[counts.thing]
+        by_episode = np.flatnonzero(found >= 0)
+        by_episode = by_episode[np.argsort(counts.episode[by_episode], kind="stable")]
+        entries.append((counts, by_episode, found))
+    count = len(held_out[0].numbers)
+    at_once = max(_CELLS_AT_ONCE // (shape[0] * (shape[1] + 1)), 1)
+    for start, end in pairwise([*range(0, count, at_once), count]):
+        together = np.zeros((2, end - start, *shape), dtype=np.int64)
+        for number, (one, (counts, rows, found)) in enumerate(
+            zip(places, entries, strict=True), start=1
+        ):
+            first, last = np.searchsorted(counts.episode[rows], [start, end])
+            planes = _planes(one, counts, rows[first:last], found, start, together.shape)
+            _add(layers[number], planes)
+            together += planes
+        _add(layers[0], together)
+    return layers
+
+
+def _planes(
+    places: _Places,
+    counts: EpisodeCounts,
+    rows: NDArray[np.int64],
+    found: NDArray[np.int64],
+    start: int,
+    shape: tuple[int, ...],
+) -> NDArray[np.int64]:
+    """Pairs covered and right in some episodes, (2, episodes, S, C)."""
+    planes = np.zeros((*shape[:3], shape[3] + 1), dtype=np.int64)
+    first = (counts.episode[rows] - start) * (shape[2] * (shape[3] + 1))
+    node = found[rows]
+    for plane, weight in zip(
+        planes.reshape(2, -1), (counts.samples[rows], counts.correct[rows]), strict=True
+    ):
+        np.add.at(plane, first + places.enters[node], weight)
+        np.subtract.at(plane, first + places.leaves[node], weight)
+    return _summed(planes)
+
+
+def _add(layer: EpisodeSums, planes: NDArray[np.int64]) -> None:
+    samples, correct = planes
+    shares = correct / np.maximum(samples, 1)
+    layer.episodes[...] += (samples > 0).sum(axis=0)
+    layer.total[...] += shares.sum(axis=0)
+    layer.squares[...] += np.square(shares).sum(axis=0)
 
 
 def _layers(
-    supports: Floats, confidences: Floats, sums: NDArray[np.int64], steps: int
+    supports: Floats,
+    confidences: Floats,
+    sums: NDArray[np.int64],
+    steps: int,
+    tried: EpisodeSums | None,
 ) -> Landscape:
-    rules, length, covered, correct, *held_out = sums
+    rules, length, covered, correct = sums
     with np.errstate(invalid="ignore"):
         fidelity = correct / covered
-        held_out_fidelity = held_out[1] / held_out[0] if held_out else None
+    low, high = (None, None) if tried is None else tried.bounds()
     return Landscape(
         supports=supports,
         confidences=confidences,
@@ -220,7 +307,9 @@ def _layers(
         mean_length=np.divide(length, rules, out=np.zeros(rules.shape), where=rules > 0),
         coverage=covered / steps,
         fidelity=fidelity,
-        held_out_fidelity=held_out_fidelity,
+        held_out_fidelity=None if tried is None else tried.mean,
+        held_out_low=low,
+        held_out_high=high,
     )
 
 

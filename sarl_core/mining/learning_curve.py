@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.holding_out import with_held_out
+from sarl_core.mining.cross_fitting import judge
+from sarl_core.mining.episode_counts import count_rules
 from sarl_core.mining.progress import Progress
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tasks import run_each
@@ -28,8 +29,8 @@ class CurvePoint(NamedTuple):
         rules: Number of rules.
         mean_length: Mean number of queries a rule.
         coverage: Share of the pairs mined from to which a rule applies.
-        fidelity: Share of the covered pairs of other episodes whose label the rule gives; NaN
-            where there are no such pairs.
+        fidelity: Share of the covered pairs of another episode whose label the rule gives, on
+            average over these; NaN where none is covered.
     """
 
     rules: int
@@ -47,8 +48,8 @@ class LearningCurve:
         rules: Number of rules, (orders, P).
         mean_length: Mean number of queries a rule, (orders, P).
         coverage: Share of the pairs mined from to which a rule applies, (orders, P).
-        fidelity: Share right of the covered pairs of other episodes, (orders, P), NaN where
-            there are none.
+        fidelity: Share right of the covered pairs of another episode, on average, (orders, P), NaN
+            where none is covered.
         tried_on: Whether these are the episodes held out, or those that come later in the order.
     """
 
@@ -175,7 +176,6 @@ def curve_point(
     )
     fidelity = float("nan")
     if rest is not None and mined.rules:
-        tried = [rule.held_out for rule in with_held_out(mined, rest).rules]
-        samples, correct = np.sum([one for one in tried if one is not None], axis=0)
-        fidelity = float(correct / samples) if samples else fidelity
+        share = judge(mined, count_rules(mined, rest)).fidelity.share
+        fidelity = fidelity if share is None else share
     return CurvePoint(len(mined), mined.mean_length, mined.coverage, fidelity)

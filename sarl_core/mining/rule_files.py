@@ -17,7 +17,9 @@ from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
-VERSION = 1
+VERSIONS = (1, 2)
+"""Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
+version 1, which is what it was before there was another."""
 _MAX_BYTES = 256 * 2**20
 _LARGEST = sys.float_info.max
 _MOST = 2**53  # whole numbers up to here are exact in floating point too
@@ -59,10 +61,10 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
             f"{name} is not a rule file (its format is not {FORMAT!r}); give one that `mine` wrote"
         )
     version = document.get("version")
-    if version != VERSION:
+    if isinstance(version, bool) or version not in VERSIONS:
         raise InputError(
             f"{name} has version {_shown(version)} of the rule format, and this program reads "
-            f"version {VERSION}; use a program of its version"
+            f"versions {VERSIONS[0]} to {VERSIONS[-1]}; use a program of its version"
         )
     return _rule_set(_Reader(document, name, ""))
 
@@ -107,7 +109,7 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
     source, thresholds = rule_set.source, rule_set.thresholds
     return {
         "format": FORMAT,
-        "version": VERSION,
+        "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
         "env_id": source.env_id,
         "features": [{"name": f.name, "unit": f.unit} for f in source.features],
         "actions": [_action(action) for action in rule_set.actions],
@@ -217,6 +219,12 @@ class _Reader:
         self._value.pop(key, None)
         return None
 
+    def share(self, key: str) -> float | None:
+        if self._value.get(key, ...) is not None:
+            return self.number(key, low=0, high=1)
+        self.take(key, type(None))
+        return None
+
     def parts(self, key: str) -> list[_Reader]:
         place = f"{self._place} {key}".strip()
         return [
@@ -259,7 +267,7 @@ def _shown(value: object) -> str:
 
 def _rule_set(document: _Reader) -> RuleSet:
     document.take("format", str)
-    document.take("version", int)
+    version: int = document.take("version", int)
     features = tuple(_read_feature(part) for part in document.parts("features"))
     actions = tuple(_read_action(part) for part in document.parts("actions"))
     if not features or not actions:
@@ -269,7 +277,8 @@ def _rule_set(document: _Reader) -> RuleSet:
     steps = demonstrations.count("steps", low=1)
     rule_set = RuleSet(
         rules=tuple(
-            _read_rule(part, len(features), actions, steps) for part in document.parts("rules")
+            _read_rule(part, len(features), actions, steps, version)
+            for part in document.parts("rules")
         ),
         actions=actions,
         source=Source(
@@ -341,7 +350,11 @@ def _read_action(part: _Reader) -> LabelledDimension:
 
 
 def _read_rule(
-    part: _Reader, n_features: int, actions: tuple[LabelledDimension, ...], steps: int
+    part: _Reader,
+    n_features: int,
+    actions: tuple[LabelledDimension, ...],
+    steps: int,
+    version: int,
 ) -> Rule:
     conditions = []
     for entry in part.parts("conditions"):
@@ -379,7 +392,7 @@ def _read_rule(
         demonstrated_value=value,
         pinned=part.take("pinned", bool, False),
         box=_read_box(part.part("box"), n_features) if part.has("box") else None,
-        held_out=_read_held_out(part.part("held_out")) if part.has("held_out") else None,
+        held_out=_read_held_out(part.part("held_out"), version) if part.has("held_out") else None,
     )
     part.finish()
     return rule
@@ -394,8 +407,24 @@ def _read_box(part: _Reader, n_features: int) -> DataBox:
     return box
 
 
-def _read_held_out(part: _Reader) -> HeldOut:
+def _read_held_out(part: _Reader, version: int) -> HeldOut:
     samples = part.count("samples")
-    found = HeldOut(samples, part.count("correct", high=samples))
+    correct = part.count("correct", high=samples)
+    if version == 1:  # in how many episodes, it did not say
+        part.finish()
+        return HeldOut(samples, correct, 0, None, None, None)
+    found = HeldOut(
+        samples,
+        correct,
+        part.count("episodes", high=samples),
+        part.share("share"),
+        part.share("low"),
+        part.share("high"),
+    )
     part.finish()
+    if (found.share is None) != (found.episodes == 0):
+        raise part.fail("'share' does not match its episodes")
+    low, high = found.low, found.high
+    if (low is None) != (high is None) or (low is not None and high is not None and low > high):
+        raise part.fail("'low' and 'high' are no interval")
     return found
