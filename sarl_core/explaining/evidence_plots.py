@@ -113,7 +113,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
 def _within(share: float, interval: Interval) -> str:
     """Where a share stands in its interval, from the lower end up."""
     width = interval.high - interval.low
-    return f"{100 * (share - interval.low) / width if width else 50:.1f}%"
+    return f"{100 * (share - interval.low) / width if width else 0:.1f}%"
 
 
 def _tip(rule: Rule, rule_set: RuleSet) -> str:

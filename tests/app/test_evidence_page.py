@@ -8,15 +8,28 @@ from functools import cache
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.cross_fit_words import judged_sentence
 from sarl_core.explaining.evidence_words import (
     VERDICT_COLOURS,
     evidence_text,
+    held_out_text,
+    mined_text,
     more_text,
+    told_by_episodes,
     verdict_counts,
 )
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.contradictions import by_episode, find_contradictions
-from sarl_core.mining.holding_out import Split, hold_out, lower_bound, more_episodes, with_held_out
+from sarl_core.mining.cross_fitting import judge
+from sarl_core.mining.episode_counts import count_rules
+from sarl_core.mining.holding_out import (
+    Split,
+    hold_out,
+    lower_bound,
+    more_episodes,
+    verdict,
+    with_held_out,
+)
 from tests.app.screens import ROUTER, html, metrics, open_page, texts
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
@@ -35,8 +48,8 @@ def tried() -> RuleSet:
 
 
 def held_out_fidelity() -> str:
-    samples, correct = map(sum, zip(*(rule.held_out for rule in tried().rules), strict=True))
-    return share_text(correct / samples, decimals=1)
+    share = judge(tried(), count_rules(tried(), parted().held_out)).fidelity.share
+    return share_text(share, decimals=1)
 
 
 def until(app: AppTest, words: str) -> str:
@@ -59,17 +72,21 @@ def test_the_page_says_what_the_library_counts() -> None:
         "Reached": str(counts["reached"]),
         "Open": str(counts["open"]),
         "Too low": str(counts["below"]),
+        "Too few episodes": str(counts["unknown"]),
     }
     table = app.dataframe[0].value
     rules = sorted(tried().rules, key=lambda rule: -rule.samples)
     assert table["Evidence"].tolist() == [evidence_text(rule) for rule in rules]
-    missing = [more_text(more_episodes(rule, 30, 0.95)) for rule in rules]
+    missing = list(map(more_text, more_episodes(rules, 30, 0.95)))
     assert table["Still missing"].tolist() == missing
+    judged = judge(tried(), count_rules(tried(), parted().held_out))
+    assert judged_sentence(judged) in html(app)
 
 
 def test_a_share_is_chosen_and_taken_back() -> None:
     app = open_page("evidence", data="cartpole")
     assert "Nothing is held out" in texts(app)
+    assert "Hold some out above" in texts(app)
     app.number_input(key="_holdout_seed_choice").set_value(3).run()
     app.select_slider(key="_holdout_choice").set_value("0.2").run()
     assert metrics(app)["Held-out fidelity"] == held_out_fidelity()
@@ -91,20 +108,26 @@ def test_junk_in_a_link_holds_nothing_out() -> None:
 def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() -> None:
     app = open_page("rules", **HELD)
     rules = sorted(tried().rules, key=lambda rule: -rule.samples)
-    assert evidence_text(rules[0]) in html(app)
+    told = told_by_episodes(rules[0].held_out, what="it was right")
+    assert f"{mined_text(rules[0])} that it was mined from. {told}" in html(app)
     table = app.dataframe[0].value
-    assert [f"held out {text}" for text in table["Held out"]] == [
-        evidence_text(rule).split(", ")[1] for rule in rules
-    ]
-    low = next(
-        rule for rule, word in zip(rules, table["Verdict"], strict=True) if "too low" in word
-    )
-    app.number_input(key="lower").set_value(0.9).run()
-    kept = [rule for rule in rules if lower_bound(rule) >= 0.9]
+    assert table["Held out"].tolist() == [held_out_text(rule.held_out) for rule in rules]
+    bounds = sorted(bound for bound in map(lower_bound, rules) if bound)
+    middle = bounds[len(bounds) // 2]
+    app.number_input(key="lower").set_value(middle).run()
+    kept = [rule for rule in rules if lower_bound(rule) >= middle]
     assert 0 < len(app.dataframe[0].value) == len(kept) < len(rules)
-    told = html(open_page("rules", **HELD, rule=low.id))
+
+
+def test_the_rules_page_says_in_red_what_other_episodes_refute() -> None:
+    unfiltered = {**HELD, "holdout": "0.5", "support": "0", "confidence": "1"}
+    mined, held_out = hold_out(load_demonstrations(CART), 0.5, seed=3)
+    rules = with_held_out(mine_rules(mined, supp_min=0, conf_min=1), held_out)
+    low = next(rule for rule in rules.rules if verdict(rule, 1.0) == "below")
+    told = html(open_page("rules", **unfiltered, rule=low.id))
     red = f"{VERDICT_COLOURS['below']} 75%, currentColor"
-    assert f'{red})">{evidence_text(low)}' in told
+    assert f'{red})">{mined_text(low)} that it was mined from. In ' in told
+    assert told_by_episodes(low.held_out, what="it was right") in told
 
 
 def test_the_maps_have_a_held_out_layer() -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, save_demonstrations
 from sarl_core.cli import main
+from sarl_core.explaining.language import share_text
+from sarl_core.mining.cross_fitting import cross_fit
 from sarl_core.mining.holding_out import hold_out
 from tests.commandline.conftest import CART
 
@@ -26,9 +28,11 @@ def test_mine_tries_the_rules_on_held_out_episodes(run, tmp_path):
     for rule in rules.rules:
         applies = rule.applies(split.held_out.observations)
         right = split.held_out.actions[applies] == rule.action
-        assert rule.held_out == (applies.sum(), right.sum())
+        assert rule.held_out[:2] == (applies.sum(), right.sum())
+        assert rule.held_out.episodes == len(set(split.held_out.episodes[applies].tolist()))
     most = max(rules.rules, key=lambda rule: rule.samples)
-    assert f" of {most.samples:,}, held out " in text
+    assert f" of {most.samples:,} states; held out: " in text
+    assert f" in {most.held_out.episodes} episodes (" in text
 
 
 def test_the_json_sums_what_the_rule_file_holds(run, tmp_path):
@@ -37,6 +41,19 @@ def test_the_json_sums_what_the_rule_file_holds(run, tmp_path):
     tried = [rule.held_out for rule in RuleSet.load(path).rules]
     assert document["samples"] == sum(one.samples for one in tried)
     assert document["correct"] == sum(one.correct for one in tried)
+    split = hold_out(load_demonstrations(CART), 0.2)
+    shares = []
+    for episode in document["episodes"]:
+        some = split.held_out.select([episode])
+        applies = [rule.applies(some.observations) for rule in RuleSet.load(path).rules]
+        right = [
+            some.actions[rows] == rule.action
+            for rows, rule in zip(applies, RuleSet.load(path).rules, strict=True)
+        ]
+        shares.append(sum(one.sum() for one in right) / sum(one.sum() for one in applies))
+    assert document["fidelity"] == pytest.approx(np.mean(shares))
+    verdicts = [document[f"rules_{name}"] for name in ("below", "open", "reached", "unknown")]
+    assert sum(verdicts) == len(tried)
     assert document["seed"] == 0
     assert len(document["episodes"]) == 6
     assert document["interval"][0] < document["fidelity"] < document["interval"][1]
@@ -45,9 +62,11 @@ def test_the_json_sums_what_the_rule_file_holds(run, tmp_path):
 def test_the_lower_bound_keeps_the_rules_that_are_certain(run, tmp_path):
     path = tmp_path / "rules.json"
     everything = json.loads(run(*MINE, "--json", "--out", path))
-    some = json.loads(run(*MINE, "--lower-bound", "0.9", "--json", "--out", path))
+    bounds = sorted({rule.held_out.low or 0.0 for rule in RuleSet.load(path).rules})
+    some = json.loads(run(*MINE, "--lower-bound", str(bounds[-1]), "--json", "--out", path))
     assert 0 < some["rules"] < everything["rules"]
     assert some["rules"] == len(RuleSet.load(path))
+    assert {rule.held_out.low for rule in RuleSet.load(path).rules} == {bounds[-1]}
     none = run(*MINE, "--lower-bound", "1", "--out", path)
     assert "No rule reaches these thresholds and lower bound" in none
 
@@ -69,3 +88,49 @@ def test_check_counts_states_shown_with_another_action(run, tmp_path):
     save_demonstrations(Demonstrations(states, np.array([0, 1, 1, 1, 1]), np.zeros(5, int)), path)
     assert json.loads(run("check", path, "--json"))["contradictions"] == 2
     assert "2 states were shown with another action too" in run("check", path)
+
+
+def test_a_lower_bound_needs_other_episodes(tmp_path, capsys):
+    path = tmp_path / "rules.json"
+    assert main([*map(str, MINE[:6]), "--lower-bound", "0.9", "--out", str(path)]) == 2
+    assert "give --hold-out as well" in capsys.readouterr().err
+    assert not path.exists()
+
+
+def test_rules_are_cross_fitted_where_that_is_asked(run, tmp_path):
+    path = tmp_path / "rules.json"
+    plain = run(*MINE[:6], "--out", path)
+    assert "flatters; --cross-fit says what they are elsewhere" in plain
+    told = run(*MINE[:6], "--cross-fit", "--out", path)
+    assert "every episode judged by rules mined without it, in 10 parts" in told
+    document = json.loads(run(*MINE[:6], "--cross-fit", "--json", "--out", path))
+    found = document["cross_fitted"]
+    expected = cross_fit(load_demonstrations(CART)).at(RuleSet.load(path).thresholds)
+    assert found["fidelity"] == expected.fidelity._asdict()
+    assert found["coverage"] == expected.coverage._asdict()
+    assert found["episodes"] == 30
+    assert f"{share_text(expected.fidelity.share)} (" in told
+    assert found["warnings"] == []
+
+
+@pytest.mark.parametrize("episodes", [20, 1])
+def test_random_labels_end_with_a_warning(episodes, run, tmp_path):
+    """Every rule is right about what it was mined from, and none about anything else."""
+    path, out = tmp_path / "noise.csv", tmp_path / "rules.json"
+    rng = np.random.default_rng(0)
+    noise = Demonstrations(
+        rng.normal(size=(2_000, 3)).astype(np.float32),
+        rng.integers(0, 2, 2_000),
+        np.arange(2_000) * episodes // 2_000,
+    )
+    save_demonstrations(noise, path)
+    told = run("mine", path, "--setting", "unfiltered", "--cross-fit", "--out", out)
+    assert "fidelity            100 %" in told
+    assert "warning: The rules are right in 100 % of the states they were mined from, and" in told
+    document = json.loads(
+        run("mine", path, "--setting", "unfiltered", "--cross-fit", "--json", "--out", out)
+    )["cross_fitted"]
+    assert document["fidelity"]["share"] == pytest.approx(0.5, abs=0.05)
+    assert document["whole_episodes"] is (episodes > 1)
+    assert (document["fidelity"]["low"] is None) is (episodes == 1)
+    assert len(document["warnings"]) == 1

@@ -28,7 +28,9 @@ def edited(mined: RuleSet) -> RuleSet:
     """One rule by hand that applies everywhere, the least general one pinned, another off."""
     by_samples = sorted(mined.rules, key=lambda rule: rule.samples)
     hand = Rule("hand", 0, (), 1, 1.0, 0.25, 1.0, 2000, origin="manual")
-    pinned = replace(by_samples[0], id="pinned", pinned=True, held_out=HeldOut(40, 31))
+    pinned = replace(
+        by_samples[0], id="pinned", pinned=True, held_out=HeldOut(40, 31, 6, 0.8, 0.5, 0.9)
+    )
     off = replace(by_samples[-1], id="off", enabled=False)
     return replace(mined, rules=(pinned, hand, off, *by_samples[1:-1]))
 
@@ -53,9 +55,21 @@ def test_text_keeps_the_order_of_placed_rules_and_marks_those_off(edited: RuleSe
 
 def test_csv_says_what_was_pinned_and_held_out(edited: RuleSet) -> None:
     rows = list(csv.DictReader(io.StringIO(rules_to_csv(edited))))
-    columns = ("id", "pinned", "held_out_samples", "held_out_correct")
-    assert [rows[0][name] for name in columns] == ["pinned", "yes", "40", "31"]
-    assert [rows[1][name] for name in columns] == ["hand", "no", "", ""]
+    held = [f"held_out_{name}" for name in HeldOut._fields]
+    assert [rows[0][name] for name in ("id", "pinned", *held)] == (
+        ["pinned", "yes", "40", "31", "6", "0.8", "0.5", "0.9"]
+    )
+    assert [rows[1][name] for name in ("id", "pinned", *held)] == ["hand", "no", *[""] * 6]
+    few = replace(edited.rules[0], held_out=HeldOut(4, 3, 2, 0.75, None, None))
+    rows = list(csv.DictReader(io.StringIO(rules_to_csv(replace(edited, rules=(few,))))))
+    assert [rows[0][name] for name in held] == ["4", "3", "2", "0.75", "", ""]
+
+
+def test_markdown_counts_held_out_episodes(edited: RuleSet) -> None:
+    assert "| 80 % in 6 episodes (50 to 90 %) |" in rules_to_markdown(edited)
+    few = replace(edited.rules[0], held_out=HeldOut(4, 3, 2, 0.75, None, None))
+    told = rules_to_markdown(replace(edited, rules=(few,)))
+    assert "| 75 % in 2 episodes (too few episodes) |" in told
 
 
 def test_the_matrix_shows_placed_rules_first_with_a_mark(mined: RuleSet, edited: RuleSet) -> None:

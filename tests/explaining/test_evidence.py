@@ -17,17 +17,20 @@ from sarl_core.explaining.evidence_tables import (
 )
 from sarl_core.explaining.evidence_words import (
     band_text,
-    decimal_text,
     evidence_bar,
     evidence_text,
     held_out_text,
-    intervals_text,
+    influence_text,
+    interval_text,
     more_text,
+    range_text,
     stability_text,
+    told_by_episodes,
     verdict_counts,
 )
 from sarl_core.mining.contradictions import EpisodeContradictions, find_contradictions
-from sarl_core.mining.evidence import HeldOut, wilson
+from sarl_core.mining.episode_counts import Influence
+from sarl_core.mining.evidence import HeldOut, Interval
 from sarl_core.mining.holding_out import hold_out, more_episodes, with_held_out
 from sarl_core.mining.learning_curve import LearningCurve
 from sarl_core.mining.rules import Rule
@@ -46,37 +49,69 @@ def tried(lander_like):
     return with_held_out(mine_rules(split.mined, supp_min=0.01, conf_min=0.85), split.held_out)
 
 
+SURE = (96, 87, 14, 0.912, 0.78, 0.991)
+
+
 def test_a_rule_says_its_shares_and_counts():
-    assert evidence_text(rule_of(412, 400, (96, 87))) == "0.97 of 412, held out 0.91 of 96"
-    assert evidence_text(rule_of(412, 400)) == "0.97 of 412"
-    assert evidence_text(rule_of(1412, 1412, (0, 0))) == "1 of 1,412, held out no states"
-    assert held_out_text(rule_of(10, 9)) == ""
+    assert evidence_text(rule_of(412, 400, SURE)) == (
+        "97.1 % of 412 states; held out: 91.2 % in 14 episodes (96 states)"
+    )
+    assert evidence_text(rule_of(412, 400)) == "97.1 % of 412 states"
+    nothing = rule_of(1412, 1412, (0, 0, 0, None, None, None))
+    assert evidence_text(nothing) == "100 % of 1,412 states; held out: no states"
+    older = rule_of(412, 400, (96, 87, 0, None, None, None))
+    assert evidence_text(older) == "97.1 % of 412 states; held out: 90.6 % of 96 states"
+    assert held_out_text(None) == ""
     assert evidence_text(rule_of(0, 0)) == "no states"
 
 
-def test_its_intervals_are_wilsons():
-    low, high = wilson(400, 412)
-    assert intervals_text(rule_of(412, 400)) == f"95 % interval {low:.2f} to {high:.2f}"
-    low, high = wilson(87, 96)
-    told = intervals_text(rule_of(412, 400, (96, 87)))
-    assert told.endswith(f", held out {low:.2f} to {high:.2f}")
-    assert intervals_text(rule_of(0, 0)) == ""
+def test_an_interval_is_said_or_why_there_is_none():
+    assert interval_text(HeldOut(*SURE)) == "78 to 99.1 %"
+    assert interval_text(HeldOut(4, 4, 4, 1.0, None, None)) == "too few episodes"
+    assert interval_text(None) == ""
+    assert range_text(Interval(0.0, 1.0)) == "0 to 100 %"
+    assert range_text(Interval(0.5, 0.99996)) == "50 to > 99.99 %"
 
 
 @pytest.mark.parametrize(
-    ("share", "text"),
+    ("held", "told"),
     [
-        (0.0, "0"),
-        (1.0, "1"),
-        (0.5, "0.50"),
-        (0.999, "0.999"),
-        (0.99996, "> 0.9999"),
-        (0.004, "0.004"),
-        (0.00001, "< 0.0001"),
+        (
+            SURE,
+            "In 14 episodes that it was not mined from, it was right in 91.2 % of its states on "
+            "average, and between 78 and 99.1 % is what that can tell.",
+        ),
+        (
+            (8, 7, 3, 0.88, None, None),
+            "In 3 episodes that it was not mined from, it was right in 88 % of its states on "
+            "average; that is too few to say more.",
+        ),
+        (
+            (1, 1, 1, 1.0, None, None),
+            "In 1 episode that it was not mined from, it was right in 100 % of its states on "
+            "average; one is too few to say more.",
+        ),
+        (
+            (0, 0, 0, None, None, None),
+            "There was no state for it in the episodes that it was not mined from.",
+        ),
+        (
+            (96, 87, 0, None, None, None),
+            "Of 96 states that it was not mined from, it was right in 90.6 %; the file does not "
+            "say in how many episodes.",
+        ),
     ],
 )
-def test_a_share_never_rounds_to_all_or_nothing(share, text):
-    assert decimal_text(share) == text
+def test_other_episodes_are_told_as_a_sentence(held, told):
+    assert told_by_episodes(HeldOut(*held), what="it was right") == told
+
+
+def test_an_episode_that_moves_a_number_is_named():
+    assert influence_text(Influence(41, 1000, 0.97, 0.71)) == (
+        "without episode 41 (1,000 steps) it would be 71 % instead of 97 %"
+    )
+    assert influence_text(Influence(41, 1000, 0.97, 0.975)) == ""
+    assert influence_text(None) == ""
 
 
 @pytest.mark.parametrize(
@@ -86,6 +121,7 @@ def test_a_share_never_rounds_to_all_or_nothing(share, text):
         (1.0, "1 more episode"),
         (1234.0, "1,234 more episodes"),
         (float("inf"), "never at this rate"),
+        (float("nan"), "too few episodes to say"),
     ],
 )
 def test_what_is_missing_is_said(more, text):
@@ -103,12 +139,14 @@ def test_a_band_and_a_return_are_said():
 
 
 def test_the_bar_marks_the_threshold_and_stays_within_its_scale():
-    bar = evidence_bar(rule_of(412, 400, (96, 60)), 0.95)
+    bar = evidence_bar(rule_of(412, 400, (96, 60, 14, 0.62, 0.5, 0.75)), 0.95)
     places = [float(part.split("%")[0]) for part in bar.split('style="left:')[1:]]
     assert all(0 <= place <= 100 for place in places)
     assert bar.count('class="m"') == 2
     assert "held out" in bar
     assert "#D55E00" in bar  # too low
+    assert bar.count('class="w"') == 1  # of what it was mined from there is none
+    assert 'class="w"' not in evidence_bar(rule_of(412, 400, (9, 6, 3, 0.6, None, None)), 0.95)
     assert evidence_bar(rule_of(0, 0), 0.95) == ""
     assert "held out" not in evidence_bar(rule_of(412, 400), 0.95)
 
@@ -119,18 +157,21 @@ def test_columns_hold_what_was_counted(tried):
     for rule, text, bound in zip(
         tried.rules, columns["Held out"], columns["Lower bound"], strict=True
     ):
-        assert text.endswith(f" of {rule.held_out.samples}")
-        assert bound == wilson(rule.held_out.correct, rule.held_out.samples).low
+        assert text.endswith(("episodes", "episode", "no states"))
+        assert bound == rule.held_out.low
     counts = verdict_counts(tried.rules, 0.85)
-    words = [columns["Verdict"].count(word) for word in ("too low", "open", "reached")]
-    assert words == [counts["below"], counts["open"], counts["reached"]]
+    said = ("too low", "open", "reached", "too few episodes")
+    words = [columns["Verdict"].count(word) for word in said]
+    assert words == [counts[name] for name in ("below", "open", "reached", "unknown")]
     assert held_out_columns([replace(rule, held_out=None) for rule in tried.rules], 0.85) == {}
 
 
 def test_tables_have_a_row_a_rule(tried):
-    missing = [more_episodes(rule, 20, 0.85) for rule in tried.rules]
-    columns = enough_columns(tried.rules, tried, missing, 0.85)
+    missing = more_episodes(tried.rules, 20, 0.85)
+    moved = [Influence(3, 100, 0.9, 0.8)] * len(tried)
+    columns = enough_columns(tried.rules, tried, missing, 0.85, moved)
     assert columns["Still missing"] == [more_text(more) for more in missing]
+    assert columns["Moved most by"] == [influence_text(one) for one in moved]
     one = tuple(RuleStability(rule.id, 0.5, 0.4, ()) for rule in tried.rules)
     stable = stability_columns(tried.rules, tried, Stability(4, 0.5, one))
     assert {len(values) for values in (*columns.values(), *stable.values())} == {len(tried)}

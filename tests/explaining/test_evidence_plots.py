@@ -9,7 +9,6 @@ import pytest
 from sarl_core import Demonstrations, RuleSet, mine_rules
 from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
 from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks, tick_text
-from sarl_core.mining.evidence import wilson
 from sarl_core.mining.holding_out import hold_out, with_held_out
 
 
@@ -47,11 +46,10 @@ def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None
     expected = []
     for rule in tried.rules:
         assert rule.held_out is not None
-        for correct, samples in (
-            (rule.correct, rule.samples),
-            (rule.held_out.correct, rule.held_out.samples),
-        ):
-            expected.append((*wilson(correct, samples), correct / samples))
+        expected.append((rule.confidence,) * 3)  # a dot: it was chosen for being right there
+        held = rule.held_out
+        assert held.share is not None
+        expected.append((*(held.interval or (held.share, held.share)), held.share))
     for (_, bottom, height, dot), (least, most, share) in zip(drawn, expected, strict=True):
         assert confidence(bottom) == pytest.approx(least, abs=1e-3)
         assert confidence(bottom + height) == pytest.approx(most, abs=1e-3)
@@ -61,9 +59,10 @@ def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None
     assert html.count("<u title=") == len(tried)
 
 
-def test_without_held_out_episodes_there_is_one_interval_a_rule(tried: RuleSet) -> None:
+def test_without_held_out_episodes_there_is_one_dot_a_rule(tried: RuleSet) -> None:
     alone = replace(tried, rules=tuple(replace(rule, held_out=None) for rule in tried.rules))
-    assert len(whiskers(overview_plot(alone.rules, alone, 0.85))) == len(tried)
+    drawn = whiskers(overview_plot(alone.rules, alone, 0.85))
+    assert [height for _, _, height, _ in drawn] == [0.0] * len(tried)
 
 
 def test_names_in_the_overview_are_no_markup(tried: RuleSet) -> None:

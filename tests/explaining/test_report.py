@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
 
 from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.language import share_text
 from sarl_core.explaining.report import Wishes, make_report
 from sarl_core.explaining.report_again import digest_of, mining_command
 from sarl_core.explaining.report_comparison import Result
@@ -133,8 +133,6 @@ def test_counts_are_those_of_the_data(cart: Demonstrations, rules: RuleSet) -> N
             inside &= column <= threshold if op == "<=" else column > threshold
         right = int((cart.actions[inside].reshape(-1) == rule.action).sum())
         assert f"{right:,} of {int(inside.sum()):,} states" in text
-        exact = binomtest(right, int(inside.sum())).proportion_ci(method="wilson")
-        assert f"{100 * exact.low:.1f} % and {100 * exact.high:.1f} %" in text
         covered |= inside
     assert f"{int(covered.sum()):,} of 15,000 demonstrated states" in text
 
@@ -318,15 +316,48 @@ def test_what_no_report_can_hold_is_refused(wrong: dict[str, int]) -> None:
         Wishes(**wrong)
 
 
-@pytest.mark.parametrize(("part", "whole"), [(0, 1), (1, 1), (0, 40), (40, 40), (153, 158)])
-def test_the_interval_is_wilson_s(part: int, whole: int) -> None:
-    exact = binomtest(part, whole).proportion_ci(method="wilson")
-    assert Share(part, whole).interval == pytest.approx((exact.low, exact.high), abs=1e-12)
-
-
-def test_of_nothing_everything_may_be() -> None:
-    assert Share(0, 0).interval == (0.0, 1.0)
+def test_of_nothing_there_is_no_share() -> None:
     assert np.isnan(Share(0, 0).value)
+
+
+def test_what_rules_were_made_from_has_no_interval_and_other_episodes_have(
+    cart: Demonstrations,
+) -> None:
+    mined, other = hold_out(cart, 0.3)
+    rules = with_held_out(mine_rules(mined, supp_min=0.005, conf_min=0.95), other)
+    text = Page(make_report(rules, cart, PLAIN).html).text
+    for rule in rules.rules:
+        told = rule.held_out
+        assert f"{rule.correct:,} of {rule.samples:,} states" in text
+        assert f"{told.correct:,} of {told.samples:,} states" in text
+        assert told.episodes >= 5
+        assert (
+            f"{share_text(told.share)} of its states in an episode, on average over "
+            f"{told.episodes} episodes; between {share_text(told.low)[:-2]} and "
+            f"{share_text(told.high)} is what that can tell"
+        ) in text
+    # Of what they were mined from alone, nothing of that kind is said.
+    plain = Page(make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, PLAIN).html)
+    assert "is what that can tell" not in plain.text
+
+
+def test_rules_of_other_demonstrations_are_judged_by_episodes(cart: Demonstrations) -> None:
+    first, rest = hold_out(cart, 0.5)
+    rules = mine_rules(first, supp_min=0.02, conf_min=0.95)
+    told = with_held_out(rules, rest).rules[0].held_out
+    text = Page(make_report(rules, rest, PLAIN).html).text
+    assert f"{told.correct:,} of {told.samples:,} states" in text
+    assert f"on average over {told.episodes} episodes; between {share_text(told.low)[:-2]}" in text
+
+
+def test_rules_that_know_few_episodes_are_doubted(cart: Demonstrations) -> None:
+    rules = mine_rules(cart, supp_min=0.0, conf_min=1.0)
+    few = sum(
+        len(np.unique(cart.episodes[rule.applies(cart.observations)])) < 5 for rule in rules.rules
+    )
+    assert 0 < few < len(rules)
+    text = Page(make_report(rules, cart, PLAIN).html).text
+    assert f"{few:,} rules have their states in fewer than 5 of the 30 episodes" in text
 
 
 @pytest.mark.parametrize("content", ["[]", "{", "\x00", "[" * 100_000])

@@ -112,6 +112,7 @@ def test_rules_tried_on_episodes_kept_aside_stay_so_when_edited(cart: Demonstrat
     assert "made from other data" not in told
 
 
-def test_the_interval_is_said_to_be_too_narrow(cart: Demonstrations, rules: RuleSet) -> None:
+def test_what_an_interval_counts_is_said(cart: Demonstrations, rules: RuleSet) -> None:
     told = words_of(make_report(rules, cart, PLAIN).html)
-    assert "Steps of one episode are alike, so the true interval is wider." in told
+    assert "each of them counts once, however long it is" in told
+    assert "Wilson" not in told

@@ -41,14 +41,22 @@ def test_a_card_says_the_rule_and_its_numbers_with_names_escaped(pushed: RuleSet
 def test_a_rule_that_held_out_episodes_refute_is_told_in_red(pushed: RuleSet) -> None:
     rule = max(pushed.rules, key=lambda one: one.samples)
     red = f'<p style="color:color-mix(in srgb, {VERDICT_COLOURS["below"]} '
-    refuted = replace(rule, held_out=HeldOut(100, 40))
+    refuted = replace(rule, held_out=HeldOut(100, 40, 12, 0.4, 0.28, 0.53))
     card = rule_card(refuted, pushed, threshold=0.8)
     assert red in card
-    assert "; too low</p>" in card
-    assert "held out 0.40 of 100" in card
-    kept = rule_card(replace(rule, held_out=HeldOut(100, 90)), pushed, threshold=0.8)
+    assert (
+        "In 12 episodes that it was not mined from, it was right in 40 % of its states on average, "
+        "and between 28 and 53 % is what that can tell. That is too low.</p>"
+    ) in card
+    kept = rule_card(
+        replace(rule, held_out=HeldOut(100, 90, 12, 0.9, 0.78, 0.99)), pushed, threshold=0.8
+    )
     assert red not in kept
-    assert "held out 0.90 of 100" in kept
+    assert "it was right in 90 % of its states on average" in kept
+    few = replace(rule, held_out=HeldOut(9, 2, 3, 0.2, None, None))
+    card = rule_card(few, pushed, threshold=0.8)
+    assert red not in card
+    assert "right in 20 % of its states on average; that is too few to say more." in card
 
 
 def test_of_a_rule_without_a_threshold_nothing_is_judged(pushed: RuleSet) -> None:

@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binomtest
+from scipy import stats
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules, threshold_landscape
-from sarl_core.mining.evidence import HeldOut, wilson, wilson_bounds
+from sarl_core.mining.episode_counts import count_rules
+from sarl_core.mining.evidence import HeldOut, held_out_of
 from sarl_core.mining.holding_out import (
     count_held_out,
-    held_out_interval,
+    episodes_needed,
     hold_out,
     lower_bound,
-    mined_interval,
     more_episodes,
-    pairs_needed,
     verdict,
     with_held_out,
     with_lower_bound,
@@ -39,10 +38,22 @@ def in_episodes(demonstrations, count):
     return replace(demonstrations, episodes=episodes, steps=None)
 
 
-def rule_of(samples, correct, held=None):
-    return Rule(
-        "0.1", 0, (), 0, 0.1, correct / samples, 1.0, samples, held_out=held and HeldOut(*held)
-    )
+def rule_of(samples, correct, shares=None):
+    """A rule that was right in such shares of ten states each of held-out episodes."""
+    held = None
+    if shares is not None:
+        held = held_out_of(
+            np.full(len(shares), 10), (10 * np.array(shares, dtype=float)).round().astype(int)
+        )
+    return Rule("0.1", 0, (), 0, 0.1, correct / samples, 1.0, samples, held_out=held)
+
+
+def t_interval(shares):
+    """Of shares and one pseudo-episode at 0.5."""
+    values = np.append(shares, 0.5)
+    reach = stats.t.ppf(0.975, len(values) - 1) * stats.sem(values)
+    low, high = values.mean() - reach, values.mean() + reach
+    return max(low, 0.0), min(high, 1.0)
 
 
 # --- the split ------------------------------------------------------------------------------------
@@ -88,18 +99,32 @@ def test_one_episode_cannot_be_parted():
 
 
 def counted_by_hand(rule, dimension, held):
-    """One state after the other, one condition after the other."""
-    samples = correct = 0
-    for state, action in zip(
-        held.observations, held.action_columns[:, rule.dimension], strict=True
+    """One state after the other, one condition after the other; (samples, correct) an episode."""
+    found = {}
+    for state, action, episode in zip(
+        held.observations, held.action_columns[:, rule.dimension], held.episodes, strict=True
     ):
         if all(
             (float(state[feature]) <= threshold) == (op == "<=")  # not rounded to float32
             for feature, op, threshold in rule.conditions
         ):
-            samples += 1
-            correct += dimension.label_of(action) == rule.action
-    return HeldOut(samples, correct)
+            samples, correct = found.get(episode, (0, 0))
+            right = dimension.label_of(action) == rule.action
+            found[episode] = samples + 1, correct + right
+    return found
+
+
+def assert_counted(rule, dimension, held):
+    """What a rule carries is what is counted by hand."""
+    counts = counted_by_hand(rule, dimension, held)
+    told = rule.held_out
+    assert told.samples == sum(samples for samples, _ in counts.values())
+    assert told.correct == sum(correct for _, correct in counts.values())
+    assert told.episodes == len(counts)
+    shares = [correct / samples for samples, correct in counts.values()]
+    assert told.share == (pytest.approx(np.mean(shares)) if shares else None)
+    expected = t_interval(shares) if len(shares) >= 5 else None
+    assert told.interval == (expected and pytest.approx(expected))
 
 
 @pytest.mark.parametrize("conf_min", [0.6, 0.9, 1.0])
@@ -108,7 +133,7 @@ def test_every_rule_is_counted_as_by_hand(lander_like, conf_min):
     rules = with_held_out(mine_rules(split.mined, supp_min=0.01, conf_min=conf_min), split.held_out)
     assert len(rules)
     for rule in rules.rules:
-        assert rule.held_out == counted_by_hand(rule, rules.actions[0], split.held_out)
+        assert_counted(rule, rules.actions[0], split.held_out)
 
 
 def test_placed_rules_that_overlap_are_counted_too(lander_like):
@@ -122,7 +147,7 @@ def test_placed_rules_that_overlap_are_counted_too(lander_like):
     pinned = replace(mined.rules[1], pinned=True)
     mixed = replace(mined, rules=(manual, pinned, mined.rules[0], *mined.rules[2:]))
     for rule in with_held_out(mixed, split.held_out).rules:
-        assert rule.held_out == counted_by_hand(rule, mined.actions[0], split.held_out)
+        assert_counted(rule, mined.actions[0], split.held_out)
 
 
 def test_only_rules_that_were_not_tried_are_tried(lander_like):
@@ -130,7 +155,7 @@ def test_only_rules_that_were_not_tried_are_tried(lander_like):
     mined = mine_rules(split.mined, supp_min=0.01, conf_min=0.8)
     tried = with_held_out(mined, split.held_out)
     assert with_untried_held_out(tried, split.held_out) is tried
-    kept = HeldOut(7, 3)
+    kept = HeldOut(7, 3, 2, 0.4, None, None)
     mixed = [
         replace(rule, held_out=kept if at % 2 else None) for at, rule in enumerate(mined.rules)
     ]
@@ -154,7 +179,7 @@ def test_continuous_dimensions_are_compared_by_their_intervals():
     assert {rule.dimension for rule in rules.rules} == {0, 1}
     for rule in rules.rules:
         dimension = rules.actions[rule.dimension]
-        assert rule.held_out == counted_by_hand(rule, dimension, split.held_out)
+        assert_counted(rule, dimension, split.held_out)
 
 
 def test_demonstrations_of_something_else_are_refused(lander_like):
@@ -180,41 +205,49 @@ def test_what_was_counted_survives_the_rule_file(lander_like):
     assert json.loads(rules_to_json(rules))["rules"][0]["held_out"]["samples"] > 0
 
 
-# --- the intervals --------------------------------------------------------------------------------
+# --- how sure one can be --------------------------------------------------------------------------
 
 
-@given(st.integers(1, 5_000), st.floats(0, 1))
-def test_wilson_is_scipys(samples, share):
-    correct = round(share * samples)
-    expected = binomtest(correct, samples).proportion_ci(method="wilson")
-    assert wilson(correct, samples) == pytest.approx((expected.low, expected.high), abs=1e-12)
+@given(st.lists(st.floats(0, 1).map(lambda share: round(share, 1)), min_size=5, max_size=80))
+def test_the_interval_is_students_over_episodes_and_one_more(shares):
+    assert rule_of(100, 98, shares).held_out.interval == pytest.approx(t_interval(shares))
 
 
-def test_without_a_pair_nothing_is_known_and_arrays_are_as_single_ones():
-    assert wilson(0, 0) == (0.0, 1.0)
-    correct, samples = np.array([0, 0, 5, 9]), np.array([0, 4, 5, 10])
-    low, high = wilson_bounds(correct, samples)
-    singly = [wilson(*pair) for pair in zip(correct, samples, strict=True)]
-    assert [tuple(pair) for pair in zip(low, high, strict=True)] == singly
+def test_a_long_episode_counts_once():
+    """Twelve episodes of 20 states, in which it is right, and one of 1,000 in which it is not."""
+    held = held_out_of([20] * 12 + [1000], [20] * 12 + [300])
+    assert held.correct / held.samples < 0.45
+    assert held.share == pytest.approx((12 + 0.3) / 13)
+    assert held.interval == pytest.approx(t_interval([1.0] * 12 + [0.3]))
 
 
-def test_the_held_out_interval_counts_where_there_is_one():
-    rule = rule_of(100, 98)
-    assert held_out_interval(rule) is None
-    assert lower_bound(rule) == mined_interval(rule).low
-    assert held_out_interval(rule_of(100, 98, (0, 0))) is None
-    assert lower_bound(rule_of(100, 98, (0, 0))) == mined_interval(rule).low
-    assert lower_bound(rule_of(100, 98, (40, 30))) == wilson(30, 40).low
+def test_nothing_is_said_of_few_episodes_whatever_their_states():
+    for shares in ([], [1.0], [1.0] * 4):
+        held = held_out_of([5_000] * len(shares), [5_000] * len(shares))
+        assert held.interval is None
+        assert held.episodes == len(shares)
+        assert held.share == (1.0 if shares else None)
+    assert rule_of(100, 98, [1.0] * 5).held_out.interval is not None
+
+
+def test_what_a_rule_was_mined_from_says_nothing_of_it():
+    for rule in (rule_of(100_000, 99_999), rule_of(100_000, 99_999, [1.0] * 4)):
+        assert lower_bound(rule) == 0.0
+        assert verdict(rule, 0.5) == "unknown"
+        assert np.isnan(more_episodes([rule], 10, 0.5)).all()
+    shares = [1.0, 0.9, 1.0, 0.8, 0.9, 1.0]
+    assert lower_bound(rule_of(100, 98, shares)) == pytest.approx(t_interval(shares)[0])
 
 
 @pytest.mark.parametrize(
-    ("held", "expected"), [((50, 20), "below"), ((50, 47), "open"), ((500, 498), "reached")]
+    ("shares", "expected"),
+    [([0.3, 0.4] * 6, "below"), ([1.0, 0.9] * 6, "open"), ([1.0] * 60, "reached")],
 )
-def test_a_verdict_is_about_the_whole_interval(held, expected):
-    interval = binomtest(held[1], held[0]).proportion_ci(method="wilson")
-    sides = {"below": interval.high < 0.95, "reached": interval.low >= 0.95}
+def test_a_verdict_is_about_the_whole_interval(shares, expected):
+    low, high = t_interval(shares)
+    sides = {"below": high < 0.95, "reached": low >= 0.95}
     assert sides.get(expected, not any(sides.values()))
-    assert verdict(rule_of(1000, 990, held), 0.95) == expected
+    assert verdict(rule_of(1000, 990, shares), 0.95) == expected
 
 
 def test_a_rule_set_is_filtered_by_the_lower_bound(lander_like):
@@ -230,43 +263,44 @@ def test_a_rule_set_is_filtered_by_the_lower_bound(lander_like):
 # --- enough demonstrations ------------------------------------------------------------------------
 
 
+def low_end(n, share, spread):
+    """Of n episodes with such a mean and variance (two values, as far apart as it takes)."""
+    mean = (n * share + 0.5) / (n + 1)
+    squares = (n - 1) * spread + n * (share - mean) ** 2 + (0.5 - mean) ** 2
+    return mean - stats.t.ppf(0.975, n) * (squares / n / (n + 1)) ** 0.5
+
+
 @settings(max_examples=60, deadline=None)
-@given(st.floats(0.3, 1.0), st.floats(0.02, 0.98))
-def test_pairs_needed_is_where_the_lower_end_passes(confidence, threshold):
-    needed = pairs_needed(confidence, threshold)
-    if confidence <= threshold:
+@given(st.floats(0.3, 1.0), st.floats(0.0, 0.2), st.floats(0.02, 0.98))
+def test_episodes_needed_is_the_first_number_whose_lower_end_passes(share, spread, threshold):
+    needed = float(episodes_needed(np.array([share]), np.array([spread]), threshold)[0])
+    if share < threshold:
         assert needed == np.inf
         return
-    if needed > 1e9 or needed < 1:
+    if np.isinf(needed) or needed > 1e6:
+        assert share - threshold < 0.01
         return
-    before, after = wilson_bounds(
-        confidence * needed * np.array([0.99, 1.01]), needed * np.array([0.99, 1.01])
-    )[0]
-    assert before < threshold < after
+    assert low_end(needed, share, spread) >= threshold - 1e-9
+    assert needed == 5 or low_end(needed - 1, share, spread) < threshold + 1e-9
 
 
-def test_more_episodes_is_the_first_number_that_does_it():
-    rule = rule_of(60, 58)  # 10 episodes gave 60 pairs, 58 of them right
-    found = more_episodes(rule, 10, 0.9)
-    first = next(
-        more
-        for more in range(1_000)
-        if wilson(58 * (10 + more) / 10, 60 * (10 + more) / 10).low >= 0.9
+def test_more_episodes_go_on_as_those_before():
+    shares = [1.0, 0.9, 1.0, 1.0, 0.9, 1.0]  # in 6 of 30 episodes
+    needed = next(
+        n for n in range(6, 10_000) if low_end(n, np.mean(shares), np.var(shares, ddof=1)) >= 0.9
     )
-    assert found == first > 0
-    assert more_episodes(rule_of(600, 598), 10, 0.9) == 0
-    assert more_episodes(rule_of(60, 50), 10, 0.9) == np.inf
-    assert more_episodes(rule_of(60, 60), 10, 1.0) == np.inf
-
-
-def test_held_out_episodes_are_a_share_of_the_further_ones():
-    tried = rule_of(600, 590, (20, 19))  # 20 held-out pairs in 10 episodes, held-out ones included
-    first = next(
-        more
-        for more in range(10_000)
-        if wilson(19 * (10 + more) / 10, 20 * (10 + more) / 10).low >= 0.9
+    found, enough, never = more_episodes(
+        [rule_of(60, 58, shares), rule_of(60, 58, [1.0] * 40), rule_of(60, 58, [0.8] * 40)], 30, 0.9
     )
-    assert more_episodes(tried, 10, 0.9) == first
+    assert found == np.ceil((needed - 6) * 30 / 6)
+    assert enough == 0
+    assert never == np.inf
+
+
+def test_where_both_ends_are_cut_off_the_most_uneven_is_assumed():
+    rule = replace(rule_of(60, 58), held_out=HeldOut(50, 30, 5, 0.6, 0.0, 1.0))
+    needed = next(n for n in range(5, 10_000) if low_end(n, 0.6, 0.3) >= 0.5)
+    assert more_episodes([rule], 5, 0.5) == (needed - 5,)
 
 
 # --- the landscape --------------------------------------------------------------------------------
@@ -275,8 +309,8 @@ def test_held_out_episodes_are_a_share_of_the_further_ones():
 @settings(max_examples=30, deadline=None)
 @given(labelled_states(), st.sampled_from([0.0, 1.1]), st.sampled_from([None, 2]))
 def test_the_landscapes_layer_is_what_mining_every_cell_counts(demonstrations, lift, depth):
-    parted = in_episodes(demonstrations, 3)
-    if len(parted) < 6:  # an episode of one step is no demonstration
+    parted = in_episodes(demonstrations, 13)
+    if len(parted) < 40:  # an episode of one step is no demonstration
         return
     split = hold_out(parted, 0.4)
     trees = grow_policy_trees(split.mined)
@@ -295,11 +329,17 @@ def test_the_landscapes_layer_is_what_mining_every_cell_counts(demonstrations, l
     for i, supp in enumerate(supports):
         for j, conf in enumerate(confidences):
             mined = mine_rules(trees, supp_min=supp, conf_min=conf, lift_min=lift, max_depth=depth)
-            counts = [counted_by_hand(r, mined.actions[0], split.held_out) for r in mined.rules]
-            covered = sum(count.samples for count in counts)
-            correct = sum(count.correct for count in counts)
+            sums = {}
+            for rule in mined.rules:
+                by_hand = counted_by_hand(rule, mined.actions[0], split.held_out)
+                for episode, count in by_hand.items():
+                    sums[episode] = np.add(sums.get(episode, (0, 0)), count)
+            shares = [correct / samples for samples, correct in sums.values()]
             found = landscape.held_out_fidelity[i, j]
-            assert found == correct / covered if covered else np.isnan(found)
+            assert found == pytest.approx(np.mean(shares)) if shares else np.isnan(found)
+            ends = landscape.held_out_low[i, j], landscape.held_out_high[i, j]
+            expected = t_interval(shares) if len(shares) >= 5 else (np.nan, np.nan)
+            assert ends == pytest.approx(expected, nan_ok=True, abs=1e-9)
 
 
 def test_the_layer_is_there_for_each_dimension_and_for_all():
@@ -310,8 +350,21 @@ def test_the_layer_is_there_for_each_dimension_and_for_all():
     trees = grow_policy_trees(split.mined)
     counts = count_held_out(trees, split.held_out)
     landscape = threshold_landscape(trees, [0.0, 0.05], [0.8, 1.0], held_out=counts)
-    mined = with_held_out(mine_rules(trees, supp_min=0.05, conf_min=0.8), split.held_out)
+    mined = mine_rules(trees, supp_min=0.05, conf_min=0.8)
     parts = [mined.of_dimension(0), mined.of_dimension(1), mined.rules]
     for rules, part in zip(parts, (*landscape.dimensions, landscape), strict=True):
-        samples, correct = np.sum([rule.held_out for rule in rules], axis=0)
-        assert part.held_out_fidelity[1, 0] == correct / samples
+        together = count_rules(replace(mined, rules=tuple(rules)), split.held_out)
+        samples, correct = together.together(np.ones(len(rules), dtype=bool))
+        assert part.held_out_fidelity[1, 0] == pytest.approx(np.mean(correct / samples))
+
+
+def test_many_episodes_are_taken_a_few_at_a_time(lander_like, monkeypatch):
+    split = hold_out(lander_like, 0.5)
+    trees = grow_policy_trees(split.mined)
+    counts = count_held_out(trees, split.held_out)
+    axes = np.linspace(0, 0.2, 7), np.linspace(0, 1, 9)
+    whole = threshold_landscape(trees, *axes, held_out=counts)
+    monkeypatch.setattr("sarl_core.mining.landscape._CELLS_AT_ONCE", 150)
+    parted = threshold_landscape(trees, *axes, held_out=counts)
+    for name in ("held_out_fidelity", "held_out_low", "held_out_high"):
+        np.testing.assert_allclose(getattr(parted, name), getattr(whole, name), rtol=1e-12)

@@ -29,7 +29,8 @@ def right_share(rules, pairs):
         applies = rule.applies(pairs.observations)
         covered |= applies
         right |= applies & (pairs.actions == rule.action)
-    return right.sum() / covered.sum()
+    episodes = [pairs.episodes == episode for episode in np.unique(pairs.episodes)]
+    return np.mean([right[rows].sum() / covered[rows].sum() for rows in episodes])
 
 
 @pytest.fixture(scope="module")

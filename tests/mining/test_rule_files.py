@@ -70,11 +70,16 @@ def test_continuous_rules_come_back(tmp_path):
     }
 
 
+HELD = HeldOut(96, 87, 14, 0.91, 0.78, 0.99)
+
+
 def test_what_a_rule_carries_comes_back(lander_like):
     rules = mine_rules(lander_like, supp_min=0.02, conf_min=0.8)
     d = lander_like.observations.shape[1]
     box = DataBox((-2.0,) * d, (-1.0,) * d, (0.1,) * d, (float(np.float32(0.3)),) * d)
-    carried = replace(rules.rules[0], pinned=True, box=box, held_out=HeldOut(96, 87))
+    carried = replace(
+        rules.rules[0], pinned=True, box=box, held_out=HeldOut(96, 87, 14, 0.91, 0.78, 0.99)
+    )
     whole = replace(rules, rules=(carried, *rules.rules[1:]))
     again = rules_from_json(rules_to_json(whole))
     assert again == whole
@@ -82,8 +87,40 @@ def test_what_a_rule_carries_comes_back(lander_like):
     assert not again.rules[1].placed
 
 
+def test_held_out_pairs_of_version_1_are_read_without_episodes(lander_like):
+    document = json.loads(rules_to_json(mine_rules(lander_like, supp_min=0.02, conf_min=0.8)))
+    assert document["version"] == 1  # nothing in it is new
+    document["rules"][0]["held_out"] = {"samples": 96, "correct": 87}
+    read = rules_from_json(json.dumps(document))
+    assert read.rules[0].held_out == HeldOut(96, 87, 0, None, None, None)
+    again = json.loads(rules_to_json(read))
+    assert again["version"] == 2
+    assert again["rules"][0]["held_out"] == {
+        "samples": 96,
+        "correct": 87,
+        "episodes": 0,
+        "share": None,
+        "low": None,
+        "high": None,
+    }
+    assert rules_from_json(json.dumps(again)) == read
+
+
 def carrying(key, value):
     return lambda d: d["rules"][0].update({key: value})
+
+
+def held(version=2, **more):
+    """A file of a version, whose first rule has held-out pairs, with something else in them."""
+    counts = {"samples": 20, "correct": 15}
+    if version > 1 and more:
+        counts |= {"episodes": 8, "share": 0.7, "low": 0.5, "high": 0.9}
+
+    def change(document):
+        document["version"] = version
+        document["rules"][0]["held_out"] = counts | more
+
+    return change
 
 
 BAD = {
@@ -106,7 +143,15 @@ BAD = {
     ),
     "a pin that is no yes or no": (carrying("pinned", 1), "'pinned'"),
     "another format": (lambda d: d.update(format="other"), "format"),
-    "a later version": (lambda d: d.update(version=2), "version 2"),
+    "a later version": (lambda d: d.update(version=3), "version 3"),
+    "a version that is yes": (lambda d: d.update(version=True), "version True"),
+    "episodes in version 1": (held(version=1, episodes=3), "'episodes' is not known"),
+    "version 2 without episodes": (held(), "'episodes' is missing"),
+    "a share above 1": (held(share=1.1), "'share'"),
+    "no share of episodes": (held(share=None), "'share' does not match its episodes"),
+    "half an interval": (held(low=None), "no interval"),
+    "an interval inside out": (held(low=0.95), "no interval"),
+    "more episodes than pairs": (held(episodes=21), "'episodes'"),
     "an unknown key": (lambda d: d.update(colour="red"), "'colour'"),
     "an unknown key in a rule": (lambda d: d["rules"][0].update(weight=1), "'weight'"),
     "an unknown key in a condition": (
