@@ -440,8 +440,9 @@ class Shield:
         if faults and self.on_invalid == "raise":
             raise InputError(f"{faults[min(faults)]}; {_CURE}")
         bad = sorted(faults)
-        states = states.copy() if bad else states
-        states[bad] = 0.0
+        if bad:
+            states = states.copy()
+            states[bad] = 0.0
         rules, _ = self._match(states)
         rules[bad] = NO_RULE
         return rules
