@@ -15,6 +15,7 @@ from sarl_core.commandline.options import (
     Env,
     Json,
     Normalise,
+    OnInvalidName,
     OutsideName,
     ProjectionName,
     Seed,
@@ -50,6 +51,7 @@ def ablate(
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -82,7 +84,7 @@ def ablate(
         from sarl_core.explaining.cells import safe_cells
         from sarl_core.rollouts.ablating import ablate as run
 
-        shield = read_shield(rules, projection, outside)
+        shield = read_shield(rules, projection, outside, on_invalid)
         assert shield is not None
         found = run(
             env,

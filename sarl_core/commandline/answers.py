@@ -350,6 +350,11 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
                 else [("interventions outside the data", _outside(summary, shield))]
             ),
             ("coverage", f"{share_text(summary['coverage'])} of the steps have a rule"),
+            *(
+                []
+                if "invalid_steps" not in summary
+                else [("not checked", _invalid(summary["invalid_steps"]))]
+            ),
         ]
     )
     print_notes(document["notes"])
@@ -372,6 +377,18 @@ def _outside(summary: dict[str, float], shield: Shield) -> str:
         return "not known: this rule file keeps no data boxes"
     left = ", where the action was left as it is" if shield.outside == "abstain" else ""
     return f"{share_text(summary['outside_rate'])} of the interventions{left}"
+
+
+def _invalid(count: int) -> str:
+    """In how many steps no rule was asked."""
+    from sarl_core.explaining.language import counted
+
+    if not count:
+        return "none: every state and every action was a valid one"
+    return (
+        f"{counted(count, 'step')}, where the observation was no state or the action none that "
+        "there is; the action passed as it was"
+    )
 
 
 def _episode(row: dict[str, Any]) -> tuple[str, ...]:
@@ -415,5 +432,12 @@ def print_replay(document: dict[str, Any]) -> None:
             (f"{entry['agent']}{', shielded' if entry['shielded'] else ''}", *_episode(entry))
             for entry in document["episodes"]
         ],
+    )
+    terminal.print_lines(
+        [
+            f"not checked: {_invalid(entry['invalid'])}"
+            for entry in document["episodes"]
+            if "invalid" in entry
+        ]
     )
     print_notes(document["notes"])

@@ -67,6 +67,7 @@ def read_shield(
     rules: Path | None,
     projection: Literal["centre", "clip", "expert"],
     outside: Literal["act", "abstain"] = "act",
+    on_invalid: Literal["raise", "pass"] = "raise",
 ) -> Shield | None:
     """Read a rule file into a shield.
 
@@ -74,6 +75,7 @@ def read_shield(
         rules: Of the option ``--rules``, or None.
         projection: What becomes of a continuous action that breaks a rule.
         outside: What a rule does in a state outside its data.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
 
     Returns:
         The shield, or None without rules.
@@ -87,7 +89,9 @@ def read_shield(
     from sarl_core.mining.rules import RuleSet
     from sarl_core.shielding.shield import Shield
 
-    shield = Shield(RuleSet.load(rules), projection=projection, outside=outside)
+    shield = Shield(
+        RuleSet.load(rules), projection=projection, outside=outside, on_invalid=on_invalid
+    )
     if outside == "abstain" and not shield.keeps_boxes:
         raise InputError(
             f"{rules}: this rule file keeps no data boxes, so --outside abstain would do nothing; "

@@ -14,6 +14,7 @@ from sarl_core.commandline.options import (
     Env,
     Json,
     Normalise,
+    OnInvalidName,
     OutsideName,
     ProjectionName,
     Rules,
@@ -40,6 +41,7 @@ def evaluate(
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
     as_json: Json = False,
 ) -> None:
     """Run episodes, shielded or not: returns, lengths, interventions, coverage.
@@ -50,7 +52,7 @@ def evaluate(
     with terminal.working("Running episodes") as advance:
         from sarl_core.rollouts.episodes import rollout
 
-        shield = read_shield(rules, projection, outside)
+        shield = read_shield(rules, projection, outside, on_invalid)
         found = rollout(
             env,
             read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
@@ -95,6 +97,7 @@ def render(
     stochastic: Stochastic = False,
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
     as_json: Json = False,
 ) -> None:
     """Play one episode and save it as a moving picture, in real time.
@@ -103,7 +106,7 @@ def render(
     --seed 1 --side-by-side --out replay.gif`
     """
     terminal.check_output(out, (".gif", ".mp4"))
-    shield = read_shield(rules, projection, outside)
+    shield = read_shield(rules, projection, outside, on_invalid)
     if both and shield is None:
         raise InputError("--side-by-side compares with a shield; give --rules, or leave it out")
     with terminal.working("Playing") as advance:

@@ -40,8 +40,9 @@ def recorder_columns(
 
     Returns:
         Column name to one value a row: the seed, the step, for each dimension what the agent
-        wanted, what was done and the rule's id, then "Changed", "Outside", "Distance", "Reward"
-        and the features, with their units. Where no threshold was looked at, the distance is NaN.
+        wanted, what was done and the rule's id, then "Changed", "Outside", "Not checked" (why no
+        rule was asked), "Distance", "Reward" and the features, with their units. Where no
+        threshold was looked at, the distance is NaN.
     """
     part = steps.take(rows)
     columns: dict[str, list[object]] = {}
@@ -65,6 +66,8 @@ def recorder_columns(
         columns["Changed"] = part.intervened.tolist()
         if steps.outside.any():
             columns["Outside"] = part.outside.tolist()
+        if steps.is_invalid.any():
+            columns["Not checked"] = [why or "" for why in part.invalid.tolist()]
         columns["Distance"] = [
             value if math.isfinite(value) else math.nan for value in part.margin.tolist()
         ]

@@ -54,10 +54,12 @@ class StepView:
     Attributes:
         step: Its index.
         actions: One entry an action dimension.
-        margin: Distance to the nearest threshold, inf where none was looked at.
+        margin: Distance to the nearest threshold, inf where none was looked at, NaN where no
+            rule was asked.
         state: Name, value and unit of each feature.
         outside: Whether the state lies outside the data of a rule that the agent's action
             breaks.
+        invalid: Why no rule was asked, "" where they were.
     """
 
     step: int
@@ -65,6 +67,7 @@ class StepView:
     margin: float
     state: tuple[tuple[str, str, str], ...]
     outside: bool = False
+    invalid: str = ""
 
     @property
     def intervened(self) -> bool:
@@ -205,7 +208,7 @@ def step_view(
                 executed=value_text(float(executed), dimension),
                 proposed_label=dimension.label_of(float(proposed)),
                 executed_label=dimension.label_of(float(executed)),
-                changed=bool(proposed != executed),
+                changed=bool(proposed != executed) and steps.invalid[row] is None,
                 rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
                 rule_id=rule_set.rules[rule].id if known and rule_set else "",
                 abstains=known
@@ -214,7 +217,7 @@ def step_view(
             )
         )
     state = tuple(
-        (feature.name, number_text(float(value)), feature.unit)
+        (feature.name, _state_text(float(value)), feature.unit)
         for feature, value in zip(features, steps.observation[row], strict=True)
     )
     return StepView(
@@ -223,6 +226,7 @@ def step_view(
         float(steps.margin[row]),
         state,
         bool(steps.outside[row]),
+        steps.invalid[row] or "",
     )
 
 
@@ -246,20 +250,23 @@ def step_texts(
             steps.proposed[:, index].tolist(),
             steps.executed[:, index].tolist(),
             steps.rules[:, index].tolist(),
+            steps.invalid.tolist(),
             strict=True,
         )
-        for line, (proposed, executed, rule) in zip(lines, pairs, strict=True):
+        for line, (proposed, executed, rule, invalid) in zip(lines, pairs, strict=True):
             done = plain(value_text(executed, dimension))
-            if proposed != executed:
+            if proposed != executed and invalid is None:
                 wanted = plain(value_text(proposed, dimension))
                 line.append(f"{prefix}wanted {wanted}, done {done}")
             else:
                 line.append(f"{prefix}{done}")
             if rule_set is not None:
                 known = f"rule {plain(rule_set.rules[rule].id)}" if rule >= 0 else ""
-                line.append(known or "no rule applies")
+                line.append(known or ("no rule applies" if invalid is None else "not checked"))
     for row in np.flatnonzero(steps.outside).tolist():
         lines[row].append("outside the data behind the rule")
+    for row in np.flatnonzero(steps.is_invalid).tolist():
+        lines[row].append(plain(steps.invalid[row]))
     return tuple("<br>".join(line) for line in lines)
 
 
@@ -267,12 +274,13 @@ def margin_text(margin: float) -> str:
     """The distance to the nearest threshold, in words.
 
     Args:
-        margin: In the feature's own unit; inf where no threshold was looked at.
+        margin: In the feature's own unit; inf where no threshold was looked at, NaN where no
+            rule was asked.
 
     Returns:
         As "Smallest distance to a threshold on the way: 0.013 (in that feature's unit)".
     """
-    if math.isinf(margin):
+    if not math.isfinite(margin):
         return "No threshold was looked at"
     return (
         f"Smallest distance to a threshold on the way: {number_text(margin)} "
@@ -296,6 +304,12 @@ def value_text(value: float, dimension: LabelledDimension) -> str:
     if not 0 <= label < dimension.n_labels:
         return f"{dimension.name} {value:g}"
     return action_text(label, dimension)
+
+
+def _state_text(value: float) -> str:
+    if math.isnan(value):
+        return "not a number"
+    return number_text(value) if math.isfinite(value) else f"{'-' if value < 0 else ''}infinite"
 
 
 def _edges(low: float, high: float, divider: int) -> NDArray[np.float64]:

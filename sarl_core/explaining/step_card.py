@@ -64,7 +64,14 @@ def step_card(view: StepView, *, shielded: bool) -> str:
         HTML without script.
     """
     several = len(view.actions) > 1
-    parts = [_action(action, shielded=shielded, named=several) for action in view.actions]
+    parts = [
+        _action(action, shielded=shielded, named=several, checked=not view.invalid)
+        for action in view.actions
+    ]
+    if view.invalid:
+        parts.append(
+            f"<p><b>No rule was asked:</b> {escape(view.invalid)}. The action stays as it is.</p>"
+        )
     if view.outside:
         parts.append(
             "<p><b>Outside the data:</b> this state lies beyond the values seen where the rule "
@@ -77,7 +84,7 @@ def step_card(view: StepView, *, shielded: bool) -> str:
     return f'{_STYLE}<div class="sarl-step">{"".join(parts)}{table}</div>'
 
 
-def _action(action: ActionView, *, shielded: bool, named: bool) -> str:
+def _action(action: ActionView, *, shielded: bool, named: bool, checked: bool) -> str:
     done = swatch(action.executed, label_colour(action.executed_label))
     said, text = "", f"The agent chose {done}."
     if action.changed:
@@ -91,7 +98,7 @@ def _action(action: ActionView, *, shielded: bool, named: bool) -> str:
         said = badge("Allowed by the rules", "allowed")
         text = f"The agent wanted {done}, as the rule says."
     elif shielded:
-        said = badge("No rule applies")
+        said = badge("No rule applies" if checked else "Not checked")
     parts = [f"<p><b>{escape(action.dimension)}</b></p>" if named else ""]
     if said:
         parts.append(f"<p>{said}</p>")

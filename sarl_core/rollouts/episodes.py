@@ -56,6 +56,8 @@ class Episodes:
             outside of, (E,) int64; none where not given.
         withheld: Those of them at which no action was changed, because rules abstain there,
             (E,) int64; none where not given.
+        invalid: Steps at which the action passed because the observation was no state or the
+            action none that there is, (E,) int64; None where no shield lets them pass.
         notes: What is to be said of how rules and environment were matched, as clauses.
     """
 
@@ -74,6 +76,7 @@ class Episodes:
     outside: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     withheld: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     notes: tuple[str, ...] = ()
+    invalid: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -112,6 +115,8 @@ class Episodes:
             changed["steps"] = self.steps.take(slice(*ends.tolist())).numbered_from(-start)
         if self.flips is not None:
             changed["flips"] = self.flips[start:stop]
+        if self.invalid is not None:
+            changed["invalid"] = self.invalid[start:stop]
         return replace(self, **changed)
 
     @cached_property
@@ -125,11 +130,13 @@ class Episodes:
         Returns:
             `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all
             steps `intervention_rate` and `coverage`; and `outside_rate`, the share of the
-            interventions, those that were withheld with them, outside the rules' data.
+            interventions, those that were withheld with them, outside the rules' data. Where
+            invalid steps pass, `invalid_steps`, how many there were.
         """
         returns = self.statistics
         steps = float(self.lengths.sum())
         broken = int(self.interventions.sum() + self.withheld.sum())
+        invalid = {} if self.invalid is None else {"invalid_steps": int(self.invalid.sum())}
         return {
             "mean": returns.mean,
             "std": returns.std,
@@ -139,6 +146,7 @@ class Episodes:
             "intervention_rate": float(self.interventions.sum()) / steps,
             "coverage": float(self.covered.sum()) / steps,
             "outside_rate": float(self.outside.sum()) / max(broken, 1),
+            **invalid,
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -152,8 +160,12 @@ class Episodes:
             strict=True,
         )
         names = ("seed", "return", "length", "interventions", "covered")
+        episodes = [dict(zip(names, row, strict=True)) for row in rows]
+        if self.invalid is not None:
+            for episode, count in zip(episodes, self.invalid.tolist(), strict=True):
+                episode["invalid"] = count
         return {
-            "episodes": [dict(zip(names, row, strict=True)) for row in rows],
+            "episodes": episodes,
             "summary": self.summary(),
             "notes": list(self.notes),
         }
@@ -181,7 +193,7 @@ class Episodes:
 _COLUMNS = tuple(
     column.name
     for column in fields(Episodes)
-    if column.name not in ("env_id", "agent", "steps", "flips", "notes")
+    if column.name not in ("env_id", "agent", "steps", "flips", "notes", "invalid")
 )
 
 
@@ -208,7 +220,9 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
     steps = concatenate(tables) if len(tables) == len(pieces) else None
     counted = [piece.flips for piece in pieces if piece.flips is not None]
     flips = np.concatenate(counted) if len(counted) == len(pieces) else None
-    return replace(pieces[0], steps=steps, flips=flips, **columns)
+    passed = [piece.invalid for piece in pieces if piece.invalid is not None]
+    invalid = np.concatenate(passed) if len(passed) == len(pieces) else None
+    return replace(pieces[0], steps=steps, flips=flips, invalid=invalid, **columns)
 
 
 def rollout(

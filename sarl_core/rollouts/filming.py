@@ -66,6 +66,7 @@ class _Row(NamedTuple):
     margin: float
     reward: float
     outside: bool
+    invalid: str | None
 
 
 def film_episode(
@@ -128,6 +129,9 @@ def film_episode(
         withheld=np.array([int((steps.outside & ~steps.intervened).sum())]),
         flips=count_flips(steps.intervened, steps.episode),
         notes=notes,
+        invalid=np.array([int(steps.is_invalid.sum())])
+        if shield is not None and shield.on_invalid == "pass"
+        else None,
     )
 
 
@@ -149,7 +153,7 @@ def _film_step(
     if record is None:
         rules = [-1] * adapter.n_dimensions
         action = proposed[0]
-        row = _Row(0, step, state, action, action, rules, False, np.inf, float(reward), False)
+        row = _Row(0, step, state, action, action, rules, False, np.inf, float(reward), False, None)
     else:
         rules = [-1 if rule is None else rule for rule in record.rules]
         row = _Row(
@@ -163,6 +167,7 @@ def _film_step(
             record.margin,
             float(reward),
             record.outside,
+            record.invalid,
         )
     return row, following, bool(terminated), bool(truncated)
 
@@ -185,6 +190,7 @@ def _table(rows: list[_Row], adapter: SpaceAdapter) -> StepTable:
         margin=np.array(columns.margin, dtype=np.float64),
         reward=np.array(columns.reward, dtype=np.float64),
         outside=np.array(columns.outside, dtype=np.bool_),
+        invalid=np.array(columns.invalid, dtype=np.object_),
     )
 
 

@@ -133,6 +133,9 @@ class Panel:
             outside = int(self.steps.outside.sum())
             if outside:
                 lines.append(f"At {outside} steps the state was outside the data behind the rule.")
+            unchecked = int(self.steps.is_invalid.sum())
+            if unchecked:
+                lines.append(f"At {unchecked} steps no rule was asked, for want of valid numbers.")
             for line, text in enumerate(lines):
                 canvas.text(_MARGIN, top + 42 + 20 * line, text, 14, INKS.quiet)
 
@@ -188,6 +191,14 @@ class Panel:
                 "No shield: every action is executed as proposed.",
                 False,
             )
+        invalid = self.steps.invalid[step]
+        if invalid is not None:
+            return Caption(
+                "NOT CHECKED",
+                action_text(self.description, executed),
+                f"No rule was asked, and the action stays as it is: {invalid}.",
+                False,
+            )
         if not rules:
             return Caption(
                 "NO RULE",
@@ -221,7 +232,7 @@ class Caption(NamedTuple):
     """What the lower strip says.
 
     Attributes:
-        mark: CHANGED, AGREES, ABSTAINS, NO RULE, or "" without a shield.
+        mark: CHANGED, AGREES, ABSTAINS, NO RULE, NOT CHECKED, or "" without a shield.
         action: What is done; where it was changed, also what was proposed.
         reason: The rule in force.
         has_rule: Whether `reason` is a rule.

@@ -33,6 +33,7 @@ class Outcome(NamedTuple):
     outside: NDArray[np.int64]
     withheld: NDArray[np.int64]
     notes: tuple[str, ...]
+    invalid: NDArray[np.int64] | None
 
 
 class Choice(NamedTuple):
@@ -44,6 +45,7 @@ class Choice(NamedTuple):
     intervened: NDArray[np.bool_]
     margin: NDArray[np.float64]
     outside: NDArray[np.bool_]
+    invalid: NDArray[np.object_]
 
 
 @dataclass
@@ -122,7 +124,7 @@ class _Run:
         self.terminated, self.truncated = np.zeros((2, count), dtype=np.bool_)
         self.flips = np.zeros(count, dtype=np.int64)
         self.on = np.zeros(count, dtype=np.bool_)  # whether the shield changed the latest action
-        self.outside, self.withheld = np.zeros((2, count), dtype=np.int64)
+        self.outside, self.withheld, self.invalid = np.zeros((3, count), dtype=np.int64)
         self.chunks: list[tuple[NDArray[Any], ...]] = []
 
     def start(self) -> None:
@@ -158,7 +160,7 @@ class _Run:
         ended: list[tuple[int, bool, bool]] = []
         for index, lane in enumerate(self.lanes):
             observation, reward, terminated, truncated, _ = lane.env.step(actions[index])
-            following[index] = observation if adapter.is_vector else adapter.flat(observation)
+            following[index] = adapter.flat(observation)
             rewards[index] = reward
             if terminated or truncated:
                 ended.append((index, bool(terminated), bool(truncated)))
@@ -175,6 +177,7 @@ class _Run:
                     choice.margin,
                     rewards,
                     choice.outside,
+                    choice.invalid,
                 )
             )
         self.returns[episodes] += rewards
@@ -187,6 +190,8 @@ class _Run:
             self.covered[episodes] += (choice.rules >= 0).any(axis=1)
             self.outside[episodes] += choice.outside
             self.withheld[episodes] += choice.outside & ~choice.intervened
+            if self.shield.on_invalid == "pass":
+                self.invalid[episodes] += choice.invalid.astype(np.bool_)
         self.lengths[episodes] += 1
         self.states = following
         return self._end(ended, episodes)
@@ -230,6 +235,7 @@ class _Run:
             self.outside,
             self.withheld,
             self.notes,
+            None if self.shield is None or self.shield.on_invalid == "raise" else self.invalid,
         )
 
 
@@ -261,7 +267,8 @@ def choose(
     if shield is None:
         none = np.full(proposed.shape, -1, dtype=np.int64)
         never = np.zeros(len(states), dtype=np.bool_)
-        return Choice(proposed, proposed, none, never, np.full(len(states), np.inf), never)
+        valid = np.full(len(states), None, dtype=np.object_)
+        return Choice(proposed, proposed, none, never, np.full(len(states), np.inf), never, valid)
     decision = shield.decide_batch(states, adapter.shaped(proposed))
     executed: Any = decision.executed
     if executed.dtype != proposed.dtype:  # what is executed is a number of the agents' kind, too
@@ -273,6 +280,7 @@ def choose(
         decision.intervened,
         decision.margin,
         decision.outside,
+        decision.invalid,
     )
 
 

@@ -7,7 +7,7 @@ vector, a matrix. This is the only place that knows both.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,14 +44,15 @@ class SpaceAdapter:
             observation: As the environment gives it.
 
         Returns:
-            Shape (d,), float32.
+            Shape (d,), float32; all NaN where it is no observation of the space.
         """
-        from gymnasium.spaces import utils
+        from sarl_core.shielding.reading import state_vector
 
-        if not self.is_vector:
-            observation = utils.flatten(self.observation_space, observation)
-        result: NDArray[np.float32] = np.asarray(observation, dtype=np.float32).reshape(-1)
-        return result
+        vector = state_vector(observation, None if self.is_vector else self.observation_space)
+        whole = type(vector) is np.ndarray and vector.shape == (self.n_features,)
+        if whole and vector.dtype == np.float32:
+            return cast(NDArray[np.float32], vector)
+        return np.full(self.n_features, np.nan, dtype=np.float32)
 
     def shaped(self, columns: Actions) -> Actions:
         """Give actions the environment's form, as the shield takes them.

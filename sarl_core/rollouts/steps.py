@@ -27,10 +27,13 @@ class StepTable:
         executed: The actions the environment got, likewise.
         rules: Index of the rule in force for each action dimension or -1, (T, m) int64.
         intervened: Whether the shield changed the action, (T,) bool.
-        margin: Distance to the nearest threshold on the paths walked, inf without one, (T,).
+        margin: Distance to the nearest threshold on the paths walked, inf without one, NaN where
+            no rule was asked, (T,).
         reward: What the environment gave, (T,) float64.
         outside: Whether the state lies outside the data of a rule that the proposed action
             breaks, (T,) bool; nowhere where not given.
+        invalid: Why no rule was asked, where the observation was no state or the proposed action
+            none that there is and it passed; else None, (T,) objects; nowhere where not given.
     """
 
     episode: NDArray[np.int64]
@@ -43,11 +46,14 @@ class StepTable:
     margin: NDArray[np.float64]
     reward: NDArray[np.float64]
     outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    invalid: NDArray[np.object_] = field(default_factory=lambda: np.zeros(0, dtype=np.object_))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
         if not len(self.outside):
             object.__setattr__(self, "outside", np.zeros(len(self.step), dtype=np.bool_))
+        if not len(self.invalid):
+            object.__setattr__(self, "invalid", np.full(len(self.step), None, dtype=np.object_))
         for column in fields(self):
             getattr(self, column.name).flags.writeable = False
 
@@ -68,6 +74,11 @@ class StepTable:
     def covered(self) -> NDArray[np.bool_]:
         """Whether some rule applied, (T,) bool."""
         return np.asarray((self.rules >= 0).any(axis=1))
+
+    @property
+    def is_invalid(self) -> NDArray[np.bool_]:
+        """Whether no rule was asked, because there was no state or no action to ask about, (T,)."""
+        return self.invalid.astype(np.bool_)
 
     def take(self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice) -> StepTable:
         """Some of the steps.
@@ -112,7 +123,7 @@ class StepTable:
         Returns:
             Columns `episode`, `step`, `obs_<name>`..., `proposed_<i>`..., `executed_<i>`...,
             `rule_<i>`..., `intervened`, `outside`, `margin`, `reward`; without `_<i>` where there
-            is one.
+            is one. Where some step was invalid, also `invalid`: why, or "".
         """
         import pandas as pd
 
@@ -134,6 +145,8 @@ class StepTable:
             "margin": self.margin,
             "reward": self.reward,
         }
+        if self.is_invalid.any():
+            columns["invalid"] = [why or "" for why in self.invalid.tolist()]
         return pd.DataFrame(columns)
 
 
