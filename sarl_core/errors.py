@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+
+_LONGEST = 480  # characters of a message; nobody reads more
+_QUOTED = 40  # of what a message repeats from a file
+# Signs that move a terminal's cursor, turn the direction of text, or cannot be written as UTF-8.
+_UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
 
 class SarlError(Exception):
-    """Anything that the user of the library can cause and mend; the message is one sentence."""
+    """Anything that the user of the library can cause and mend.
+
+    The message is one sentence on one line. It may repeat what stands in a file, so signs that
+    are not for people are taken out of it, and where it is too long its middle is left out: it
+    begins with what is wrong and ends with what to do.
+    """
+
+    def __init__(self, message: object = "") -> None:
+        text = _seen(str(message))
+        if len(text) > _LONGEST:
+            head = 2 * _LONGEST // 3
+            text = f"{text[:head]} … {text[head + 3 - _LONGEST :]}"
+        super().__init__(text)
 
 
 class InputError(SarlError):
@@ -13,3 +33,34 @@ class InputError(SarlError):
 
 class WorkError(SarlError):
     """The input was fine and the work failed all the same. The command line exits with 1."""
+
+
+def quoted(value: object) -> str:
+    """A value from a file as a sentence quotes it.
+
+    Args:
+        value: Whatever was read.
+
+    Returns:
+        A text in quotation marks, a number as Python writes it, anything else in words; short, on
+        one line, and without signs that are not for people.
+    """
+    if isinstance(value, bytes):
+        value = value[: 4 * _QUOTED].decode(errors="replace")
+    if isinstance(value, str):
+        return repr(_short(_seen(value[: 2 * _QUOTED])))
+    if isinstance(value, (list, tuple)):
+        return "a list"
+    if isinstance(value, Mapping):
+        return "an object"
+    if isinstance(value, int) and abs(value) > 10**_QUOTED:  # Python may refuse to write it
+        return "far too large"
+    return _short(_seen(repr(value)))
+
+
+def _seen(text: str) -> str:
+    return _UNSEEN.sub(lambda sign: " " if sign[0].isspace() else "\N{REPLACEMENT CHARACTER}", text)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}..."

@@ -103,6 +103,16 @@ def zip_bomb(*, says: int) -> bytes:
     return bytes(content)
 
 
+def spoilt_npz(place: int, value: bytes) -> bytes:
+    """The good arrays, with something else in every entry of the archive's directory."""
+    content = bytearray(npz_bytes(**good_arrays()))
+    at = content.find(b"PK\x01\x02")
+    while at >= 0:
+        content[at + place : at + place + len(value)] = value
+        at = content.find(b"PK\x01\x02", at + 1)
+    return bytes(content)
+
+
 def npy_header(shape: tuple[int, ...]) -> bytes:
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(
@@ -274,6 +284,38 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         parquet_bytes(with_value("obs_y", 5, float("inf"))),
         ("'obs_y'", "infinite", "row 5"),
     ),
+    "no reading csv": (
+        "demo.csv",
+        changed(2, "0,1,3.4028235e38,1,0"),
+        ("'obs_x'", "row 2", "no reading"),
+    ),
+    "no reading parquet": (
+        "demo.parquet",
+        parquet_bytes(
+            good_columns() | {"obs_x": [0.5, -3.4028234663852886e38, 0.1, 9.96921e36, 0]}
+        ),
+        ("'obs_x' is -3.40282e+38 in row 2", "first of 2", "no reading"),
+    ),
+    "actions beyond measure npz": (
+        "demo.npz",
+        npz_bytes(**good_arrays() | {"actions": np.array([3e38, -3e38, 0.5, 1, 2], np.float32)}),
+        ("'actions' is 3e+38 in row 1", "no reading"),
+    ),
+    "rewards beyond measure npz": (
+        "demo.npz",
+        npz_bytes(**good_arrays(), rewards=np.array([1, 2, 1.7e308, 0, 0])),
+        ("'rewards' is 1.7e+308 in row 3", "no reading"),
+    ),
+    "hexadecimal csv": ("demo.csv", changed(4, "1,0,0x10,1,0"), ("'obs_x'", "'0x10'", "row 4")),
+    "hexadecimal action csv": ("demo.csv", changed(2, "0,1,1,1,0X1"), ("'action'", "'0X1'")),
+    "underscore csv": ("demo.csv", changed(1, "0,0,1_000,1,0"), ("'obs_x'", "'1_000'", "row 1")),
+    "nan with a payload csv": ("demo.csv", changed(1, "0,0,nan(7),1,0"), ("'obs_x'", "'nan(7)'")),
+    "Arabic digits csv": ("demo.csv", changed(1, "0,0,٣,1,0"), ("'obs_x'", "'٣'", "row 1")),
+    "numbers and truth values csv": (
+        "demo.csv",
+        changed(3, "0,2,true,1.0,0"),
+        ("'obs_x'", "true or false"),
+    ),
     "beyond float32 csv": (
         "demo.csv",
         changed(2, "0,1,1e39,1,0"),
@@ -356,6 +398,23 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     ),
     "zip bomb npz": ("demo.npz", zip_bomb(says=2**32 - 2), ("unpacks to", "GiB")),
     "lying zip npz": ("demo.npz", zip_bomb(says=2**10), ("damaged",)),
+    "indices with marks in two columns npz": (
+        "demo.npz",
+        npz_bytes(
+            obs=np.zeros((5, 2)),
+            acts=np.array([0, 1, 0, 1, 1]),
+            indices=np.array([3]),
+            terminals=np.zeros((2, 2), bool),
+        ),
+        ("'terminals'", "one number a step"),
+    ),
+    "encrypted npz": ("demo.npz", spoilt_npz(8, b"\x01\x00"), ("encrypted", "password")),
+    "other compression npz": ("demo.npz", spoilt_npz(10, b"\x0e\x00"), ("compressed in a way",)),
+    "archive of far too many files npz": (
+        "demo.npz",
+        b"PK\x03\x04" + b"PK\x05\x06" + bytes(8) + b"\xff\xff\xff\x7f" + bytes(6),
+        ("far too many files",),
+    ),
     "truncated npz": ("demo.npz", npz_bytes(**good_arrays())[:-40], ("damaged",)),
     "shape beyond its content npz": (
         "demo.npz",

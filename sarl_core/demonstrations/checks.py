@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.requirements import (
+    LARGEST,
     as_numbers,
     column_of_numbers,
     flags,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 MAX_FEATURES = 4096
 MAX_LABELS = 10_000  # of one action dimension whose space is not known
+MAX_ALL_LABELS = 100_000  # of all action dimensions together
 _SHOWN_WARNINGS = 5  # of one kind; the rest is counted
 
 
@@ -242,6 +244,13 @@ def _labels(
         if raw.label_first is None:
             # What is always done is one action, and not one of as many as its number is high.
             first = tuple(low if low == high else 0 for low, high in zip(least, most, strict=True))
+        labels = sum(high - low + 1 for low, high in zip(first, most, strict=True))
+        if labels > MAX_ALL_LABELS:
+            raise InputError(
+                f"the {m:,} action dimensions have {labels:,} labels, more than the "
+                f"{MAX_ALL_LABELS:,} that rules a person reads could use; number those of each "
+                "from 0, or choose fewer"
+            )
         names = tuple(
             tuple(str(label) for label in range(low, high + 1))
             for low, high in zip(first, most, strict=True)
@@ -285,7 +294,7 @@ def _bounds(
             actions, low.tolist(), high.tolist(), [f"action {name!r}" for name in action_names]
         )
     # A space that is not bounded has nothing to divide: what was shown is divided.
-    unbounded = ~(np.isfinite(low) & np.isfinite(high))
+    unbounded = ~((low >= -LARGEST) & (high <= LARGEST))
     if unbounded.any():
         low, high = np.where(unbounded, least, low), np.where(unbounded, most, high)
         source = "demonstrated values"

@@ -13,6 +13,8 @@ from sarl_core.errors import InputError
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
 
 _EXACT = 2**53  # up to here every whole number is a float64
+# Nothing is measured beyond it, and the sum of as many numbers as fit in memory is a float32 yet.
+LARGEST = 1e30
 
 
 def require_length(got: int, wanted: int, what: str, other: str) -> None:
@@ -24,7 +26,7 @@ def require_length(got: int, wanted: int, what: str, other: str) -> None:
 def require_finite(
     values: NDArray[Any], columns: Sequence[str], rows: NDArray[np.int64] | None = None
 ) -> None:
-    """Refuse NaN and infinity.
+    """Refuse NaN, infinity, and the huge numbers that devices write where they read nothing.
 
     Args:
         values: Shape (N, k).
@@ -34,14 +36,23 @@ def require_finite(
     Raises:
         InputError: With the column and the first row.
     """
-    finite = np.isfinite(values)
-    if finite.all():
+    if values.dtype.kind != "f":
         return
-    row, column = _first(~finite)
-    kind = "not a number (NaN)" if np.isnan(values[row, column]) else "infinite"
-    raise InputError(
-        f"{columns[column]} is {kind} in row {_number(row, rows)}; mend or remove that row"
-    )
+    fine = np.abs(values) <= np.float32(LARGEST)
+    if fine.all():
+        return
+    row, column = _first(~fine)
+    value = values[row, column]
+    where = f"in row {_number(row, rows)}"
+    if np.isfinite(value):
+        count = int((~fine[:, column]).sum())
+        raise InputError(
+            f"{columns[column]} is {value:g} {where}, the first of {count:,}, which is no "
+            "measurement but what is often written where there was no reading; mend or remove "
+            "such rows"
+        )
+    kind = "not a number (NaN)" if np.isnan(value) else "infinite"
+    raise InputError(f"{columns[column]} is {kind} {where}; mend or remove that row")
 
 
 def require_labels(

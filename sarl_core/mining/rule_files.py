@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.errors import InputError
+from sarl_core.demonstrations.requirements import LARGEST
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
@@ -20,7 +24,6 @@ FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
 """Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
 version 1, which is what it was before there was another."""
-_MAX_BYTES = 256 * 2**20
 _LARGEST = sys.float_info.max
 _MOST = 2**53  # whole numbers up to here are exact in floating point too
 
@@ -51,8 +54,8 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
         InputError: If it is no rule file, or holds anything this version does not know.
     """
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = parse_json(text, finite=False)
+    except ValueError as error:
         raise InputError(
             f"{name} is not JSON ({error}); give a rule file that `mine` wrote"
         ) from error
@@ -63,7 +66,7 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
     version = document.get("version")
     if isinstance(version, bool) or version not in VERSIONS:
         raise InputError(
-            f"{name} has version {_shown(version)} of the rule format, and this program reads "
+            f"{name} has version {quoted(version)} of the rule format, and this program reads "
             f"versions {VERSIONS[0]} to {VERSIONS[-1]}; use a program of its version"
         )
     return _rule_set(_Reader(document, name, ""))
@@ -97,9 +100,9 @@ def load_rules(path: Path) -> RuleSet:
         InputError: If it cannot be read or is no rule file.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{path} has over {_MAX_BYTES >> 20} MB, more than any rule file")
-        text = path.read_bytes()
+        text = limited_bytes(path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); give a rule file") from error
     return rules_from_json(text, name=str(path))
@@ -192,7 +195,7 @@ class _Reader:
         kinds = kind if isinstance(kind, tuple) else (kind,)
         boolean = isinstance(value, bool) and bool not in kinds
         if value is not default and (boolean or not isinstance(value, kinds)):
-            raise self.fail(f"{key!r} is {_shown(value)}, of the wrong kind")
+            raise self.fail(f"{key!r} is {quoted(value)}, of the wrong kind")
         return value
 
     def has(self, key: str) -> bool:
@@ -204,13 +207,13 @@ class _Reader:
         value = self.take(key, (int, float), default)
         # Compared before it is converted: an integer may be too large for a float.
         if not low <= value <= high:
-            raise self.fail(f"{key!r} is {_shown(value)}, not a number from {low:g} to {high:g}")
+            raise self.fail(f"{key!r} is {quoted(value)}, not a number from {low:g} to {high:g}")
         return float(value)
 
     def count(self, key: str, default: Any = ..., *, low: int = 0, high: int = _MOST) -> int:
         value: int = self.take(key, int, default)
         if not low <= value <= high:
-            raise self.fail(f"{key!r} is {_shown(value)}, not a whole number from {low} to {high}")
+            raise self.fail(f"{key!r} is {quoted(value)}, not a whole number from {low} to {high}")
         return value
 
     def limit(self, key: str) -> int | None:
@@ -256,13 +259,7 @@ class _Reader:
     def finish(self) -> None:
         """Refuse what nobody asked for, by name."""
         if self._value:
-            raise self.fail(f"{_shown(next(iter(self._value)))} is not known to this version")
-
-
-def _shown(value: object) -> str:
-    """A value from a file, short enough for a sentence."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < _MOST else "far too large"
-    return text if len(text) <= 40 else f"{text[:40]}..."
+            raise self.fail(f"{quoted(next(iter(self._value)))} is not known to this version")
 
 
 def _rule_set(document: _Reader) -> RuleSet:
@@ -301,15 +298,15 @@ def _rule_set(document: _Reader) -> RuleSet:
         part.finish()
     ids = [rule.id for rule in rule_set.rules]
     if len(set(ids)) < len(ids):
-        doubled = next(one for one in ids if ids.count(one) > 1)
-        raise document.fail(f"the rule id {doubled!r} stands twice")
+        doubled = next(one for one, count in Counter(ids).items() if count > 1)
+        raise document.fail(f"the rule id {quoted(doubled)} stands twice")
     return rule_set
 
 
 def _read_cut(document: _Reader) -> Literal["thresholds", "leaves"]:
     cut: Literal["thresholds", "leaves"] = document.take("cut", str, "thresholds")
     if cut not in ("thresholds", "leaves"):
-        raise document.fail(f"the cut {_shown(cut)} is neither 'thresholds' nor 'leaves'")
+        raise document.fail(f"the cut {quoted(cut)} is neither 'thresholds' nor 'leaves'")
     return cut
 
 
@@ -332,7 +329,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
         numeric = all(
             isinstance(edge, (int, float))
             and not isinstance(edge, bool)
-            and -_LARGEST <= edge <= _LARGEST
+            and -LARGEST <= edge <= LARGEST
             for edge in edges
         )
         single = numeric and len(edges) == 2 and edges[0] == edges[1]
@@ -344,7 +341,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
             name, edges, bounds_from=part.take("bounds_from", str, "action space")
         )
     else:
-        raise part.fail(f"the kind {_shown(kind)} is neither 'discrete' nor 'interval'")
+        raise part.fail(f"the kind {quoted(kind)} is neither 'discrete' nor 'interval'")
     part.finish()
     return action
 
@@ -360,24 +357,28 @@ def _read_rule(
     for entry in part.parts("conditions"):
         feature, op = entry.take("feature", int), entry.take("op", str)
         if not 0 <= feature < n_features:
-            raise entry.fail(f"there is no feature {_shown(feature)}")
+            raise entry.fail(f"there is no feature {quoted(feature)}")
         if op not in ("<=", ">"):
-            raise entry.fail(f"the operator {_shown(op)} is neither '<=' nor '>'")
+            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
         conditions.append(Condition(feature, op, entry.number("threshold")))
         entry.finish()
     dimension, action = part.take("dimension", int), part.take("action", int)
     if not 0 <= dimension < len(actions):
-        raise part.fail(f"there is no action dimension {_shown(dimension)}")
+        raise part.fail(f"there is no action dimension {quoted(dimension)}")
     if not 0 <= action < actions[dimension].n_labels:
         raise part.fail(
-            f"the action {_shown(action)} is none of the {actions[dimension].n_labels} labels"
+            f"the action {quoted(action)} is none of the {actions[dimension].n_labels} labels"
         )
     origin = part.take("origin", str, "mined")
     if origin not in ("mined", "manual"):
-        raise part.fail(f"the origin {_shown(origin)} is neither 'mined' nor 'manual'")
+        raise part.fail(f"the origin {quoted(origin)} is neither 'mined' nor 'manual'")
     if part.take("length", int, len(conditions)) != len(conditions):
         raise part.fail(f"'length' does not match its {len(conditions)} conditions")
-    value = part.number("demonstrated_value") if part.has("demonstrated_value") else None
+    value = (
+        part.number("demonstrated_value", low=-LARGEST, high=LARGEST)
+        if part.has("demonstrated_value")
+        else None
+    )
     rule = Rule(
         id=part.take("id", str),
         dimension=dimension,

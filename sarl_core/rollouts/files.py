@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.archives import array_of, arrays_in, opened, promise_of
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 
 MAX_POLICY_BYTES = 256 * 2**20  # an MlpPolicy takes kilobytes; more is not a policy
+_NUMBER = 8  # bytes of a number of any kind: as it is read, and as it is kept
 
 
 def write_card(path: Path, card: Mapping[str, Any]) -> None:
@@ -41,17 +44,30 @@ def read_limited_npz(path: Path) -> dict[str, NDArray[Any]]:
         InputError: If it is no such file, holds objects, or unpacks to more than a policy has.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            check_unpacked_size(archive, path)
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except InputError:
-        raise
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        content = limited_bytes(path, MAX_POLICY_BYTES)
+    except OSError as error:
         raise InputError(
-            f"{path} cannot be read as a policy ({reason}); give an .npz policy"
+            f"{path} cannot be read as a policy ({error.strerror or error}); give an .npz policy"
         ) from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    try:
+        with opened(content) as archive:
+            entries = arrays_in(archive)
+            _require_size(sum(entry.file_size for entry in entries.values()))
+            promises = {name: promise_of(archive, entry) for name, entry in entries.items()}
+            _require_size(
+                len(content)
+                + sum(
+                    math.prod(promise.shape) * max(promise.dtype.itemsize, _NUMBER)
+                    for promise in promises.values()
+                )
+            )
+            return {
+                name: array_of(archive, entry, promises[name]) for name, entry in entries.items()
+            }
+    except InputError as error:
+        raise InputError(f"{path} cannot be read as a policy: {error}") from error
 
 
 def check_unpacked_size(archive: zipfile.ZipFile, path: Path) -> None:
@@ -64,9 +80,14 @@ def check_unpacked_size(archive: zipfile.ZipFile, path: Path) -> None:
     Raises:
         InputError: If it is larger.
     """
-    size = sum(entry.file_size for entry in archive.infolist())
+    try:
+        _require_size(sum(entry.file_size for entry in archive.infolist()))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _require_size(size: int) -> None:
     if size > MAX_POLICY_BYTES:
         raise InputError(
-            f"{path} unpacks to {size / 2**20:.0f} MB, more than any MlpPolicy has; "
-            "give a policy file"
+            f"it unpacks to {size / 2**20:,.0f} MB, more than any MlpPolicy has; give a policy file"
         )

@@ -16,7 +16,7 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
 from sarl_core.rollouts.activations import Activation, activate
 from sarl_core.rollouts.files import read_limited_npz
@@ -25,6 +25,7 @@ Head = Literal["categorical", "gaussian", "squashed_gaussian", "clipped", "squas
 
 _FORMAT = "sarl-policy"
 _VERSION = 1
+_MOST_DIMENSIONS = 4096  # of an action
 _VARIANCE_FLOOR = 1e-8  # what Stable-Baselines3's VecNormalize adds under the root
 
 
@@ -156,11 +157,25 @@ class MlpPolicy:
             vector = vectors[name]
             if vector is None and name not in needed:
                 continue
-            if vector is None or vector.shape != (length,) or np.isnan(vector).any():
+            # Bounds may be infinite, as an action space's are.
+            wrong = np.isnan if name.startswith("action") else _is_no_number
+            if vector is None or vector.shape != (length,) or wrong(vector).any():
                 raise InputError(
                     f"the policy's {name.replace('_', ' ')} is not a row of {length} numbers; "
                     "export the policy again"
                 )
+        normalisation = self.normalisation
+        if normalisation is not None and not (
+            normalisation.clip > 0.0 and (normalisation.variance >= 0.0).all()
+        ):
+            raise InputError(
+                "the policy's observations are normalised by a variance or a bound below 0; "
+                "export the policy again"
+            )
+        if any(count < 1 for count in self.label_counts):
+            raise InputError(
+                "the policy has an action dimension without labels; export the policy again"
+            )
 
     @property
     def n_features(self) -> int:
@@ -344,7 +359,7 @@ class MlpPolicy:
         head, activation = str(arrays.get("head")), str(arrays.get("activation"))
         if head not in get_args(Head) or activation not in get_args(Activation):
             raise InputError(
-                f"{path} names the head {head!r} and activation {activation!r}, "
+                f"{path} names the head {quoted(head)} and activation {quoted(activation)}, "
                 "of which this version does not know both; export it again"
             )
         try:
@@ -353,33 +368,54 @@ class MlpPolicy:
                 head=cast(Head, head),
                 **_parts(arrays),
             )
-        except (KeyError, IndexError, TypeError, ValueError) as error:
+        except KeyError as error:
             raise InputError(
-                f"{path} lacks a part of its policy ({error}); export the policy again"
+                f"{path} lacks a part of its policy, {quoted(error.args[0])}; export the policy "
+                "again"
+            ) from error
+        except (IndexError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f"{path} holds a part of its policy in another form; export the policy again"
             ) from error
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
+
+
+def _is_no_number(values: NDArray[np.float32]) -> NDArray[np.bool_]:
+    return ~np.isfinite(values)
 
 
 def _parts(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     """The fields of a policy from the arrays of its file."""
     layers = sum(1 for name in arrays if name.startswith("weight_"))
 
+    def plain(name: str) -> NDArray[Any]:
+        values = arrays[name]
+        if values.dtype.kind not in "biuf":
+            raise TypeError(f"{name} are no numbers")
+        return values
+
+    def numbers(name: str) -> NDArray[np.float32]:
+        with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+            return plain(name).astype(np.float32)
+
     def optional(name: str) -> NDArray[np.float32] | None:
-        return arrays[name].astype(np.float32) if name in arrays else None
+        return numbers(name) if name in arrays else None
 
     normalisation = None
     if "observation_mean" in arrays:
         normalisation = Normalisation(
-            mean=_floats(arrays["observation_mean"]),
-            variance=_floats(arrays["observation_variance"]),
+            mean=_floats(plain("observation_mean")),
+            variance=_floats(plain("observation_variance")),
             clip=float(arrays["observation_clip"]),
             # Older files have the one that Stable-Baselines3 takes unless told otherwise.
             epsilon=float(arrays.get("observation_epsilon", np.array(_VARIANCE_FLOOR))),
         )
+    if arrays["label_counts"].size > _MOST_DIMENSIONS:
+        raise ValueError("more action dimensions than any policy has")
     return {
-        "weights": tuple(arrays[f"weight_{i}"].astype(np.float32) for i in range(layers)),
-        "biases": tuple(arrays[f"bias_{i}"].astype(np.float32) for i in range(layers)),
+        "weights": tuple(numbers(f"weight_{i}") for i in range(layers)),
+        "biases": tuple(numbers(f"bias_{i}") for i in range(layers)),
         "label_counts": tuple(int(count) for count in arrays["label_counts"]),
         "log_std": optional("log_std"),
         "action_low": optional("action_low"),

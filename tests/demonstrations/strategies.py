@@ -20,7 +20,8 @@ SPACES = (
     "whole continuous",
 )
 
-_finite = st.floats(allow_nan=False, allow_infinity=False, width=32)
+_LARGEST = 2.0**99  # what is larger stands for no reading, and is refused
+_finite = st.floats(-_LARGEST, _LARGEST, width=32)
 _letters = st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zs", "Zl", "Zp"))
 # A name that is a number only counts; those have tests of their own.
 names = st.text(_letters, min_size=1, max_size=8).filter(
@@ -49,9 +50,7 @@ def demonstrations(draw: st.DrawFn, space: str) -> Demonstrations:
             "label_names": draw(st.tuples(*[st.lists(names, min_size=5, max_size=5)] * m)),
         }
     per_step = {
-        "rewards": hnp.arrays(
-            np.float64, n, elements=st.floats(allow_nan=False, allow_infinity=False)
-        ),
+        "rewards": hnp.arrays(np.float64, n, elements=st.floats(-_LARGEST, _LARGEST)),
         "terminated": hnp.arrays(np.bool_, n),
         "truncated": hnp.arrays(np.bool_, n),
     }

@@ -17,7 +17,7 @@ from sarl_core.demonstrations.formats.vocabulary import (
     plain,
     stripped,
 )
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last")
 USE_WORDS = MappingProxyType(
@@ -379,8 +379,7 @@ def refuse_doubled(names: Sequence[str]) -> None:
 def listed(names: Iterable[str], limit: int = 12) -> str:
     """Names for a sentence, the first few of them."""
     names = list(names)
-    short = (name if len(name) <= 60 else f"{name[:60]}..." for name in names[:limit])
-    shown = ", ".join(map(repr, short))
+    shown = ", ".join(map(quoted, names[:limit]))
     return shown if len(names) <= limit else f"{shown} and {len(names) - limit:,} more"
 
 

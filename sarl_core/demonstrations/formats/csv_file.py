@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import codecs
 import csv
-import io
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, BinaryIO, Literal
+from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
-from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, shown
+from sarl_core.demonstrations.formats.parquet_file import column_from_arrow
 from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
+from sarl_core.limits import require_memory, table_memory
 
 Delimiter = Literal[";", "\t", "|", ","]
 _DELIMITERS: tuple[Delimiter, ...] = (";", "\t", "|", ",")  # a comma may be a decimal sign
@@ -30,6 +31,14 @@ _BOMS = {
     codecs.BOM_UTF16_BE: "UTF-16",
 }
 _MAX_LINE = 2**24  # characters of a header
+_BLOCK = 2**22  # bytes that are looked through at once
+_FEED, _RETURN = b"\n\r"
+# What Arrow's parser of numbers takes beside numbers, wherever it stands.
+_NO_NUMBERS = re.compile(rb"0x|nan\(", re.I)
+# A field that holds a number, nothing, or a truth value; in the grammar of Arrow's own matcher.
+_NUMBER_FIELD = (
+    r"^\s*([+-]?(\d+(POINT\d*)?|POINT\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)|true|false|)\s*$"
+)
 
 
 @dataclass(frozen=True)
@@ -71,6 +80,12 @@ class CsvTable:
         """
         import pyarrow as pa
 
+        # Numbers take up to 8 bytes each on the way, whatever they take as text.
+        rows = _count_lines(self.body)
+        require_memory(len(self.body) + table_memory(rows, 0, len(columns.used)))
+        # What Arrow takes for a number and a person does not: 0x10, nan(1).
+        if _NO_NUMBERS.search(self.body):
+            self._require_numbers(columns.used)
         try:
             # Straight to float32: by way of float64 a few numbers would be rounded twice.
             table = self._parse(columns.used, dict.fromkeys(columns.observations, pa.float32()))
@@ -78,7 +93,10 @@ class CsvTable:
             try:
                 table = self._parse(columns.used, {})
             except pa.ArrowInvalid as error:
-                raise self._explained(columns.used) from error
+                self._require_numbers(columns.used)
+                raise InputError(
+                    "it cannot be read as CSV; check its quotation marks and delimiters"
+                ) from error
         texts = [
             name
             for name in columns.used
@@ -90,8 +108,19 @@ class CsvTable:
             )
         ]
         if texts:
-            raise self._explained(texts)
-        return {name: column_from_arrow(name, table.column(name)) for name in columns.used}
+            self._require_numbers(texts)
+            raise InputError(
+                f"column {quoted(texts[0])} holds both numbers and true or false; write numbers"
+            )
+        # Each column is given back as soon as its numbers stand in one piece.
+        left = dict(zip(columns.used, table.columns, strict=True))
+        del table
+        return {
+            name: _as_float32(column_from_arrow(name, left.pop(name)))
+            if name in columns.observations
+            else column_from_arrow(name, left.pop(name))
+            for name in columns.used
+        }
 
     def _parse(self, used: Sequence[str], types: dict[str, Any]) -> Any:
         import pyarrow as pa
@@ -110,32 +139,108 @@ class CsvTable:
             ),
         )
 
-    def _explained(self, suspects: Sequence[str]) -> InputError:
-        """Read row by row what could not be read at once, to say where it fails."""
-        places = [(self.names.index(name), name) for name in suspects]
-        for number, (line, row) in enumerate(self._rows(), start=1):
-            if len(row) != len(self.names):
-                return InputError(
-                    f"row {number} (line {line}) has {len(row)} fields in place of "
-                    f"{len(self.names)}; mend that row"
-                )
-            for index, name in places:
-                if not _readable(row[index], self.decimal):
-                    return InputError(
-                        f"column {name!r} holds {shown(row[index])} in row {number} (line {line}), "
-                        "which is no number; mend that row"
-                    )
-        return InputError("it cannot be read as CSV; check its quotation marks and delimiters")
+    def _require_numbers(self, suspects: Sequence[str]) -> None:
+        """Say in which row a file is wrong, block by block and with nothing taken for a number."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+        import pyarrow.csv
 
-    def _rows(self) -> Iterator[tuple[int, list[str]]]:
-        text = io.TextIOWrapper(io.BytesIO(self.body), encoding="utf-8", newline="")
-        reader = csv.reader(text, delimiter=self.delimiter)
+        wrong: list[Any] = []
+
+        def keep(row: Any) -> Literal["error"]:
+            wrong.append(row)
+            return "error"
+
+        pattern = _NUMBER_FIELD.replace("POINT", re.escape(self.decimal))
+        row = 0
         try:
-            for row in reader:
-                if row:
-                    yield self.first_line - 1 + reader.line_num, row
-        except csv.Error:
-            return
+            for block in pyarrow.csv.open_csv(
+                pa.BufferReader(pa.py_buffer(self.body)),
+                # In one thread, which knows the numbers of the rows.
+                read_options=pyarrow.csv.ReadOptions(
+                    column_names=list(self.names), use_threads=False
+                ),
+                parse_options=pyarrow.csv.ParseOptions(
+                    delimiter=self.delimiter, invalid_row_handler=keep
+                ),
+                convert_options=pyarrow.csv.ConvertOptions(
+                    include_columns=list(suspects),
+                    column_types=dict.fromkeys(suspects, pa.large_string()),
+                    strings_can_be_null=False,
+                ),
+            ):
+                found: list[tuple[int, str, str]] = []
+                for name in suspects:
+                    fields = block.column(name)
+                    matches = pc.match_substring_regex(fields, pattern, ignore_case=True)
+                    place = pc.index(matches, False).as_py()
+                    if place >= 0:
+                        found.append((place, name, fields[place].as_py()))
+                if found:
+                    place, name, field = min(found)
+                    raise InputError(
+                        f"column {quoted(name)} holds {quoted(field)} in "
+                        f"{self._place(row + place + 1)}, which is no number; mend that row"
+                    )
+                row += block.num_rows
+        except pa.ArrowInvalid as error:
+            if wrong and wrong[0].number is not None:
+                raise InputError(
+                    f"{self._place(wrong[0].number)} has {wrong[0].actual_columns} fields in place "
+                    f"of {len(self.names)}; mend that row"
+                ) from error
+
+    def _place(self, row: int) -> str:
+        """A row (from 1) for a sentence, with its line where rows and lines go together."""
+        if re.search(rb'"', self.body):
+            return f"row {row}"
+        return f"row {row} (line {self.first_line - 1 + _line_of(self.body, row)})"
+
+
+def _as_float32(column: Column) -> Column:
+    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+        return Column(column.values.astype(np.float32, copy=False), column.missing)
+
+
+class _Lines(NamedTuple):
+    """Where lines start and end in a part of a file.
+
+    Attributes:
+        starts: Where a line that is not empty starts.
+        ends: Where a line ends, in its first sign: a return and a feed are one end.
+    """
+
+    starts: NDArray[np.bool_]
+    ends: NDArray[np.bool_]
+
+
+def _lines(data: memoryview) -> Iterator[_Lines]:
+    """Part by part, so that a large file takes little memory."""
+    codes = np.frombuffer(data, dtype=np.uint8)
+    before = _FEED
+    for start in range(0, len(codes), _BLOCK):
+        part = codes[start : start + _BLOCK]
+        previous = np.concatenate([np.array([before], dtype=np.uint8), part[:-1]])
+        feeds, returned = part == _FEED, previous == _RETURN
+        breaks = feeds | (part == _RETURN)
+        yield _Lines(~breaks & (returned | (previous == _FEED)), breaks & ~(feeds & returned))
+        before = int(part[-1])
+
+
+def _count_lines(data: memoryview) -> int:
+    """As many as there are rows, or more."""
+    return 1 + sum(int(np.count_nonzero(part.ends)) for part in _lines(data))
+
+
+def _line_of(data: memoryview, row: int) -> int:
+    """The line (from 1) of a row (from 1): a line with nothing in it is no row."""
+    line, rows = 1, 0
+    for part in _lines(data):
+        starts = np.flatnonzero(part.starts)
+        if rows + len(starts) >= row:
+            return line + int(np.count_nonzero(part.ends[: starts[row - rows - 1]]))
+        line, rows = line + int(np.count_nonzero(part.ends)), rows + len(starts)
+    return line
 
 
 def open_csv(data: memoryview, *, like: CsvTable | None = None) -> CsvTable:
@@ -224,13 +329,17 @@ def _as_text(data: memoryview) -> memoryview:
         raise InputError("it is no text; give a CSV file in UTF-8")
     if codes.size == 0 or codes.max() < 128:  # ASCII, which is UTF-8; decoding would take longer
         return data
-    try:
-        codecs.utf_8_decode(data, "strict", True)
-    except UnicodeDecodeError as error:
-        line = 1 + bytes(data[: error.start]).count(b"\n")
-        raise InputError(
-            f"it is not UTF-8 in line {line} (byte 0x{data[error.start]:02x}); save it as UTF-8"
-        ) from None
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    for start in range(0, len(data), _BLOCK):
+        waiting = len(decoder.getstate()[0])
+        try:
+            decoder.decode(data[start : start + _BLOCK], start + _BLOCK >= len(data))
+        except UnicodeDecodeError as error:
+            wrong = start - waiting + error.start
+            line = _count_lines(data[:wrong])
+            raise InputError(
+                f"it is not UTF-8 in line {line} (byte 0x{data[wrong]:02x}); save it as UTF-8"
+            ) from None
     return data
 
 
@@ -276,10 +385,3 @@ def _decimal(body: memoryview, delimiter: str) -> str:
     if delimiter == "," or re.search(rb",", body) is None:
         return "."
     return "," if re.search(rb"\.", body) is None else "."
-
-
-def _readable(field: str, decimal: str) -> bool:
-    text = field.strip().replace(decimal, ".")
-    if text == "" or text.lower() in ("true", "false"):
-        return True
-    return _NUMBER.fullmatch(text) is not None and "," not in text

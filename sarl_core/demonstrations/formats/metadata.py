@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.feature_order import Order
-from sarl_core.errors import InputError
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError, quoted
 
 KEY = "sarl"
 VERSION = 1
@@ -89,17 +91,16 @@ def decode_metadata(text: str | bytes) -> Metadata:
         InputError: If it is not JSON, says a thing twice, or says it in another form.
     """
     try:
-        # ValueError is what json raises for bad JSON, bad UTF-8 and numbers too long to read.
-        raw = json.loads(text, object_pairs_hook=_unique, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
+        raw = parse_json(text, object_pairs_hook=_unique)
+    except ValueError as error:
         raise InputError(
-            f"its metadata {KEY!r} is not JSON; save the file again, or without metadata"
+            f"its metadata {KEY!r} is not JSON ({error}); save the file again, or without metadata"
         ) from error
     if not isinstance(raw, dict):
         raise _malformed("is no JSON object")
     version = raw.get("version", VERSION)
     if version != VERSION:
-        raise _malformed(f"has version {version!r}, and this program reads version {VERSION}")
+        raise _malformed(f"has version {quoted(version)}, and this program reads version {VERSION}")
     metadata = Metadata(
         env_id=_text(raw, "env_id"),
         agent=_text(raw, "agent"),
@@ -125,13 +126,9 @@ def _malformed(what: str) -> InputError:
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     keys = [key for key, _ in pairs]
     if len(set(keys)) < len(keys):
-        doubled = next(key for index, key in enumerate(keys) if key in keys[:index])
-        raise _malformed(f"gives {doubled!r} twice")
+        doubled = next(key for key, count in Counter(keys).items() if count > 1)
+        raise _malformed(f"gives {quoted(doubled)} twice")
     return dict(pairs)
-
-
-def _refuse_constant(constant: str) -> Any:
-    raise _malformed(f"holds {constant}, which is no number")
 
 
 def _list(raw: dict[str, Any], key: str) -> list[Any]:

@@ -8,20 +8,16 @@ Stable-Baselines (``obs, actions, rewards, episode_returns, episode_starts``) an
 
 from __future__ import annotations
 
-import io
-import lzma
-import struct
-import zipfile
-import zlib
+import math
 from collections.abc import Mapping
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.archives import Promise, array_of, arrays_in, opened, promise_of
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import listed
-from sarl_core.demonstrations.formats.limits import MAX_UNPACKED, too_large
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
     Metadata,
@@ -29,7 +25,9 @@ from sarl_core.demonstrations.formats.metadata import (
     encode_metadata,
 )
 from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
 from sarl_core.errors import InputError
+from sarl_core.limits import require_memory, table_memory
 
 _KEYS = {
     "observations": ("observations", "obs", "observation", "states", "state"),
@@ -189,7 +187,7 @@ def _episodes(
             )
         starts = np.zeros(n, dtype=np.bool_)
         starts[indices] = True
-        if terminated is not None and len(terminated) == len(indices) + 1 != n:
+        if terminated is not None and terminated.shape == (len(indices) + 1,) != (n,):
             by_step = np.zeros(n, dtype=terminated.dtype)
             by_step[np.append(indices, n).astype(np.int64) - 1] = terminated
             terminated = by_step
@@ -207,83 +205,52 @@ def _episodes(
 
 def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
     """The arrays that are known, by what they are, and the keys they stand under."""
-    try:
-        # BytesIO copies nothing that is already bytes.
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = {
-                info.filename.removesuffix(".npy"): info
-                for info in archive.infolist()
-                if info.filename.endswith(".npy")
-            }
-            wanted = {
-                what: key
-                for what, keys in _KEYS.items()
-                if (key := next((key for key in keys if key in entries), None)) is not None
-            }
-            for what in ("observations", "actions"):
-                if what not in wanted:
-                    raise InputError(
-                        f"there are no {what} among its arrays {listed(sorted(entries))}; save "
-                        f"them under {what!r}"
-                    )
-            if KEY in entries:
-                wanted[KEY] = KEY
-            promised = sum(entries[key].file_size for key in wanted.values())
-            if promised > MAX_UNPACKED:
-                raise too_large(promised)
-            read: dict[str, NDArray[Any]] = {}
-            for what, key in wanted.items():
-                left = MAX_UNPACKED - sum(array.nbytes for array in read.values())
-                read[what] = _array(archive, entries[key], key, left)
-            return read, wanted
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        OSError,
-        NotImplementedError,
-        RuntimeError,
-        ValueError,
-        struct.error,
-        OverflowError,
-        lzma.LZMAError,
-    ) as error:
-        # All of these come from zipfile: RuntimeError for an encrypted entry, ValueError for
-        # offsets that lie outside the file.
-        raise InputError(
-            "it is damaged, cut off or encrypted; save or download it again"
-        ) from error
+    with opened(data) as archive:
+        entries = arrays_in(archive)
+        wanted = {
+            what: key
+            for what, keys in _KEYS.items()
+            if (key := next((key for key in keys if key in entries), None)) is not None
+        }
+        for what in ("observations", "actions"):
+            if what not in wanted:
+                raise InputError(
+                    f"there are no {what} among its arrays {listed(sorted(entries))}; save "
+                    f"them under {what!r}"
+                )
+        if KEY in entries:
+            wanted[KEY] = KEY
+        require_memory(len(data) + sum(entries[key].file_size for key in wanted.values()))
+        promises = {what: promise_of(archive, entries[key]) for what, key in wanted.items()}
+        for what, promise in promises.items():
+            if what != KEY and promise.dtype.kind not in "biuf":
+                raise InputError(
+                    f"the array {wanted[what]!r} holds {promise.dtype}, which are no numbers; "
+                    "save plain numbers"
+                )
+        _require_width(promises, wanted)
+        rows = math.prod(promises["actions"].shape[:1])
+        numbers = sum(map(_needed, promises, promises.values()))
+        require_memory(len(data) + table_memory(rows, 0, 0) + numbers)
+        read = {
+            what: array_of(archive, entries[key], promises[what]) for what, key in wanted.items()
+        }
+        return read, wanted
 
 
-def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, key: str, limit: int) -> NDArray[Any]:
-    """One array of the archive, of no more bytes than a limit whatever the archive promises."""
-    with archive.open(entry) as file:
-        content = file.read(min(entry.file_size, limit) + 1)
-    if len(content) > limit or len(content) > entry.file_size:
-        raise too_large(len(content))
-    try:
-        header = io.BytesIO(content)
-        version = np.lib.format.read_magic(header)
-        read = (
-            np.lib.format.read_array_header_1_0
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0
-        )
-        shape, _, dtype = read(header)
-        if dtype.hasobject:
+def _require_width(promises: Mapping[str, Promise], keys: Mapping[str, str]) -> None:
+    """Refuse far too many columns before each of them gets a name."""
+    for what, promise in promises.items():
+        width = math.prod(promise.shape[1:])
+        if what in ("observations", "actions") and promise.shape[0:1] and width > MAX_COLUMNS:
+            noun = "features" if what == "observations" else "action dimensions"
             raise InputError(
-                f"the array {key!r} holds Python objects (a pickle), which may run code and are "
-                "never opened; save plain numbers"
+                f"there are {width:,} {noun} under {keys[what]!r}, more than the {MAX_COLUMNS:,} "
+                "that rules a person reads could use; choose fewer columns"
             )
-        # Before anything is made of that size: the content must be there.
-        promised = int(np.prod(shape, dtype=object)) * dtype.itemsize
-        if promised != len(content) - header.tell():
-            raise InputError(f"the array {key!r} is cut off or damaged; save it again")
-        array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
-    except (ValueError, EOFError, SyntaxError, TypeError, MemoryError) as error:
-        raise InputError(f"the array {key!r} cannot be read as NumPy's; save it again") from error
-    if key != KEY and array.dtype.kind not in "biuf":
-        raise InputError(
-            f"the array {key!r} holds {array.dtype}, which are no numbers; save plain numbers"
-        )
-    return array
+
+
+def _needed(what: str, promise: Promise) -> int:
+    """Bytes of an array as it is in the file, and of what it becomes: half of the peak."""
+    kept = {"observations": 4, KEY: 0}.get(what, 8)
+    return math.prod(promise.shape) * max(promise.dtype.itemsize, kept)

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import ColumnMap
-from sarl_core.demonstrations.formats.limits import MAX_UNPACKED, too_large
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
     Metadata,
     decode_metadata,
     encode_metadata,
 )
+from sarl_core.demonstrations.formats.parquet_pages import largest_chunk
 from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
+from sarl_core.limits import require_memory, table_memory
 
 MAGIC = b"PAR1"
+_BATCH = 2**17  # rows that are brought into their final form at once
+_FOOTER = 2**24  # bytes; it takes some forty times as much in memory
 
 
 @dataclass(frozen=True)
@@ -30,11 +35,13 @@ class ParquetTable:
         names: Names of the columns.
         metadata: What the file says besides.
         file: The ``pyarrow.parquet.ParquetFile``.
+        data: The whole file.
     """
 
     names: tuple[str, ...]
     metadata: Metadata
     file: Any
+    data: memoryview
 
     @property
     def named(self) -> bool:
@@ -55,14 +62,26 @@ class ParquetTable:
         """
         import pyarrow as pa
 
-        schema = self.file.schema_arrow
+        schema, metadata = self.file.schema_arrow, self.file.metadata
         for name in columns.used:
             _require_flat(name, schema.field(name).type)
+        rows = metadata.num_rows
+        d = len(columns.observations)
+        needed = len(self.data) + table_memory(rows, d, len(columns.used) - d)
+        # Before a page is unpacked: a few bytes can stand for any number of rows, or of bytes.
+        require_memory(needed)
+        places = _places(self.file, columns.used)
+        require_memory(needed + largest_chunk(self.data, metadata, places))
         try:
-            table = self.file.read(columns=list(columns.used))
-        except (pa.ArrowException, OSError, ValueError) as error:
-            raise InputError("it is damaged or cut off; save or download it again") from error
-        return {name: column_from_arrow(name, table.column(name)) for name in columns.used}
+            # Texts by their dictionary: each stands there once, however often it occurs.
+            texts = [name for name in columns.used if _is_text(schema.field(name).type)]
+            file = _opened(self.data, texts)
+            return {
+                name: _column(file, name, np.float32 if name in columns.observations else None)
+                for name in columns.used
+            }
+        except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
+            raise _damaged() from error
 
 
 def open_parquet(data: memoryview) -> ParquetTable:
@@ -78,25 +97,84 @@ def open_parquet(data: memoryview) -> ParquetTable:
         InputError: If it is cut off or damaged, has too many columns or would not fit in memory.
     """
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
+    # The list of columns and row groups stands at the end, and its length behind it.
+    if _FOOTER < int.from_bytes(data[-8:-4], "little") < len(data) and data[-4:] == MAGIC:
+        raise InputError(
+            "its list of columns and row groups is far too long; save it in fewer row groups"
+        )
     try:
-        file = pq.ParquetFile(pa.BufferReader(pa.py_buffer(data)))
+        file = _opened(data)
         names = tuple(file.schema_arrow.names)
         rows = file.metadata.num_rows
         described = (file.schema_arrow.metadata or {}).get(KEY.encode())
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise InputError("it is damaged or cut off; save or download it again") from error
+    except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
+        raise _damaged() from error
     check_names(names)
     if rows == 0:
         raise InputError(
             "there are no steps, only columns; give at least two observations with their actions"
         )
-    # A few bytes of Parquet can stand for any number of rows.
-    if rows * len(names) * 8 > MAX_UNPACKED:
-        raise too_large(rows * len(names) * 8)
     metadata = Metadata() if described is None else decode_metadata(described)
-    return ParquetTable(names, metadata, file)
+    return ParquetTable(names, metadata, file, data)
+
+
+def _opened(data: memoryview, texts: Sequence[str] = ()) -> Any:
+    """The file, with some columns to be read as dictionaries."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    return pq.ParquetFile(pa.BufferReader(pa.py_buffer(data)), read_dictionary=list(texts))
+
+
+def _column(file: Any, name: str, dtype: Any) -> Column:
+    """One column, brought into its final form batch by batch."""
+    rows = file.metadata.num_rows
+    values: NDArray[Any] | None = None
+    missing: NDArray[np.bool_] | None = None
+    at = 0
+    for batch in file.iter_batches(_BATCH, columns=[name], use_threads=False):
+        part = column_from_arrow(name, batch.column(0), at)
+        end = at + len(part.values)
+        if end > rows:
+            raise _damaged()
+        if values is None:
+            values = np.empty(rows, dtype=dtype or part.values.dtype)
+        with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+            values[at:end] = part.values
+        if part.missing is not None:
+            missing = np.zeros(rows, dtype=np.bool_) if missing is None else missing
+            missing[at:end] = part.missing
+        at = end
+    if values is None or at != rows:
+        raise _damaged()
+    return Column(values, missing)
+
+
+def _places(file: Any, names: Sequence[str]) -> list[int]:
+    """Where flat columns stand among all, as a row group counts them."""
+    places: dict[str, int] = {}
+    at = 0
+    for field in file.schema_arrow:
+        places[field.name] = at
+        at += _leaves(field.type)
+    if at != file.metadata.num_columns:
+        raise _damaged()
+    return [places[name] for name in names]
+
+
+def _leaves(kind: Any) -> int:
+    import pyarrow as pa
+
+    if isinstance(kind, pa.BaseExtensionType):
+        return _leaves(kind.storage_type)
+    if not pa.types.is_nested(kind):
+        return 1
+    return sum(_leaves(kind.field(index).type) for index in range(kind.num_fields))
+
+
+def _damaged() -> InputError:
+    return InputError("it is damaged or cut off; save or download it again")
 
 
 def write_parquet(demonstrations: Demonstrations, out: BinaryIO) -> None:
@@ -117,12 +195,13 @@ def write_parquet(demonstrations: Demonstrations, out: BinaryIO) -> None:
     )
 
 
-def column_from_arrow(name: str, column: Any) -> Column:
+def column_from_arrow(name: str, column: Any, start: int = 0) -> Column:
     """Numbers of an Arrow column.
 
     Args:
         name: For the message.
-        column: A ``pyarrow.ChunkedArray``.
+        column: A ``pyarrow.ChunkedArray`` or ``pyarrow.Array``.
+        start: Row of its first value, from 0.
 
     Returns:
         Its numbers.
@@ -134,7 +213,7 @@ def column_from_arrow(name: str, column: Any) -> Column:
     import pyarrow.compute as pc
 
     kind = column.type
-    if pa.types.is_dictionary(kind):
+    if pa.types.is_dictionary(kind) and not _is_text(kind):
         column, kind = pc.cast(column, kind.value_type), kind.value_type
     if pa.types.is_decimal(kind):
         column, kind = pc.cast(column, pa.float64()), pa.float64()
@@ -142,24 +221,50 @@ def column_from_arrow(name: str, column: Any) -> Column:
     if not numeric and not pa.types.is_null(kind):
         found = pc.index(pc.is_valid(column), True).as_py()
         if found < 0:
-            raise InputError(f"column {name!r} is empty; fill or leave it out")
+            raise InputError(
+                f"column {quoted(name)} is empty in row {start + 1}; fill it or leave it out"
+            )
         raise InputError(
-            f"column {name!r} holds {shown(column[found].as_py())} in row {found + 1}, which is no "
-            "number; mend that row"
+            f"column {quoted(name)} holds {quoted(_value(column[found]))} in row "
+            f"{start + found + 1}, which is no number; mend that row"
         )
     if column.null_count == 0:
-        return Column(np.asarray(column.to_numpy()))
-    missing = np.asarray(pc.is_null(column).to_numpy())
+        return Column(_numbers(column))
+    missing = np.asarray(pc.is_null(column).to_numpy(zero_copy_only=False))
     if pa.types.is_null(kind):
         return Column(np.full(len(column), np.nan), missing)
     filler = pa.scalar(float("nan") if pa.types.is_floating(kind) else 0, pa.float64()).cast(kind)
-    return Column(np.asarray(pc.fill_null(column, filler).to_numpy()), missing)
+    return Column(_numbers(pc.fill_null(column, filler)), missing)
 
 
-def shown(value: Any) -> str:
-    """A value for a sentence, cut short and on one line."""
-    text = value if isinstance(value, str) else str(value)
-    return repr(text if len(text) <= 40 else f"{text[:40]}...")
+def _numbers(column: Any) -> NDArray[Any]:
+    return np.asarray(column.to_numpy(zero_copy_only=False))
+
+
+def _is_text(kind: Any) -> bool:
+    import pyarrow as pa
+
+    if pa.types.is_dictionary(kind):
+        return _is_text(kind.value_type)
+    return bool(
+        pa.types.is_string(kind)
+        or pa.types.is_large_string(kind)
+        or pa.types.is_string_view(kind)
+        or pa.types.is_binary(kind)
+        or pa.types.is_large_binary(kind)
+        or pa.types.is_binary_view(kind)
+    )
+
+
+def _value(scalar: Any) -> Any:
+    """What an Arrow scalar is in Python; of a text what is quoted, however long it is."""
+    import pyarrow as pa
+
+    if isinstance(scalar, pa.DictionaryScalar):
+        scalar = scalar.value
+    if isinstance(scalar, pa.BinaryScalar):
+        return bytes(scalar.as_buffer()[:200])
+    return str(scalar)
 
 
 def _require_flat(name: str, kind: Any) -> None:
@@ -167,6 +272,6 @@ def _require_flat(name: str, kind: Any) -> None:
 
     if pa.types.is_nested(kind) or isinstance(kind, pa.BaseExtensionType):
         raise InputError(
-            f"column {name!r} holds a {str(kind).split('<')[0]} in each row; give each number a "
-            "column of its own"
+            f"column {quoted(name)} holds a {str(kind).split('<')[0]} in each row; give each "
+            "number a column of its own"
         )

@@ -28,6 +28,7 @@ from sarl_core.demonstrations.formats.recording import Recording, to_demonstrati
 from sarl_core.demonstrations.formats.tables import Table, recording_from_table
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 
 Content = bytes | bytearray | memoryview | BinaryIO
 
@@ -291,7 +292,7 @@ def _content(path: Path) -> memoryview:
     if path.is_dir():
         raise InputError("it is a folder; give a file")
     try:
-        return memoryview(path.read_bytes())
+        return memoryview(limited_bytes(path))
     except FileNotFoundError as error:
         raise InputError("there is no such file; check its name") from error
     except OSError as error:
