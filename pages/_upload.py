@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import _state as state
 import streamlit as st
 from _environments import registered
@@ -150,7 +152,7 @@ def upload_section(*, expanded: bool) -> None:
         if len(files) == 1:
             names = columns_of(*files[0])
             # An error about a row is not mended by another map; one about columns is.
-            asked = error is not None and "column" in error and "row" not in error
+            asked = error is not None and "column" in error and not re.search(r"\brow \d", error)
             if names and (asked or st.toggle("Map the columns myself", key="map_columns")):
                 mapping_form(names)
 

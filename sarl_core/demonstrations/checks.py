@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.giveaways import find_giveaways
 from sarl_core.demonstrations.requirements import (
     LARGEST,
     as_numbers,
+    coarse_columns,
     column_of_numbers,
     flags,
     frozen,
@@ -51,6 +53,8 @@ def normalise(raw: Demonstrations) -> dict[str, Any]:
     units = ("",) * d if raw.feature_units is None else tuple(map(str, raw.feature_units))
     require_length(len(units), d, "feature units", "features")
     require_finite(observations, [f"observation {name!r}" for name in feature_names])
+    columns = [f"feature {name!r}" for name in feature_names]
+    notes = (*raw.notes, *coarse_columns(raw.observations, observations, columns))
     actions = _actions(raw, n)
     m = 1 if actions.ndim == 1 else actions.shape[1]
     action_names = _names(raw.action_names, m, "action")
@@ -74,6 +78,7 @@ def normalise(raw: Demonstrations) -> dict[str, Any]:
         "feature_names": feature_names,
         "feature_units": units,
         "action_names": action_names,
+        "notes": notes,
     }
     if actions.dtype.kind == "i":
         return fields | _labels(raw, actions.reshape(n, m), action_names)
@@ -87,12 +92,13 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
         demonstrations: To look at.
 
     Returns:
-        One sentence each: notes from reading, constant or doubled features, labels that never
-        occur, a single action.
+        One sentence each: notes from reading, constant or doubled features, features that give
+        the action or the time, labels that never occur, a single action.
     """
     return (
         *demonstrations.notes,
         *_feature_warnings(demonstrations),
+        *_shortened(find_giveaways(demonstrations), "features tell what they should not"),
         *_action_warnings(demonstrations),
     )
 

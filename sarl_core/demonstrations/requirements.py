@@ -12,6 +12,8 @@ from sarl_core.errors import InputError
 
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
 
+_FEW_STEPS = 2**12  # of float32 between the least and the largest value of a feature
+_MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
 _EXACT = 2**53  # up to here every whole number is a float64
 # Nothing is measured beyond it, and the sum of as many numbers as fit in memory is a float32 yet.
 LARGEST = 1e30
@@ -156,6 +158,83 @@ def counts_up(values: NDArray[Any], together: NDArray[np.bool_] | None = None) -
     if together is not None:
         rises = rises[together]
     return len(rises) > 0 and bool(np.all(rises == 1))
+
+
+def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Which columns have so few steps of float32 between their least and largest value.
+
+    Args:
+        values: Shape (N, d).
+
+    Returns:
+        Shape (d,): where it is worth asking whether float32 keeps what was given.
+    """
+    if not len(values):
+        return np.zeros(values.shape[1], dtype=np.bool_)
+    low, high = values.min(axis=0).astype(np.float64), values.max(axis=0).astype(np.float64)
+    with np.errstate(invalid="ignore", over="ignore"):  # what is infinite is refused elsewhere
+        step = np.spacing(np.maximum(np.abs(low), np.abs(high)).astype(np.float32))
+        return np.asarray(high - low < _FEW_STEPS * step.astype(np.float64))
+
+
+def coarse_columns(
+    given: Any, kept: NDArray[np.float32], columns: Sequence[str]
+) -> tuple[str, ...]:
+    """Sentences on columns whose values differ and are equal as float32, as seconds since 1970.
+
+    Args:
+        given: Shape (N, d), of any type.
+        kept: The same in float32, in which rules compare.
+        columns: What the d columns are called.
+
+    Returns:
+        One sentence for each column in which that hides what differs.
+    """
+    exact = np.asarray(given)
+    if exact.dtype == np.float32 or exact.shape != kept.shape or not exact.size:
+        return ()
+    notes = []
+    for index in np.flatnonzero(crowded(kept)).tolist():
+        different, left = len(np.unique(exact[:, index])), len(np.unique(kept[:, index]))
+        if left < different:
+            least = exact[:, index].min()
+            notes.append(
+                f"{columns[index]} has {different:,} different values and rules can tell only "
+                f"{left:,} of them apart, as they compare 7 digits (float32); subtract an offset "
+                f"from it first, as its least value {least:.17g}"
+            )
+    return tuple(notes)
+
+
+def told_of_whole_numbers(
+    values: NDArray[Any], column: str, rows: NDArray[np.int64] | None = None
+) -> str | None:
+    """A sentence on actions that are labels nearly as well as amounts.
+
+    Args:
+        values: Finite actions of one dimension that were taken as amounts, (N,).
+        column: What it is called.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Returns:
+        None where most are no whole numbers.
+    """
+    broken = values != np.floor(values)
+    count = int(np.count_nonzero(broken))
+    if count > _MOST_BROKEN * len(values):
+        return None
+    if count:
+        row = int(np.argmax(broken))
+        return (
+            f"{column} was taken as an amount (continuous), because {count:,} of its "
+            f"{len(values):,} values {'is' if count == 1 else 'are'} not whole, the first "
+            f"{values[row]:g} in row {_number(row, rows)}; if it holds labels, mend "
+            f"{'that row' if count == 1 else 'those rows'}"
+        )
+    return (
+        f"{column} holds whole numbers with a decimal point and was taken as an amount "
+        "(continuous); if it holds labels, write them as 0, 1, 2 without a point"
+    )
 
 
 def as_numbers(given: Any, what: str) -> NDArray[Any]:

@@ -35,6 +35,7 @@ from sarl_core.demonstrations.formats.tables import (
     numbers_of,
     observation_block,
     require_filled,
+    told_coarse,
 )
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
 from sarl_core.errors import InputError
@@ -164,12 +165,14 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
             others = open_csv(actions, like=table)
     with naming(names[0]):
         seen = _observations_of(table)
-        observed = observation_block(seen.read, seen.guess.columns.observations)
+        features = seen.guess.columns.observations
+        observed = observation_block(seen.read, features)
+        coarse = told_coarse(table, features, observed)
     with naming(names[1]):
         taken = _actions_of(others)
         done = action_block(taken.read, taken.guess.columns.actions)
     observed, fields, notes = _together(observed, done, (seen, taken), names)
-    features, dimensions = seen.guess.columns.observations, taken.guess.columns.actions
+    dimensions = taken.guess.columns.actions
     return Recording(
         observations=observed,
         actions=done,
@@ -185,7 +188,7 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
             for half, file in zip((seen, taken), names, strict=True)
             for role, name in half.guess.columns.singles.items()
         },
-        notes=notes,
+        notes=(*notes, *coarse),
         columns=tuple(
             replace(use, column=f"{use.column} ({file})")
             for half, one, file in ((seen, table, short[0]), (taken, others, short[1]))

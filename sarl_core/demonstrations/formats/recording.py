@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,16 +17,21 @@ from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
+    coarse_columns,
     column_of_numbers,
     flags,
+    is_whole,
     require_finite,
     require_labels,
     require_length,
     require_order,
     require_within,
+    told_of_whole_numbers,
     whole_numbers,
 )
 from sarl_core.errors import InputError
+
+_LARGEST_CODE = 2**31  # a label that is larger is a slip
 
 
 @dataclass(frozen=True)
@@ -96,9 +101,10 @@ def to_demonstrations(
         recording = _fit(recording, described)
     observations = _owned(recording.observations, np.float32)
     require_finite(observations, recording.observation_columns, recording.rows)
+    coarse = coarse_columns(recording.observations, observations, recording.observation_columns)
     recording = _without_last_observations(_checked(replace(recording, observations=observations)))
     discrete, note = _is_discrete(recording, described)
-    notes = recording.notes if note is None else (*recording.notes, note)
+    notes = (*recording.notes, *coarse, *((note,) if note is not None else ()))
     features = _features(recording, described)
     fields: dict[str, Any] = features | {
         "action_names": _action_names(recording, described),
@@ -288,19 +294,33 @@ def _is_discrete(
     if described is not None:
         return described.is_discrete, None
     actions = recording.actions
+    columns = actions.reshape(len(actions), -1).T
     if actions.dtype.kind != "f":
-        return True, None
-    column = actions.reshape(-1)
-    if not recording.guess_labels or len(recording.action_columns) > 1:
-        return False, None
-    if not np.all((column == np.floor(column)) & (column >= 0)):
-        return False, None
-    if len(np.unique(column)) > FEW_VALUES:
-        return False, None
-    return True, (
-        "the actions are whole numbers with a decimal point and were taken as labels; name the "
-        "environment if they are continuous"
+        return True, _told_of_many(columns, recording.action_columns)
+    single = recording.guess_labels and len(columns) == 1
+    if single and is_whole(columns[0]) and len(np.unique(columns[0])) <= FEW_VALUES:
+        return True, (
+            "the actions are whole numbers with a decimal point and were taken as labels; name the "
+            "environment if they are continuous"
+        )
+    told = (
+        told_of_whole_numbers(column, name, recording.rows)
+        for name, column in zip(recording.action_columns, columns, strict=True)
+        if single or np.any(column != np.floor(column))
     )
+    return False, next((note for note in told if note is not None), None)
+
+
+def _told_of_many(columns: NDArray[Any], names: Sequence[str]) -> str | None:
+    """A sentence on labels that are so many that they may be amounts."""
+    for name, column in zip(names, columns, strict=True):
+        different = len(np.unique(column))
+        if different > FEW_VALUES:
+            return (
+                f"{name} holds {different:,} different whole numbers and was taken as so many "
+                "labels; if it is an amount, as a percentage, write it with a decimal point (26.0)"
+            )
+    return None
 
 
 def _features(
@@ -360,12 +380,25 @@ def _labels(
         require_length(len(names), m, "lists of label names", "action dimensions")
         require_length(len(first or names), m, "first labels", "action dimensions")
     counts = [len(labels) for labels in names] if names else [MAX_LABELS] * m
+    if not names:
+        _refuse_codes(whole, recording.action_columns)
     require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
     flat = actions.ndim == 1 if described is None else described.action_shape == ()
     return _owned(whole.reshape(-1) if flat and m == 1 else whole, np.int64), {
         "label_names": names or None,
         "label_first": first or None,
     }
+
+
+def _refuse_codes(columns: NDArray[np.int64], names: Sequence[str]) -> None:
+    """Refuse a few labels that are numbered by large codes."""
+    for name, column in zip(names, columns.T, strict=True):
+        codes = np.unique(column)
+        if codes[0] >= 0 and MAX_LABELS <= codes[-1] < _LARGEST_CODE and len(codes) <= FEW_VALUES:
+            raise InputError(
+                f"{name} holds {len(codes)} different labels, numbered up to {codes[-1]}; number "
+                f"them from 0 to {len(codes) - 1}"
+            )
 
 
 def _values(

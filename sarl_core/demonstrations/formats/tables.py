@@ -27,7 +27,7 @@ from sarl_core.demonstrations.formats.columns import (
 )
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
-from sarl_core.demonstrations.requirements import flags
+from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
 from sarl_core.errors import InputError
 
 MAX_COLUMNS = 4096
@@ -118,8 +118,10 @@ def recording_from_table(
     single = {role: read[name].values for role, name in chosen.singles.items()}
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
+    observations = observation_block(read, chosen.observations)
+    coarse = told_coarse(table, chosen.observations, observations, kept)
     return Recording(
-        observations=observation_block(read, chosen.observations),
+        observations=observations,
         actions=action_block(read, chosen.actions),
         observation_columns=tuple(f"column {name!r}" for name in chosen.observations),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
@@ -131,7 +133,7 @@ def recording_from_table(
         guess_labels=not _is_vector(chosen.actions),
         names={role: f"column {name!r}" for role, name in chosen.singles.items()},
         metadata=metadata,
-        notes=(*notes, *marked, *dropped),
+        notes=(*notes, *marked, *dropped, *coarse),
         columns=guess.uses(table.names),
     )
 
@@ -247,6 +249,37 @@ def observation_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArr
         for index, name in enumerate(names):
             observations[:, index] = read[name].values
     return observations
+
+
+def told_coarse(
+    table: Table,
+    names: Sequence[str],
+    observations: NDArray[np.float32],
+    kept: NDArray[np.int64] | None = None,
+) -> tuple[str, ...]:
+    """Sentences on features whose values are too close to one another for float32.
+
+    Args:
+        table: The opened file; a few of its columns are read again, with all their digits.
+        names: Columns of the d features.
+        observations: What was read of them, (N, d).
+        kept: Shape (N,), their rows in the file, from 0; None if they are all.
+
+    Returns:
+        One sentence for each of them.
+    """
+    suspects = np.flatnonzero(crowded(observations)).tolist()
+    if not suspects:
+        return ()
+    again = table.read(ColumnMap((), tuple(names[index] for index in suspects)))
+    rows = slice(None) if kept is None else kept
+    notes: list[str] = []
+    for index in suspects:
+        exact = again[names[index]].values[rows, None]
+        notes += coarse_columns(
+            exact, observations[:, index : index + 1], (f"column {names[index]!r}",)
+        )
+    return tuple(notes)
 
 
 def action_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[Any]:
