@@ -27,10 +27,12 @@ from sarl_core.explaining.aggregation_figures import (
     points_of,
     rounds_figure,
 )
-from sarl_core.explaining.language import counted
+from sarl_core.explaining.comparison_text import POLICY_TEXT
+from sarl_core.explaining.language import counted, share_text
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.rollouts.aggregation import Aggregation
 from sarl_core.rollouts.aggregation_files import aggregation_card, card_path
+from sarl_core.rollouts.episodes import Episodes
 
 PLAIN = {"displayModeBar": False}
 BUDGETS = "budgets.json"
@@ -106,7 +108,10 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             else ""
         )
     )
-    with st.grid(6, min_column_width=140):
+    if improved.reported.summary().get("freedom") == 0.0:
+        changed = share_text(improved.reported.summary()["intervention_rate"])
+        st.markdown(f"{POLICY_TEXT}: they changed {changed} of the novice's steps.")
+    with st.grid(7, min_column_width=130):
         for label, value, hint in (
             ("Mean return", f"{spread.mean:,.1f}", "Over the fresh episodes"),
             ("Deviation", f"{spread.std:,.1f}", "Standard deviation over the fresh episodes"),
@@ -117,6 +122,7 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
                 "Mean of the middle half of the episodes (IQM), 95 % interval "
                 f"{spread.low:,.1f} to {spread.high:,.1f}",
             ),
+            ("Failures", *failures_of(improved.reported)),
             ("Rules", f"{len(rules):,}", "Over all actions"),
             (
                 "Demonstrations",
@@ -125,6 +131,18 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             ),
         ):
             st.metric(label, value, border=True, height="stretch", help=hint)
+
+
+def failures_of(episodes: Episodes) -> tuple[str, str]:
+    """The share of episodes that ended in failure, and what it tells."""
+    found = episodes.failures
+    if found is None:
+        return "–", "It is not known which ends of this environment are failures"
+    return (
+        share_text(found.rate),
+        f"{found.count:,} of {found.of:,} fresh episodes, 95 % interval {share_text(found.low)} to "
+        f"{share_text(found.high)}",
+    )
 
 
 def how_chosen(improved: Aggregation) -> str:

@@ -13,9 +13,9 @@ from _flips import flips_rate, flips_title
 from _words import escaped
 
 from sarl_core.explaining.comparison_figures import ArmStyle, returns_figure, typical_figure
-from sarl_core.explaining.comparison_text import verdict_on_all
+from sarl_core.explaining.comparison_text import POLICY_TEXT, verdict_on_all
 from sarl_core.explaining.language import share_text
-from sarl_core.rollouts.comparison import Arm, Comparison, crash_rate, failure_known
+from sarl_core.rollouts.comparison import Arm, Comparison
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
 
@@ -70,7 +70,8 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
     styles = [line.style for line in lines]
     height = max(HEIGHT, 60 + ROW * len(lines))
     if not at_work:
-        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in verdicts(found)))
+        told = [*verdicts(found), *policies(found), *remarks(found)]
+        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in told))
     left, right = st.columns([2, 3], gap="medium")
     with left:
         st.markdown("**Typical return**")
@@ -90,8 +91,10 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
             alt="Return of every episode, for every agent and shield",
         )
     st.caption(
-        "The typical return is the mean of the middle half of the episodes, which a few odd ones "
-        "do not move, with its 95 % interval. Click a name to hide its line, twice to see it alone."
+        "The typical return is the mean of the middle half of the episodes, with its 95 % "
+        "interval. It leaves out the worst quarter of the episodes, and so hides crashes: read the "
+        "mean return and the crashes beside it. Click a name to hide its line, twice to see it "
+        "alone."
     )
     st.dataframe(
         [table_row(line, episodes) for line, episodes in found],
@@ -129,6 +132,29 @@ def verdicts(found: Found) -> list[str]:
         if shielded:
             sentences.append(verdict_on_all(agent_name(agent), alone, shielded))
     return sentences
+
+
+def policies(found: Found) -> list[str]:
+    """Which of the rules leave an agent nothing to choose from."""
+    names = dict.fromkeys(
+        line.shield
+        for line, episodes in found
+        if line.arm.rules is not None and episodes.summary().get("freedom") == 0.0
+    )
+    return [f"The {rules_name(name)}: {POLICY_TEXT[0].lower()}{POLICY_TEXT[1:]}." for name in names]
+
+
+def remarks(found: Found) -> list[str]:
+    """What is to be said of how the episodes came about, each once."""
+    notes = dict.fromkeys(
+        (line.shield if line.arm.rules is not None else "", note)
+        for line, episodes in found
+        for note in episodes.remarks
+    )
+    return [
+        f"{f'With the {rules_name(shield)}, ' if shield else 'Without a shield, '}{note}."
+        for shield, note in notes
+    ]
 
 
 def agent_name(agent: str) -> str:
@@ -169,6 +195,11 @@ def column_config(env_id: str) -> dict[str, Any]:
         "Covered": column.TextColumn(
             alignment="right", help="Share of the steps at which some rule applied"
         ),
+        "Freedom": column.TextColumn(
+            alignment="right",
+            help="What the rules leave the agent to choose from: 100 % where no rule applies, 0 % "
+            "where they decide everything and the agent nothing",
+        ),
         flips_title(env_id): column.TextColumn(
             alignment="right", help="How often the shield switches on or off"
         ),
@@ -178,12 +209,16 @@ def column_config(env_id: str) -> dict[str, Any]:
             "ends an episode of this environment before its time. A landing or an arrival is none. "
             "A dash where it is not known which ends are failures.",
         ),
+        "Crashes, 95 %": column.TextColumn(
+            alignment="right",
+            help="Where the share of crashes probably lies (95 % interval by Clopper and Pearson)",
+        ),
     }
 
 
 def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
     """What the table says of a line."""
-    numbers, summary = episodes.statistics, episodes.summary()
+    numbers, summary, failures = episodes.statistics, episodes.summary(), episodes.failures
     rules = line.arm.rules
     return {
         "Agent": line.agent,
@@ -198,12 +233,14 @@ def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
         if rules is not None and any(rule.box is not None for rule in rules.rules)
         else "–",
         "Covered": share_text(summary["coverage"]) if rules is not None else "–",
+        "Freedom": share_text(summary.get("freedom", float("nan"))) if rules is not None else "–",
         flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
         if rules is not None and episodes.flips is not None
         else "–",
-        "Crashes": share_text(crash_rate(episodes, episodes.env_id))
-        if failure_known(episodes.env_id)
-        else "–",
+        "Crashes": "–" if failures is None else share_text(failures.rate),
+        "Crashes, 95 %": "–"
+        if failures is None
+        else f"{share_text(failures.low)} to {share_text(failures.high)}",
     }
 
 

@@ -343,6 +343,8 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
         [
             ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
             ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
+            ("failures", failures_text(summary, len(document["episodes"]))),
+            *_cost(summary),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
             *(
                 []
@@ -355,9 +357,52 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
                 if "invalid_steps" not in summary
                 else [("not checked", _invalid(summary["invalid_steps"]))]
             ),
+            *([] if shield is None else [("freedom", freedom_text(summary))]),
         ]
     )
     print_notes(document["notes"])
+
+
+def failures_text(summary: dict[str, float], episodes: int) -> str:
+    """How many episodes failed, and how sure one can be of the share.
+
+    Args:
+        summary: What `Episodes.summary` gave.
+        episodes: How many there are.
+
+    Returns:
+        In words, also where it is not known which ends are failures.
+    """
+    from sarl_core.explaining.language import share_text
+
+    if "failures" not in summary:
+        return "not known: nothing says which ends of this environment are failures"
+    low, high = (share_text(summary[name]) for name in ("failure_low", "failure_high"))
+    return (
+        f"{summary['failures']:,} of {episodes:,} episodes, "
+        f"{share_text(summary['failure_rate'])} (95 % interval {low} to {high})"
+    )
+
+
+def freedom_text(summary: dict[str, float]) -> str:
+    """What a shield leaves the agent to choose from.
+
+    Args:
+        summary: What `Episodes.summary` gave.
+
+    Returns:
+        In words.
+    """
+    from sarl_core.explaining.language import share_text
+
+    what = share_text(summary["freedom"])
+    if not summary["freedom"]:
+        return f"{what}: a rule decides every step, so this is a policy and no longer a shield"
+    return f"{what} of the choice is left to the agent"
+
+
+def _cost(summary: dict[str, float]) -> list[tuple[str, str]]:
+    return [("cost", f"{summary['cost']:.2f} an episode")] if "cost" in summary else []
 
 
 def print_notes(notes: Sequence[str]) -> None:
@@ -415,7 +460,7 @@ def describe_replay(replay: Replay, path: Path, shielded: Sequence[bool]) -> dic
             {"agent": episode.agent, "shielded": has_shield, **episode.to_dict()["episodes"][0]}
             for episode, has_shield in zip(replay.episodes, shielded, strict=False)
         ],
-        "notes": list(dict.fromkeys(note for one in replay.episodes for note in one.notes)),
+        "notes": list(dict.fromkeys(note for one in replay.episodes for note in one.remarks)),
     }
 
 

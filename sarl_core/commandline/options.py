@@ -71,6 +71,16 @@ ProjectionName = Annotated[
         "rule's interval, the nearest value in it, or the expert's median.",
     ),
 ]
+MaxSteps = Annotated[
+    int | None,
+    typer.Option(
+        "--max-steps",
+        min=1,
+        show_default="100,000, and 5,000 of a picture",
+        help="Cut an episode off after so many steps if it has not ended by then; the answer says "
+        "so.",
+    ),
+]
 OutsideName = Annotated[
     Literal["act", "abstain"],
     typer.Option(

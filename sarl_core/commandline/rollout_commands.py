@@ -13,6 +13,7 @@ from sarl_core.commandline.options import (
     AgentName,
     Env,
     Json,
+    MaxSteps,
     Normalise,
     OnInvalidName,
     OutsideName,
@@ -42,9 +43,10 @@ def evaluate(
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
     on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
     as_json: Json = False,
 ) -> None:
-    """Run episodes, shielded or not: returns, lengths, interventions, coverage.
+    """Run episodes, shielded or not: returns, failures, interventions, coverage, freedom.
 
     Example: `python -m sarl_core evaluate --env LunarLander-v3 --agent novice --rules rules.json
     --episodes 50 --seed 1 --json`
@@ -60,6 +62,7 @@ def evaluate(
             episodes=episodes,
             seed=seed,
             keep_steps=False,
+            max_steps=max_steps,
             progress=advance,
         )
         document = found.to_dict()
@@ -98,6 +101,7 @@ def render(
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
     on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
     as_json: Json = False,
 ) -> None:
     """Play one episode and save it as a moving picture, in real time.
@@ -114,9 +118,13 @@ def render(
 
         actor = read_agent(agent, env, normalise, stochastic=stochastic, seed=seed)
         if both and shield is not None:
-            replay = side_by_side(env, actor, shield, seed=seed, progress=advance)
+            replay = side_by_side(
+                env, actor, shield, seed=seed, max_steps=max_steps, progress=advance
+            )
         else:
-            replay = render_episode(env, actor, shield=shield, seed=seed, progress=advance)
+            replay = render_episode(
+                env, actor, shield=shield, seed=seed, max_steps=max_steps, progress=advance
+            )
     with terminal.working("Writing") as advance:
         replay.save(out, progress=advance)
     from sarl_core.commandline.answers import describe_replay, print_replay

@@ -10,8 +10,10 @@ import numpy as np
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import LABEL_COLOURS, faded
+from sarl_core.explaining.language import share_text
 from sarl_core.explaining.markup import plain
 from sarl_core.rollouts.comparison import Arm, Comparison
+from sarl_core.rollouts.episodes import Episodes
 
 _BLUE, _ORANGE, _GREEN, _PINK, _SKY, _YELLOW, _GREY, _VIOLET, _BROWN, _OLIVE = LABEL_COLOURS
 _VERMILION = "#D55E00"
@@ -161,7 +163,7 @@ def typical_figure(
             x=[found.iqm],
             y=[row],
             mode="markers+text",
-            text=[f"{found.iqm:,.1f}"],
+            text=[f"{found.iqm:,.1f}{_crashing(episodes)}"],
             textposition="top center",
             cliponaxis=False,
             marker={"color": style.colour, "size": 11, "symbol": style.symbol},
@@ -198,6 +200,12 @@ def typical_figure(
         ticklabelstandoff=6,
     )
     return figure
+
+
+def _crashing(episodes: Episodes) -> str:
+    """How many episodes crash, beside a number that leaves out the worst ones."""
+    found = episodes.failures
+    return "" if found is None or not found.count else f" ({share_text(found.rate)} crash)"
 
 
 def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from sarl_core.explaining.language import counted, share_text, threshold_text
 from sarl_core.files import whole_file
-from sarl_core.rollouts.comparison import failure_known
+from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 

@@ -9,18 +9,32 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from sarl_core.errors import InputError
+from sarl_core.explaining.comparison_text import POLICY_TEXT
 from sarl_core.explaining.language import number_text, share_text
 from sarl_core.explaining.report_svg import MUTED, NEUTRAL, Scale, dot_and_interval
 from sarl_core.rollouts.comparison import Comparison, comparison_row
+from sarl_core.rollouts.shield_effect import Effect
+from sarl_core.rollouts.statistics import MeanInterval
 
 _MAX_BYTES = 16 * 2**20
 _MOST_ROWS = 200
-_HEADINGS = ("Failures", "Actions changed", "Steps with a rule", "Rules", "Episodes")
-_UNKNOWN = "–"
+_HEADINGS = (
+    "Failures",
+    "Against no shield",
+    "Actions changed",
+    "Freedom left",
+    "Steps with a rule",
+    "Rules",
+    "Episodes",
+)
+_ALWAYS = ("Failures",)  # a typical return hides them
+_UNKNOWN, _NOT_KNOWN = "–", "not known"
 _NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
+_DIFFERENCE = ("return_difference", "difference_low", "difference_high")
+HARMS: Effect = "harms"
 
 
 @dataclass(frozen=True)
@@ -41,6 +55,12 @@ class Result:
         changed: Share of steps at which the shield changed the action, None without one.
         covered: Share of steps at which a rule applied, None without a shield.
         crashes: Share of episodes that ended in failure, None where unknown.
+        crash_ends: Its 95 % interval, None where unknown.
+        freedom: What the rules left the agent to choose from, 0 to 1, None where unknown.
+        gained: Return with the shield less the return without it on the same seeds, mean and 95 %
+            interval; None where both were not run.
+        effect: What that and the failures mean: helps, harms, or no difference seen; "" where
+            unknown.
     """
 
     name: str
@@ -56,6 +76,10 @@ class Result:
     changed: float | None
     covered: float | None
     crashes: float | None
+    crash_ends: tuple[float, float] | None = None
+    freedom: float | None = None
+    gained: MeanInterval | None = None
+    effect: str = ""
 
 
 @dataclass(frozen=True)
@@ -107,9 +131,14 @@ def results_of(comparison: Comparison) -> tuple[Result, ...]:
     """
     return tuple(
         _result(
-            comparison_row(arm, episodes) | {"environment": comparison.env_id}, "", comparison.seed
+            comparison_row(arm, episodes, comparison.alone(place))
+            | {"environment": comparison.env_id},
+            "",
+            comparison.seed,
         )
-        for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True)
+        for place, (arm, episodes) in enumerate(
+            zip(comparison.arms, comparison.episodes, strict=True)
+        )
     )
 
 
@@ -173,7 +202,9 @@ def compared(results: Sequence[Result]) -> Compared | None:
     scale = Scale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
     more = [_more(one) for one in results]
     known = [
-        place for place in range(len(_HEADINGS)) if any(texts[place] != _UNKNOWN for texts in more)
+        place
+        for place, heading in enumerate(_HEADINGS)
+        if heading in _ALWAYS or any(texts[place] != _UNKNOWN for texts in more)
     ]
     environments = sorted({one.env_id for one in results if one.env_id})
     where = f" in {' and '.join(environments)}" if environments else ""
@@ -182,9 +213,11 @@ def compared(results: Sequence[Result]) -> Compared | None:
     return Compared(
         sentences=(
             f"Agents were run{where}{since}. The typical return is the mean of the middle half of "
-            "the episodes, which a few odd ones do not move; the line through the dot shows where "
-            "it probably lies (95 % interval). Where two lines do not overlap, the difference is "
-            "hardly chance.",
+            "the episodes; the line through the dot shows where it probably lies (95 % interval). "
+            "It leaves out the worst quarter of the episodes, so it hides crashes: read the mean "
+            "and the failures beside it.",
+            *(f"{one.name}: these rules harm the agent." for one in results if one.effect == HARMS),
+            *(f"{one.name}: {_policy(one)}" for one in results if one.freedom == 0.0),
         ),
         headings=tuple(_HEADINGS[place] for place in known),
         rows=tuple(
@@ -261,6 +294,10 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
         return None if row.get(key) is None else int(number(key))
 
     mean, std, iqm, low, high = map(number, _NUMBERS)
+    gained = None
+    if all(row.get(name) is not None for name in _DIFFERENCE):
+        gained = MeanInterval(*map(number, _DIFFERENCE))
+    effect = str(row.get("effect") or "")
     if not low <= iqm <= high:
         raise InputError(
             f"the interval of {row['arm']!r} in the comparison {name} does not hold its value; "
@@ -279,11 +316,44 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
         high=high,
         changed=share("intervention_rate"),
         covered=share("coverage"),
-        crashes=share("crash_rate"),
+        crashes=share("failure_rate") if row.get("crash_rate") is None else share("crash_rate"),
+        crash_ends=_both(share("failure_low"), share("failure_high")),
+        freedom=None if row.get("coverage") is None else share("freedom"),
+        gained=gained,
+        effect=effect if effect in get_args(Effect) else "",
     )
 
 
+def _both(low: float | None, high: float | None) -> tuple[float, float] | None:
+    return None if low is None or high is None else (low, high)
+
+
 # --- showing -----------------------------------------------------------------------------------
+
+
+def _policy(one: Result) -> str:
+    changed = (
+        "" if one.changed is None else f" They changed {share_text(one.changed)} of the steps."
+    )
+    return f"{POLICY_TEXT[0].lower()}{POLICY_TEXT[1:]}.{changed}"
+
+
+def _crashes(one: Result) -> str:
+    """The share of failures with its interval."""
+    if one.crashes is None:
+        return _NOT_KNOWN
+    if one.crash_ends is None:
+        return share_text(one.crashes)
+    low, high = map(share_text, one.crash_ends)
+    return f"{share_text(one.crashes)} ({low} to {high})"
+
+
+def _gained(one: Result) -> str:
+    """The paired difference in return, and what it means."""
+    if one.gained is None:
+        return _UNKNOWN
+    low, mean, high = map(number_text, (one.gained.low, one.gained.mean, one.gained.high))
+    return f"{mean} ({low} to {high}){f': {one.effect}' if one.effect else ''}"
 
 
 def _more(one: Result) -> tuple[str, ...]:
@@ -293,8 +363,10 @@ def _more(one: Result) -> tuple[str, ...]:
         return _UNKNOWN if value is None else share_text(value)
 
     return (
-        told(one.crashes),
+        _crashes(one),
+        _gained(one),
         told(one.changed),
+        told(one.freedom),
         told(one.covered),
         _UNKNOWN if one.rules is None else f"{one.rules:,}",
         f"{one.episodes:,}",

@@ -279,7 +279,8 @@ def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]
     found = [
         "These rules were not cut out by thresholds. A tree of a few questions was built so that "
         "in every state exactly one rule for each action applies: few rules that do as much as "
-        "possible.",
+        "possible. So these rules leave an agent nothing to choose from: they are a policy that "
+        "replaces it, and no longer a shield that corrects it here and there.",
     ]
     if card is not None and isinstance(card.get("budget"), int):
         each = " for each action" if len(rule_set.actions) > 1 else ""
@@ -303,6 +304,12 @@ def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]
         "read the share of states in which the expert did the same as how far they follow it."
     )
     return tuple(found)
+
+
+def _shares(reported: Mapping[str, Any]) -> list[float]:
+    """The ends of the interval of the failures, as far as a card has them."""
+    ends = (reported.get("failure_low"), reported.get("failure_high"))
+    return [float(end) for end in ends if isinstance(end, (int, float)) and 0 <= end <= 1]
 
 
 def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -336,6 +343,16 @@ def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
             over = f", over {episodes} episodes" if episodes is not None else ""
             found.append(
                 ("Mean return of an agent that follows the rules", f"{mean}{spread}{ends}{over}")
+            )
+        failures = number(reported.get("failures"))
+        shares = [number(100 * share) for share in _shares(reported)]
+        if failures is not None and episodes is not None and len(shares) == 2:
+            found.append(
+                (
+                    "Failures of an agent that follows the rules",
+                    f"{failures} of {episodes} episodes (95 % interval {shares[0]} to "
+                    f"{shares[1]} %)",
+                )
             )
     text("Reported on", "reported_on")
     if (seed := number(card.get("seed"))) is not None:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.rollouts.comparison import crashed, failure_known
+from sarl_core.rollouts.comparison import crashed
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.paired import holm, sign_flip_test
 from sarl_core.rollouts.rule_use import RuleUse
 from sarl_core.rollouts.statistics import MeanInterval, mean_interval

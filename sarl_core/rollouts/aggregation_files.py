@@ -183,4 +183,9 @@ def _reported(found: Aggregation) -> dict[str, Any] | None:
         "iqm_high": round(spread.high, 2),
         "min": round(float(episodes.returns.min()), 2),
         "max": round(float(episodes.returns.max()), 2),
+        **{
+            name: value if isinstance(value, int) else round(value, 4)
+            for name, value in episodes.summary().items()
+            if name.startswith("failure") or name in ("intervention_rate", "freedom")
+        },
     }

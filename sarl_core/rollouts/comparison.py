@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.failures import failed, failure_known
 from sarl_core.rollouts.progress import Progress, report
+from sarl_core.rollouts.shield_effect import shield_effect
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside, Shield
 
@@ -21,25 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from sarl_core.mining.rules import RuleSet
-
-_EVERY_END, _NO_END = "every end", "no end"
-# What an end that is no time limit means. Some end for good reasons too; there only a failure
-# brings exactly this reward.
-_FAILURES: dict[str, str | float] = {
-    "LunarLander": -100.0,
-    "BipedalWalker": -100.0,
-    "CarRacing": -100.0,
-    "CartPole": _EVERY_END,
-    "InvertedPendulum": _EVERY_END,
-    "InvertedDoublePendulum": _EVERY_END,
-    "Hopper": _EVERY_END,
-    "Walker2d": _EVERY_END,
-    "Ant": _EVERY_END,
-    "Humanoid": _EVERY_END,
-    "Pendulum": _NO_END,
-    "MountainCar": _NO_END,  # it ends at the flag
-    "Acrobot": _NO_END,  # it ends when it has swung up
-}
 
 
 @dataclass(frozen=True)
@@ -85,10 +68,35 @@ class Comparison:
 
         return pd.DataFrame(
             [
-                comparison_row(arm, episodes)
-                for arm, episodes in zip(self.arms, self.episodes, strict=True)
+                comparison_row(arm, episodes, self.alone(place))
+                for place, (arm, episodes) in enumerate(zip(self.arms, self.episodes, strict=True))
             ]
         )
+
+    def alone(self, place: int) -> Episodes | None:
+        """The same agent's episodes without a shield.
+
+        Args:
+            place: Of a shielded arm.
+
+        Returns:
+            As many on the same seeds; None where they were not run, or the arm has no shield.
+        """
+        arm, own = self.arms[place], self.episodes[place]
+        if arm.rules is None:
+            return None
+        for other, episodes in zip(self.arms, self.episodes, strict=True):
+            same = other.agent is arm.agent or (
+                isinstance(other.agent, (str, Path)) and other.agent == arm.agent
+            )
+            if (
+                same
+                and other.rules is None
+                and other.stochastic == arm.stochastic
+                and np.array_equal(episodes.seeds, own.seeds)
+            ):
+                return episodes
+        return None
 
 
 def compare(
@@ -195,46 +203,6 @@ def crashed(episodes: Episodes, env_id: str) -> NDArray[np.bool_]:
     return failed(env_id, episodes.terminated, episodes.last_rewards)
 
 
-def failed(
-    env_id: str, terminated: NDArray[np.bool_], last_rewards: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Which ends of episodes are failures.
-
-    In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
-    walker arrives; there a failure is an end with a last reward of -100. In CartPole every end
-    that is not a time limit is one, in MountainCar none is.
-
-    Args:
-        env_id: Environment.
-        terminated: Whether the environment ended each episode, and no limit, (E,).
-        last_rewards: Reward of each episode's last step, (E,).
-
-    Returns:
-        Shape (E,); of an environment in which it is not known, none.
-    """
-    meaning = _failure(env_id)
-    if isinstance(meaning, float):
-        return np.asarray(terminated & (last_rewards == meaning))
-    return np.asarray(terminated & (meaning == _EVERY_END))
-
-
-def failure_known(env_id: str) -> bool:
-    """Whether it is known which ends of an environment's episodes are failures.
-
-    Args:
-        env_id: Environment.
-
-    Returns:
-        False for an environment that this project knows nothing of.
-    """
-    return _failure(env_id) is not None
-
-
-def _failure(env_id: str) -> str | float | None:
-    family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
-    return next((meaning for name, meaning in _FAILURES.items() if family.startswith(name)), None)
-
-
 def crash_rate(episodes: Episodes, env_id: str) -> float:
     """Share of the episodes that ended by failure, as `crashed` says.
 
@@ -250,19 +218,22 @@ def crash_rate(episodes: Episodes, env_id: str) -> float:
     return float(crashed(episodes, env_id).mean())
 
 
-def comparison_row(arm: Arm, episodes: Episodes) -> dict[str, Any]:
+def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) -> dict[str, Any]:
     """What one arm's episodes say, for a table.
 
     Args:
         arm: The arm.
         episodes: Its E episodes.
+        alone: Those of the same agent without a shield, on the same seeds, where they were run.
 
     Returns:
         `arm`, `agent`, `rules` (their number, None without a shield), `episodes`, the statistics
         of `Episodes.summary` (without a shield, `intervention_rate`, `coverage` and
-        `outside_rate` are None),
-        and `crash_rate`, None where it is not known.
+        `outside_rate` are None), `crash_rate`, None where it is not known, and of `ShieldEffect`
+        `return_difference`, `difference_low`, `difference_high`, `return_p`, `failure_p` and
+        `effect`, None where the episodes without a shield are not given.
     """
+    found = None if alone is None else shield_effect(alone, episodes)
     row: dict[str, Any] = {
         "arm": arm.name,
         "agent": episodes.agent,
@@ -275,4 +246,12 @@ def comparison_row(arm: Arm, episodes: Episodes) -> dict[str, Any]:
         row["crash_rate"] = None
     if arm.rules is None:
         row |= {"intervention_rate": None, "coverage": None, "outside_rate": None}
-    return row
+    known = found is not None and found.failures is not None
+    return row | {
+        "return_difference": None if found is None else found.returns.mean,
+        "difference_low": None if found is None else found.returns.low,
+        "difference_high": None if found is None else found.returns.high,
+        "return_p": None if found is None else found.return_p,
+        "failure_p": found.failure_p if found is not None and known else None,
+        "effect": None if found is None else found.effect,
+    }

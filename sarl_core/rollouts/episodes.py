@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import Agent, make_agent
+from sarl_core.rollouts.failures import failed, failure_known
 from sarl_core.rollouts.player import Outcome, play
 from sarl_core.rollouts.progress import Progress, report
-from sarl_core.rollouts.statistics import Interval, summarise
+from sarl_core.rollouts.statistics import Interval, Rate, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 from sarl_core.rollouts.workers import parallel
 
@@ -47,7 +48,7 @@ class Episodes:
         interventions: Steps at which the shield changed the action, (E,) int64.
         covered: Steps at which some rule applied, (E,) int64.
         terminated: Whether the environment ended the episode, (E,) bool.
-        truncated: Whether a limit ended it, (E,) bool.
+        truncated: Whether a limit ended it, the environment's or the run's, (E,) bool.
         last_rewards: Reward of each episode's last step, which tells a crash, (E,) float64.
         steps: Every step, or None where they were not kept.
         flips: How often the shield switched on or off, (E,) int64, or None where it was not
@@ -58,6 +59,11 @@ class Episodes:
             (E,) int64; none where not given.
         invalid: Steps at which the action passed because the observation was no state or the
             action none that there is, (E,) int64; None where no shield lets them pass.
+        cut: Whether that was the run's, for it had no end of its own, (E,) bool; none where not
+            given.
+        freedom: What the rules left the agent to choose from, mean over the steps, 0 to 1, (E,);
+            NaN where not given.
+        costs: Sum of what the environment said that the steps cost, (E,); NaN where it does not.
         notes: What is to be said of how rules and environment were matched, as clauses.
     """
 
@@ -75,14 +81,24 @@ class Episodes:
     flips: NDArray[np.int64] | None = None
     outside: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     withheld: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    freedom: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    costs: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     notes: tuple[str, ...] = ()
     invalid: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for name in ("outside", "withheld"):
+        nothing: tuple[tuple[str, Any], ...] = (
+            ("outside", np.int64(0)),
+            ("withheld", np.int64(0)),
+            ("cut", np.False_),
+            ("freedom", np.float64("nan")),
+            ("costs", np.float64("nan")),
+        )
+        for name, value in nothing:
             if not len(getattr(self, name)):
-                object.__setattr__(self, name, np.zeros(len(self.seeds), dtype=np.int64))
+                object.__setattr__(self, name, np.full(len(self.seeds), value))
         for column in fields(self):
             value = getattr(self, column.name)
             if isinstance(value, np.ndarray):
@@ -124,6 +140,34 @@ class Episodes:
         """Mean, interquartile mean and its interval of the returns; worked out once."""
         return summarise(self.returns)
 
+    @cached_property
+    def failures(self) -> Rate | None:
+        """How many ended by failure; None where it is not known which ends are some."""
+        if not failure_known(self.env_id):
+            return None
+        return rate_of(self.failed)
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which episodes ended by failure, (E,); none where it is not known."""
+        return failed(self.env_id, self.terminated, self.last_rewards)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of how they came about, as clauses."""
+        count = int(self.cut.sum())
+        if not count:
+            return self.notes
+        longest = int(self.lengths[self.cut].max())
+        who = "the episode" if len(self) == 1 else f"{count} of the {len(self)} episodes"
+        if 1 < len(self) == count:
+            who = f"all {count} episodes"
+        return (
+            *self.notes,
+            f"{who} had no end and {'was' if count == 1 else 'were'} cut off after {longest:,} "
+            "steps (max_steps), so the return counts these alone",
+        )
+
     def summary(self) -> dict[str, float]:
         """What the episodes say together (``evaluate --json``).
 
@@ -131,7 +175,10 @@ class Episodes:
             `mean`, `std`, `iqm`, `iqm_low`, `iqm_high` of the returns, and as shares of all
             steps `intervention_rate` and `coverage`; and `outside_rate`, the share of the
             interventions, those that were withheld with them, outside the rules' data. Where
-            invalid steps pass, `invalid_steps`, how many there were.
+            invalid steps pass, `invalid_steps`, how many there were; where there are some, `cut`,
+            the number of episodes without an end. Where they are known, `freedom` and `cost`,
+            means over the steps and over the episodes, and `failures`, `failure_rate`,
+            `failure_low` and `failure_high` (95 %, Clopper and Pearson's).
         """
         returns = self.statistics
         steps = float(self.lengths.sum())
@@ -147,7 +194,26 @@ class Episodes:
             "coverage": float(self.covered.sum()) / steps,
             "outside_rate": float(self.outside.sum()) / max(broken, 1),
             **invalid,
+            **self._known(),
         }
+
+    def _known(self) -> dict[str, float]:
+        """What is not known of all episodes, where it is."""
+        found: dict[str, float] = {}
+        if self.cut.any():
+            found["cut"] = int(self.cut.sum())
+        if not np.isnan(self.freedom).any():
+            found["freedom"] = float((self.freedom * self.lengths).sum() / self.lengths.sum())
+        if not np.isnan(self.costs).any():
+            found["cost"] = float(self.costs.mean())
+        if self.failures is not None:
+            found |= {
+                "failures": self.failures.count,
+                "failure_rate": self.failures.rate,
+                "failure_low": self.failures.low,
+                "failure_high": self.failures.high,
+            }
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """The document that ``evaluate --json`` prints, ready for JSON."""
@@ -160,15 +226,20 @@ class Episodes:
             strict=True,
         )
         names = ("seed", "return", "length", "interventions", "covered")
-        episodes = [dict(zip(names, row, strict=True)) for row in rows]
+        episodes: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in rows]
+        for episode, fell, cost, cut in zip(
+            episodes, self.failed.tolist(), self.costs.tolist(), self.cut.tolist(), strict=True
+        ):
+            if self.failures is not None:
+                episode["failed"] = fell
+            if not np.isnan(cost):
+                episode["cost"] = cost
+            if cut:
+                episode["cut"] = True
         if self.invalid is not None:
             for episode, count in zip(episodes, self.invalid.tolist(), strict=True):
                 episode["invalid"] = count
-        return {
-            "episodes": episodes,
-            "summary": self.summary(),
-            "notes": list(self.notes),
-        }
+        return {"episodes": episodes, "summary": self.summary(), "notes": list(self.remarks)}
 
     def to_frame(self) -> pd.DataFrame:
         """One row an episode: its columns, and how it ended."""
@@ -183,9 +254,12 @@ class Episodes:
                 "covered": self.covered,
                 "terminated": self.terminated,
                 "truncated": self.truncated,
+                "cut": self.cut,
                 "last_reward": self.last_rewards,
                 "outside": self.outside,
                 "withheld": self.withheld,
+                "freedom": self.freedom,
+                "cost": self.costs,
             }
         )
 
@@ -236,6 +310,7 @@ def rollout(
     batch: int = _BATCH,
     jobs: int = 1,
     keep_steps: bool = True,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
     """Run episodes to their end.
@@ -251,21 +326,25 @@ def rollout(
         batch: Environments side by side; changes the speed, never the result.
         jobs: Processes; likewise. Starting one takes about a second.
         keep_steps: Whether to keep the record of every step (about 60 bytes and 4 d a step).
+        max_steps: An episode that has not ended by then is cut off, and `Episodes.cut` says so;
+            `MAX_STEPS` where not given.
         progress: Called with (episodes done, in all); returning False stops.
 
     Returns:
         The episodes in the order of their seeds. The same arguments give the same result, bit
-        for bit. Episodes without end are truncated after `MAX_STEPS`.
+        for bit.
 
     Raises:
         InputError: If a number is out of range, or agent, shield and environment do not fit.
         CancelledError: If `progress` returned False.
     """
+    most = MAX_STEPS if max_steps is None else max_steps
     for name, value, least in (
         ("episodes", episodes, 1),
         ("seed", seed, 0),
         ("batch", batch, 1),
         ("jobs", jobs, 1),
+        ("max_steps", most, 1),
     ):
         if value < least:
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
@@ -288,10 +367,11 @@ def rollout(
             seeds,
             batch=batch,
             keep_steps=keep_steps,
+            max_steps=most,
             finished=lambda: finished(1),
         )
     found = []
-    outcomes = _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps)
+    outcomes = _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps, most)
     for piece, outcome in zip(pieces, outcomes, strict=True):
         found.append(_episodes(env_id, actor.name, piece, outcome))
         finished(len(piece))
@@ -306,6 +386,7 @@ def run_seeds(
     *,
     batch: int = _BATCH,
     keep_steps: bool = True,
+    max_steps: int | None = None,
     finished: Callable[[], None] | None = None,
 ) -> Episodes:
     """Run the episodes of some seeds, which need not follow each other, in this process.
@@ -317,6 +398,7 @@ def run_seeds(
         seeds: Shape (E,), at least one.
         batch: Environments side by side; changes the speed, never the result.
         keep_steps: Whether to keep the record of every step.
+        max_steps: An episode that has not ended by then is cut off; `MAX_STEPS` where not given.
         finished: Called after every episode; may raise to stop.
 
     Returns:
@@ -331,7 +413,7 @@ def run_seeds(
         shield,
         seeds,
         batch=batch,
-        max_steps=MAX_STEPS,
+        max_steps=MAX_STEPS if max_steps is None else max_steps,
         keep_steps=keep_steps,
         finished=finished,
     )
@@ -346,6 +428,7 @@ def _in_processes(
     batch: int,
     jobs: int,
     keep_steps: bool,
+    max_steps: int,
 ) -> Iterator[Outcome]:
     from joblib import delayed
 
@@ -359,7 +442,7 @@ def _in_processes(
                     shield,
                     piece,
                     batch=batch,
-                    max_steps=MAX_STEPS,
+                    max_steps=max_steps,
                     keep_steps=keep_steps,
                 )
                 for piece in pieces[start : start + jobs]

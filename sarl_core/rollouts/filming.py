@@ -16,7 +16,7 @@ from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.film import Film
 from sarl_core.rollouts.flips import count_flips
-from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.player import added, check_environment
 from sarl_core.rollouts.spaces import SpaceAdapter
 from sarl_core.rollouts.steps import StepTable
 
@@ -28,29 +28,33 @@ MAX_STEPS = 5_000  # of one picture; where an environment sets itself no limit
 _DEFAULT_FPS = 30.0  # where an environment does not say
 
 
-def picture_speed(env_id: str) -> tuple[float, int]:
+def picture_speed(env_id: str, max_steps: int | None = None) -> tuple[float, int]:
     """Refuse an environment without pictures; of one with, say how fast and how long it runs.
 
     Args:
         env_id: What ``gymnasium.make`` takes.
+        max_steps: An episode that has not ended by then is cut off; `MAX_STEPS` where None.
 
     Returns:
         Pictures a second, and the most steps of an episode.
 
     Raises:
-        InputError: If it draws no pictures.
+        InputError: If it draws no pictures, or there are to be no steps.
     """
+    most = MAX_STEPS if max_steps is None else max_steps
+    if most < 1:
+        raise InputError(f"max_steps is {most} and must be at least 1; give a larger one")
     describe_environment(env_id)
     env = make_environment(env_id)
     modes, fps = env.metadata.get("render_modes", []), env.metadata.get("render_fps")
-    limit = getattr(env.spec, "max_episode_steps", None) or MAX_STEPS
+    limit = getattr(env.spec, "max_episode_steps", None) or most
     env.close()
     if "rgb_array" not in modes:
         raise InputError(
             f"{env_id} draws no pictures (it has no render mode rgb_array); "
             "choose another environment"
         )
-    return float(fps) if fps else _DEFAULT_FPS, min(limit, MAX_STEPS)
+    return float(fps) if fps else _DEFAULT_FPS, min(limit, most)
 
 
 class _Row(NamedTuple):
@@ -86,7 +90,7 @@ def film_episode(
         shield: Checks them, or None.
         seed: Of the episode.
         film: Gets a picture before each step, and one of the last state.
-        limit: The episode is truncated after as many steps.
+        limit: An episode that has not ended by then is cut off.
         told: Called with (steps done, most steps); may raise to stop.
 
     Returns:
@@ -102,14 +106,18 @@ def film_episode(
     with _no_display(), _drawing(env_id, shield) as env:
         observation, _ = env.reset(seed=seed)
         terminated = truncated = False
+        cost = float("nan")
         while not (terminated or truncated):
             film.add(_picture(env, env_id))
-            row, observation, terminated, truncated = _film_step(
+            row, observation, terminated, truncated, info = _film_step(
                 env, adapter, agent, generator, observation, len(rows)
             )
             rows.append(row)
-            truncated = bool(truncated) or (len(rows) >= limit and not terminated)
+            if "cost" in info:
+                cost = added(cost, info["cost"])
             told(len(rows), limit)
+            if len(rows) >= limit:
+                break
         film.add(_picture(env, env_id))
         told(limit, limit)
     steps = _table(rows, adapter)
@@ -122,17 +130,24 @@ def film_episode(
         interventions=np.array([int(steps.intervened.sum())]),
         covered=np.array([int(steps.covered.sum())]),
         terminated=np.array([bool(terminated)]),
-        truncated=np.array([bool(truncated)]),
+        truncated=np.array([not terminated]),
+        cut=np.array([not (terminated or truncated)]),
         last_rewards=steps.reward[-1:].copy(),
         steps=steps,
         outside=np.array([int(steps.outside.sum())]),
         withheld=np.array([int((steps.outside & ~steps.intervened).sum())]),
         flips=count_flips(steps.intervened, steps.episode),
+        freedom=np.array([1.0 if shield is None else _freedom(shield, steps)]),
+        costs=np.array([cost]),
         notes=notes,
         invalid=np.array([int(steps.is_invalid.sum())])
         if shield is not None and shield.on_invalid == "pass"
         else None,
     )
+
+
+def _freedom(shield: Shield, steps: StepTable) -> float:
+    return float(shield.freedom(steps.observation, steps.rules).mean())
 
 
 def _film_step(
@@ -142,7 +157,7 @@ def _film_step(
     generator: np.random.Generator,
     observation: Any,
     step: int,
-) -> tuple[_Row, Any, bool, bool]:
+) -> tuple[_Row, Any, bool, bool, dict[str, Any]]:
     state = np.array(adapter.flat(observation))
     uniforms = generator.random((1, agent.n_uniforms)) if agent.n_uniforms else None
     proposed = agent.act(state[None], uniforms)
@@ -169,7 +184,7 @@ def _film_step(
             record.outside,
             record.invalid,
         )
-    return row, following, bool(terminated), bool(truncated)
+    return row, following, bool(terminated), bool(truncated), info
 
 
 def _table(rows: list[_Row], adapter: SpaceAdapter) -> StepTable:

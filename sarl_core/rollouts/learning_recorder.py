@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
-from sarl_core.rollouts.comparison import failed
+from sarl_core.rollouts.failures import failed
 from sarl_core.rollouts.learners import MaskedPPO
 from sarl_core.rollouts.learning_arms import Handover, LearningArm
 from sarl_core.rollouts.learning_curves import LearningCurve

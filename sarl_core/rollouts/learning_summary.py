@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.rollouts.comparison import failure_known
+from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.learning_arms import ARMS, LearningArm
 from sarl_core.rollouts.learning_curves import Trial
 from sarl_core.rollouts.learning_files import LearningRun, LearningStudy

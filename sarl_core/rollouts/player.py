@@ -32,6 +32,9 @@ class Outcome(NamedTuple):
     flips: NDArray[np.int64]
     outside: NDArray[np.int64]
     withheld: NDArray[np.int64]
+    cut: NDArray[np.bool_]
+    freedom: NDArray[np.float64]
+    costs: NDArray[np.float64]
     notes: tuple[str, ...]
     invalid: NDArray[np.int64] | None
 
@@ -76,7 +79,7 @@ def play(
         shield: Checks them, or None.
         seeds: Shape (E,).
         batch: Environments side by side.
-        max_steps: An episode is truncated after as many.
+        max_steps: An episode that has not ended by then is cut off.
         keep_steps: Whether to keep the record of every step.
         finished: Called after every episode; may raise to stop.
 
@@ -121,7 +124,8 @@ class _Run:
         count = len(seeds)
         self.returns, self.last_rewards = np.zeros((2, count))
         self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
-        self.terminated, self.truncated = np.zeros((2, count), dtype=np.bool_)
+        self.terminated, self.truncated, self.cut = np.zeros((3, count), dtype=np.bool_)
+        self.free, self.costs = np.zeros(count), np.full(count, np.nan)
         self.flips = np.zeros(count, dtype=np.int64)
         self.on = np.zeros(count, dtype=np.bool_)  # whether the shield changed the latest action
         self.outside, self.withheld, self.invalid = np.zeros((3, count), dtype=np.int64)
@@ -159,9 +163,11 @@ class _Run:
         rewards = np.empty(len(states))
         ended: list[tuple[int, bool, bool]] = []
         for index, lane in enumerate(self.lanes):
-            observation, reward, terminated, truncated, _ = lane.env.step(actions[index])
+            observation, reward, terminated, truncated, info = lane.env.step(actions[index])
             following[index] = adapter.flat(observation)
             rewards[index] = reward
+            if "cost" in info:
+                self.costs[lane.episode] = added(self.costs[lane.episode], info["cost"])
             if terminated or truncated:
                 ended.append((index, bool(terminated), bool(truncated)))
         if self.keep_steps:
@@ -190,8 +196,11 @@ class _Run:
             self.covered[episodes] += (choice.rules >= 0).any(axis=1)
             self.outside[episodes] += choice.outside
             self.withheld[episodes] += choice.outside & ~choice.intervened
+            self.free[episodes] += self.shield.freedom(states, choice.rules)
             if self.shield.on_invalid == "pass":
                 self.invalid[episodes] += choice.invalid.astype(np.bool_)
+        else:
+            self.free[episodes] += 1.0
         self.lengths[episodes] += 1
         self.states = following
         return self._end(ended, episodes)
@@ -199,7 +208,10 @@ class _Run:
     def _end(self, ended: list[tuple[int, bool, bool]], episodes: NDArray[np.int64]) -> int:
         closed = {index for index, _, _ in ended}
         too_long = np.flatnonzero(self.lengths[episodes] >= self.max_steps).tolist()
-        ended.extend((index, False, True) for index in too_long if index not in closed)
+        for index in too_long:
+            if index not in closed:
+                self.cut[self.lanes[index].episode] = True
+                ended.append((index, False, True))
         if not ended:
             return 0
         for index, terminated, truncated in ended:
@@ -234,6 +246,9 @@ class _Run:
             self.flips,
             self.outside,
             self.withheld,
+            self.cut,
+            self.free / self.lengths,
+            self.costs,
             self.notes,
             None if self.shield is None or self.shield.on_invalid == "raise" else self.invalid,
         )
@@ -282,6 +297,23 @@ def choose(
         decision.outside,
         decision.invalid,
     )
+
+
+def added(cost: float, more: Any) -> float:
+    """What an episode has cost, with one more step.
+
+    Args:
+        cost: Of the steps before; NaN before the first.
+        more: What stands in the step's ``info["cost"]``.
+
+    Returns:
+        The sum; what is no number counts as nothing.
+    """
+    try:
+        value = float(more)
+    except (TypeError, ValueError):
+        return cost
+    return value if np.isnan(cost) else cost + value
 
 
 def shield_for(env_id: str, shield: Shield) -> Shield:

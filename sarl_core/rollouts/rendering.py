@@ -168,6 +168,7 @@ def render_episode(
     seed: int = 0,
     stochastic: bool = False,
     describe_rule: DescribeRule | None = None,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Replay:
     """Render one episode, the same as `rollout` plays it with that seed.
@@ -179,6 +180,7 @@ def render_episode(
         seed: Of the episode.
         stochastic: Whether a trained policy is sampled.
         describe_rule: A sentence for the index of a rule; its conditions where not given.
+        max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
         progress: Called with (steps done, most steps); returning False stops.
 
     Returns:
@@ -189,7 +191,7 @@ def render_episode(
         WorkError: If drawing fails.
         CancelledError: If `progress` returned False.
     """
-    return _replay(env_id, agent, (shield,), seed, stochastic, describe_rule, progress)
+    return _replay(env_id, agent, (shield,), seed, stochastic, describe_rule, max_steps, progress)
 
 
 def side_by_side(
@@ -200,6 +202,7 @@ def side_by_side(
     seed: int = 0,
     stochastic: bool = False,
     describe_rule: DescribeRule | None = None,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Replay:
     """Render an agent with the shield (left) and without (right), on one seed.
@@ -213,6 +216,7 @@ def side_by_side(
         seed: Of both episodes.
         stochastic: Whether a trained policy is sampled.
         describe_rule: A sentence for the index of a rule; its conditions where not given.
+        max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
         progress: Called with (steps done, most steps); returning False stops.
 
     Returns:
@@ -223,7 +227,9 @@ def side_by_side(
         WorkError: If drawing fails.
         CancelledError: If `progress` returned False.
     """
-    return _replay(env_id, agent, (shield, None), seed, stochastic, describe_rule, progress)
+    return _replay(
+        env_id, agent, (shield, None), seed, stochastic, describe_rule, max_steps, progress
+    )
 
 
 def _replay(
@@ -233,12 +239,13 @@ def _replay(
     seed: int,
     stochastic: bool,
     describe_rule: DescribeRule | None,
+    max_steps: int | None,
     progress: Progress | None,
 ) -> Replay:
     if seed < 0:
         raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
-    fps, limit = picture_speed(env_id)
+    fps, limit = picture_speed(env_id, max_steps)
     palette = Palette(OVERLAY_COLOURS)
     episodes: list[Episodes] = []
     panels: list[Panel] = []

@@ -50,6 +50,43 @@ class MeanInterval:
     high: float
 
 
+@dataclass(frozen=True)
+class Rate:
+    """How often something happened, and how sure one can be of it.
+
+    Attributes:
+        count: How often.
+        of: Among how many.
+        rate: The share.
+        low: Lower end of its exact 95 % interval (Clopper and Pearson's).
+        high: Upper end.
+    """
+
+    count: int
+    of: int
+    rate: float
+    low: float
+    high: float
+
+
+def rate_of(happened: ArrayLike) -> Rate:
+    """A share of independent episodes with its exact interval.
+
+    Args:
+        happened: One truth value an episode, shape (E,), E at least 1.
+
+    Returns:
+        The share; its interval covers in at least 95 % of all cases, however rare it is.
+    """
+    from scipy.special import betaincinv
+
+    values = np.asarray(happened, dtype=np.bool_).reshape(-1)
+    count, of = int(values.sum()), len(values)
+    low = 0.0 if count == 0 else float(betaincinv(count, of - count + 1, 0.025))
+    high = 1.0 if count == of else float(betaincinv(count + 1, of - count, 0.975))
+    return Rate(count, of, count / of, low, high)
+
+
 def mean_interval(values: ArrayLike) -> MeanInterval:
     """The mean of a few runs, as learners with seeds of their own, with its 95 % interval.
 

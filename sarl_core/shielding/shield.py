@@ -471,6 +471,30 @@ class Shield:
         """
         return tuple(index for matcher in self._matchers for index in matcher.scanned)
 
+    def freedom(
+        self, observations: NDArray[np.float32], rules: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """What the rules leave an agent to choose from.
+
+        Args:
+            observations: Shape (B, d).
+            rules: In force there, -1 for none, (B, m).
+
+        Returns:
+            Shape (B,): the mean over the action dimensions of log(labels still allowed) /
+            log(labels): 1 where no rule applies or it abstains, 0 where one label is left, as
+            every rule leaves one.
+        """
+        free = rules < 0
+        if self._abstains:
+            for dimension, column in enumerate(rules.T):
+                ruled = np.flatnonzero(column >= 0)
+                free[ruled, dimension] = self._boxes.leave_out(column[ruled], observations[ruled])
+        for dimension, action in enumerate(self._actions):
+            if action.n_labels == 1:  # there was nothing to choose from
+                free[:, dimension] = True
+        return np.asarray(free.mean(axis=1))
+
     @property
     def keeps_boxes(self) -> bool:
         """Whether any of the rules says where its pairs lay; else none is ever outside."""

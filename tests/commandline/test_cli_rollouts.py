@@ -33,7 +33,14 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
     document = json.loads(run(*arguments))
     assert [episode["seed"] for episode in document["episodes"]] == [7, 8, 9, 10]
     for episode in document["episodes"]:
-        assert set(episode) == {"seed", "return", "length", "interventions", "covered"}
+        assert set(episode) == {
+            "seed",
+            "return",
+            "length",
+            "interventions",
+            "covered",
+            "failed",
+        }
         assert 0 <= episode["interventions"] <= episode["covered"] <= episode["length"]
     summary = document["summary"]
     assert set(summary) == {
@@ -45,6 +52,11 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
         "intervention_rate",
         "coverage",
         "outside_rate",
+        "freedom",
+        "failures",
+        "failure_rate",
+        "failure_low",
+        "failure_high",
     }
     assert summary["mean"] == np.mean([episode["return"] for episode in document["episodes"]])
     assert summary["intervention_rate"] > 0

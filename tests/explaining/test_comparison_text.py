@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sarl_core.explaining.comparison_text import clear_change, verdict, verdict_on_all
+from sarl_core.explaining.comparison_text import verdict, verdict_on_all
 from sarl_core.rollouts.episodes import Episodes, rollout
 
 
@@ -19,22 +19,65 @@ def with_returns(episodes: Episodes, returns: list[float], failures: int) -> Epi
     return replace(episodes, returns=np.array(returns), terminated=terminated)
 
 
+NOVICE = [20.0, 21.0, 22.0, 23.0, 20.0, 21.0, 22.0, 23.0]
+LIKE = [18.0, 21.0, 22.0, 26.0, 20.0, 21.0, 22.0, 23.0]
+
+
 def test_a_rise_a_fall_and_neither(alone: Episodes) -> None:
-    alone = with_returns(alone, [20.0, 21.0, 22.0, 23.0, 20.0, 21.0, 22.0, 23.0], 8)
-    better = with_returns(alone, [500.0] * 8, 0)
-    like = with_returns(alone, [18.0, 21.0, 22.0, 26.0, 20.0, 21.0, 22.0, 23.0], 8)
-    assert clear_change(alone, better) == 1
-    assert clear_change(better, alone) == -1
-    assert clear_change(alone, like) == 0
+    alone = with_returns(alone, NOVICE, 8)
+    better, like = with_returns(alone, [500.0] * 8, 0), with_returns(alone, LIKE, 8)
     assert verdict("novice", "the filtered rules", alone, better) == (
-        "With the filtered rules the typical return of the novice rises from 22 to 500, and 0 % "
-        "instead of 100 % of its episodes end in a crash."
+        "With the filtered rules the typical return of the novice rises from 22 to 500 (its mean "
+        "from 22 to 500, a difference of 478, 95 % interval 478 to 479), and 0 % instead of 100 % "
+        "of its episodes end in a crash."
     )
-    assert "falls from 500 to 22" in verdict("expert", "the rules", better, alone)
+    fall = verdict("expert", "the rules", better, alone)
+    assert "falls from 500 to 22" in fall
+    assert fall.endswith("these rules harm it.")
     assert verdict("novice", "the rules", alone, like).endswith(
-        "does not clearly change (22, without them 22), and 100 % of its episodes end in a crash, "
-        "as without."
+        "does not clearly change (22, without them 22; its mean from 22 to 22, a difference of 0, "
+        "95 % interval −1 to 1), and 100 % of its episodes end in a crash, as without."
     )
+
+
+def test_harm_among_the_worst_episodes_is_told_as_harm() -> None:
+    """Most episodes are as before, and a quarter of them crash: the middle half says little."""
+    rng = np.random.default_rng(7)
+    safe = rollout("CartPole-v1", "novice", episodes=20, keep_steps=False)
+    before = with_returns(safe, (250 + rng.normal(0, 15, 20)).tolist(), 0)
+    after = before.returns - 10.0
+    after[[1, 4, 9, 13, 17]] -= 400.0
+    worse = replace(before, returns=after, terminated=np.isin(np.arange(20), [1, 4, 9, 13, 17]))
+    told = verdict("expert", "the unfiltered rules", before, worse)
+    assert "falls" in told
+    assert "25 % instead of 0 % of its episodes end in a crash" in told
+    assert told.endswith("these rules harm it.")
+
+
+def test_more_crashes_alone_are_harm() -> None:
+    safe = rollout("CartPole-v1", "novice", episodes=20, keep_steps=False)
+    before = with_returns(safe, [100.0, 300.0] * 10, 0)
+    worse = with_returns(safe, [101.0, 299.0] * 10, 9)
+    told = verdict("expert", "the rules", before, worse)
+    assert "does not clearly change" in told
+    assert told.endswith("45 % instead of 0 % of its episodes end in a crash: these rules harm it.")
+
+
+def test_a_typical_return_that_hides_the_change_is_not_the_last_word() -> None:
+    safe = rollout("CartPole-v1", "novice", episodes=40, keep_steps=False)
+    before = with_returns(safe, [500.0] * 40, 0)
+    worse = with_returns(safe, [100.0] * 9 + [500.0] * 31, 9)
+    told = verdict("expert", "the rules", before, worse)
+    assert "its mean falls (its mean from 500 to 410" in told
+    assert told.endswith("these rules harm it.")
+
+
+def test_few_episodes_are_told_with_a_caution(alone: Episodes) -> None:
+    few = with_returns(alone, NOVICE, 8).part(0, 4)
+    better = with_returns(few, [500.0] * 4, 0)
+    assert "rises from 22 to 500" in verdict("novice", "the rules", few, better)
+    assert "4 episodes are too few to rule out chance" in verdict("novice", "it", few, better)
+    assert "harm" not in verdict("novice", "the rules", better, few)
 
 
 def test_where_nothing_crashes_nothing_is_said_of_it(alone: Episodes) -> None:
@@ -43,21 +86,28 @@ def test_where_nothing_crashes_nothing_is_said_of_it(alone: Episodes) -> None:
 
 
 def test_every_shield_is_told_the_best_one_first(alone: Episodes) -> None:
-    alone = with_returns(alone, [20.0, 21.0, 22.0, 23.0, 20.0, 21.0, 22.0, 23.0], 8)
+    alone = with_returns(alone, NOVICE, 8)
     shielded = [
         ("the coarse rules", with_returns(alone, [9.0] * 8, 8)),
         ("the filtered rules", with_returns(alone, [305.0] * 8, 6)),
         ("the unfiltered rules", with_returns(alone, [500.0] * 8, 0)),
         ("the compact rules", with_returns(alone, [18.0, 21.0, 22.0, 26.0] * 2, 8)),
     ]
-    assert verdict_on_all("novice", alone, shielded) == (
-        "With the unfiltered rules the typical return of the novice rises from 22 to 500, and 0 % "
-        "instead of 100 % of its episodes end in a crash; with the filtered rules it rises to 305 "
-        "(75 % of its episodes crash); with the compact rules it does not clearly change (22; "
-        "100 % of its episodes crash); "
-        "with the coarse rules it falls to 9 (100 % of its episodes crash)."
-    )
+    told = verdict_on_all("novice", alone, shielded)
+    parts = told.split("; with ")
+    assert [part.split(" rules")[0] for part in parts] == [
+        "With the unfiltered",
+        "the filtered",
+        "the compact",
+        "the coarse",
+    ]
+    assert "rises to 305" in parts[1]
+    assert "75 % of its episodes crash" in parts[1]
+    assert "does not clearly change (22" in parts[2]
+    assert "falls to 9" in parts[3]
+    assert "these rules harm it" in parts[3]
+    assert "harm" not in " ".join(parts[:3])
     safe = with_returns(alone, [500.0] * 8, 0)
-    told = verdict_on_all("expert", safe, [("the rules", safe), ("the filtered rules", safe)])
-    assert "crash" not in told
-    assert told.endswith("with the filtered rules it does not clearly change (500).")
+    same = verdict_on_all("expert", safe, [("the rules", safe), ("the filtered rules", safe)])
+    assert "crash" not in same
+    assert same.endswith("every episode has the same return with them and without).")

@@ -18,9 +18,9 @@ from sarl_core.rollouts.comparison import (
     comparison_row,
     crash_rate,
     crashed,
-    failure_known,
 )
 from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.recording import record
 from sarl_core.shielding.shield import Shield

@@ -157,7 +157,14 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
     document = found.to_dict()
     assert json.loads(json.dumps(document)) == document
     assert [row["seed"] for row in document["episodes"]] == [1, 2, 3, 4, 5]
-    assert set(document["episodes"][0]) == {"seed", "return", "length", "interventions", "covered"}
+    assert set(document["episodes"][0]) == {
+        "seed",
+        "return",
+        "length",
+        "interventions",
+        "covered",
+        "failed",
+    }
     summary = document["summary"]
     assert list(summary) == [
         "mean",
@@ -168,6 +175,11 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
         "intervention_rate",
         "coverage",
         "outside_rate",
+        "freedom",
+        "failures",
+        "failure_rate",
+        "failure_low",
+        "failure_high",
     ]
     assert summary["mean"] == found.returns.mean()
     assert found.steps is not None
@@ -263,6 +275,7 @@ def test_an_endless_environment_is_truncated(monkeypatch: pytest.MonkeyPatch) ->
     found = rollout("toy/Endless-v0", "novice", episodes=3, batch=2)
     assert found.lengths.tolist() == [50, 50, 50]
     assert found.truncated.all()
+    assert found.cut.all()
     assert not found.terminated.any()
 
 

@@ -1,0 +1,65 @@
+"""Which ends of episodes are failures: a crash, a fall, whatever the task must not let happen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+_EVERY_END, _NO_END = "every end", "no end"
+# What an end that is no time limit means. Some end for good reasons too; there only a failure
+# brings exactly this reward.
+_FAILURES: dict[str, str | float] = {
+    "LunarLander": -100.0,
+    "BipedalWalker": -100.0,
+    "CarRacing": -100.0,
+    "CartPole": _EVERY_END,
+    "InvertedPendulum": _EVERY_END,
+    "InvertedDoublePendulum": _EVERY_END,
+    "Hopper": _EVERY_END,
+    "Walker2d": _EVERY_END,
+    "Ant": _EVERY_END,
+    "Humanoid": _EVERY_END,
+    "Pendulum": _NO_END,
+    "MountainCar": _NO_END,  # it ends at the flag
+    "Acrobot": _NO_END,  # it ends when it has swung up
+}
+
+
+def failed(
+    env_id: str, terminated: NDArray[np.bool_], last_rewards: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which ends of episodes are failures.
+
+    In LunarLander and BipedalWalker an episode also ends when the lander rests and when the
+    walker arrives; there a failure is an end with a last reward of -100. In CartPole every end
+    that is not a time limit is one, in MountainCar none is.
+
+    Args:
+        env_id: Environment.
+        terminated: Whether the environment ended each episode, and no limit, (E,).
+        last_rewards: Reward of each episode's last step, (E,).
+
+    Returns:
+        Shape (E,); of an environment in which it is not known, none.
+    """
+    meaning = _failure(env_id)
+    if isinstance(meaning, float):
+        return np.asarray(terminated & (last_rewards == meaning))
+    return np.asarray(terminated & (meaning == _EVERY_END))
+
+
+def failure_known(env_id: str) -> bool:
+    """Whether it is known which ends of an environment's episodes are failures.
+
+    Args:
+        env_id: Environment.
+
+    Returns:
+        False for an environment that this project knows nothing of.
+    """
+    return _failure(env_id) is not None
+
+
+def _failure(env_id: str) -> str | float | None:
+    family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
+    return next((meaning for name, meaning in _FAILURES.items() if family.startswith(name)), None)
