@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import streamlit as st
 from _cache import cached
 
+from sarl_core.reproducing.chance import how_decided
 from sarl_core.reproducing.report import REPORT, Entry, Report, read_report
 from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import Claim, Drawing, Verdict
+from sarl_core.reproducing.study import Drawing
 from sarl_core.reproducing.tables import read_table
+from sarl_core.reproducing.verdicts import Claim, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +28,7 @@ _DOTS: dict[Verdict, str] = {
     "agrees": "#009E73",
     "partly": "#E69F00",
     "does not agree": "#D55E00",
+    "cannot be judged": "#8a949c",
 }
 _STYLE = """<style>
 .claims { font-size: 0.95rem; }
@@ -128,7 +131,7 @@ def show_claims(claims: tuple[Claim, ...], *, beside: bool) -> None:
         f"{escape(one.verdict.capitalize())}</div>"
         f'<div><div class="who">The paper, {escape(one.where)}</div>{escape(one.paper)}</div>'
         f'<div><div class="who">Here</div>{escape(one.ours)}'
-        f"<details><summary>How this is decided</summary>{escape(one.decided_by)}</details></div>"
+        f"<details><summary>How this is decided</summary>{escape(how_decided(one))}</details></div>"
         "</div>"
         for one in claims
     ]

@@ -11,9 +11,11 @@ from _words import in_full
 
 from sarl_core.errors import SarlError
 from sarl_core.explaining.language import counted
+from sarl_core.reproducing.chance import chance_text
 from sarl_core.reproducing.report import Entry, Report
 from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import FULL_MINUTES, VERDICTS
+from sarl_core.reproducing.study import FULL_MINUTES, replication
+from sarl_core.reproducing.verdicts import VERDICTS
 
 CLAIMS = "Claims"
 ALL = "all"
@@ -32,7 +34,7 @@ def load() -> Report:
     if found is None or not found.studies:
         st.info(
             "Nothing has been reproduced yet. This command, where the dashboard runs, makes every "
-            f"figure; it takes about {FULL_MINUTES} minutes on two busy cores.",
+            f"figure; it takes about {FULL_MINUTES} minutes on two cores.",
             icon=":material/terminal:",
         )
         st.code(paper.COMMAND, language="sh")
@@ -47,8 +49,10 @@ def show_all_claims(found: Report) -> None:
     st.markdown(
         f"Of {counted(len(claims), 'claim')} of the paper, our numbers agree with "
         f"**{counts['agrees']}**, agree partly with **{counts['partly']}**, and do not agree with "
-        f"**{counts['does not agree']}**."
+        f"**{counts['does not agree']}**; **{counts['cannot be judged']}** cannot be judged."
     )
+    if by_chance := chance_text(claims):
+        st.markdown(by_chance)
     wanted = st.segmented_control(
         "Verdict",
         [ALL, *VERDICTS],
@@ -67,10 +71,9 @@ def show_all_claims(found: Report) -> None:
             st.markdown(f"**{entry.place}. {entry.title}**")
             paper.show_claims(chosen, beside=False)
     st.caption(
-        "Each verdict is decided by a rule, from the numbers alone. Intervals are over episodes or "
-        "learners, and ranges over trees that choose differently among equally good queries; the "
-        "demonstrations and the expert of an environment are one each, and others may give other "
-        "numbers."
+        "Each verdict is decided by a rule, from the numbers alone: over several recordings of "
+        "several experts, since one recording is one draw. Who has the demonstrations of another "
+        "expert may see how far that carries."
     )
 
 
@@ -93,10 +96,12 @@ def show_study(name: str, entry: Entry | None) -> None:
             icon=":material/bolt:",
         )
     try:
-        parts = study.parts(paper.table(name, entry))
+        frame = paper.table(name, entry)
+        parts = study.parts(frame)
     except SarlError as error:
         st.error(in_full(str(error)), icon=":material/error:")
         return
+    st.caption(f"Made from {replication(frame)} for each environment.")
     part = parts[0]
     if len(parts) > 1:
         part = (
@@ -185,9 +190,8 @@ def how_made(entry: Entry) -> None:
 
 st.title("Paper")
 st.caption(
-    "The figures and claims of the paper behind this method, made again with the shipped experts "
-    "and demonstrations: rules with several tree seeds and their range, learners and episodes with "
-    "several seeds and 95 % intervals."
+    "The figures and claims of the paper behind this method, made again: over several recordings "
+    "of several experts of each task, with 95 % intervals."
 )
 report = load()
 places = {STUDIES[name].place: name for name in STUDIES}

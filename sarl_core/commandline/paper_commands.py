@@ -90,7 +90,8 @@ def reproduce(
 
 
 def _print_claims(report: Report, names: list[str]) -> None:
-    from sarl_core.reproducing.study import VERDICTS
+    from sarl_core.reproducing.chance import chance_text
+    from sarl_core.reproducing.verdicts import VERDICTS
 
     entries = [report.studies[name] for name in names]
     claims = [(entry.place, claim) for entry in entries for claim in entry.claims]
@@ -103,8 +104,11 @@ def _print_claims(report: Report, names: list[str]) -> None:
     terminal.print_lines(
         [
             f"Of {len(claims)} claims of the paper, our numbers agree with {counts[0]}, agree "
-            f"partly with {counts[1]}, and do not agree with {counts[2]}."
+            f"partly with {counts[1]}, and do not agree with {counts[2]}; {counts[3]} cannot be "
+            "judged.",
         ]
     )
+    if by_chance := chance_text(claim for _, claim in claims):
+        terminal.print_lines([by_chance])
     if any(entry.quick for entry in entries):
         terminal.print_lines(["This was a quick run: its numbers and verdicts mean little."])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -11,18 +11,22 @@ import numpy as np
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.quantisation import SNAPPINGS, STUDIED_DIVIDERS, Quantisation, Snapping
-from sarl_core.reproducing.shipped import (
+from sarl_core.reproducing.replicates import (
     PAPER_DIVIDER,
     demonstrations_of,
     environment_name,
     environments,
+    recorded_seeds,
+    replicates_of,
+    shipped_demonstrations,
 )
-from sarl_core.reproducing.study import FIRST_SEED, Claim, Drawing, Effort, Frames, Study, judge
-from sarl_core.reproducing.words import COMPARED, interval, number
+from sarl_core.reproducing.study import Drawing, Effort, Frames, Study, experts_in
+from sarl_core.reproducing.verdicts import Claim, Floats, above, claim, over_recordings, together
+from sarl_core.reproducing.words import interval, number
 from sarl_core.rollouts.divider_study import DividerStudy, study_divider
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.progress import Progress, report
-from sarl_core.rollouts.statistics import Interval
+from sarl_core.rollouts.statistics import MeanInterval, interquartile_mean
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +34,8 @@ if TYPE_CHECKING:
 _WALKER = "BipedalWalker-v3"
 _COLUMNS = (
     "environment",
+    "expert",
+    "recording",
     "what",
     "divider",
     "snapping",
@@ -47,42 +53,48 @@ _STAYS, _SOME = 0.5, 0.25  # of the expert's typical return
 
 def continuous() -> tuple[str, ...]:
     """The environments whose demonstrations have continuous actions."""
-    return tuple(one for one in environments() if not demonstrations_of(one).is_discrete)
+    return tuple(one for one in environments() if not shipped_demonstrations(one).is_discrete)
 
 
 def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
-    """Snap the expert's actions to intervals, with no rule in between.
+    """Snap the experts' actions to intervals, with no rule in between.
 
     Args:
-        effort: How many episodes for each divider and way to snap.
+        effort: How many recordings, and episodes for each divider and way to snap.
         progress: Called with (episodes done, in all); returning False stops.
 
     Returns:
-        Three kinds of rows, told apart by `what`: "return", an episode of the expert (`seed`,
-        `value`; `divider` 0 is the expert as it is); "error", what snapping changes in the
-        demonstrated actions (`value`, root mean square); "interval", with its edges `low` and
-        `high`, the `count` of demonstrated values in it, and their `median`.
+        For each recording (`environment`, `expert`, `recording`) three kinds of rows, told apart by
+        `what`: "return", an episode of the expert (`seed`, `value`; `divider` 0 is the expert as it
+        is); "error", what snapping changes in the demonstrated actions (`value`, root mean square);
+        "interval", with its edges `low` and `high`, the `count` of demonstrated values in it, and
+        their `median`.
     """
     import pandas as pd
 
-    ids = continuous()
+    wanted = [one for env_id in continuous() for one in replicates_of(env_id, effort.recordings)]
     rows: list[dict[str, Any]] = []
-    for number_of, env_id in enumerate(ids):
+    for done_before, replicate in enumerate(wanted):
 
-        def told(done: int, total: int, before: int = number_of) -> None:
-            report(progress, before * total + done, len(ids) * total)
+        def told(done: int, total: int, before: int = done_before) -> None:
+            report(progress, before * total + done, len(wanted) * total)
 
         found = study_divider(
-            env_id,
-            "expert",
-            demonstrations_of(env_id),
+            replicate.env_id,
+            replicate.expert,
+            demonstrations_of(replicate),
             episodes=effort.snapped_episodes,
-            seed=FIRST_SEED,
+            seed=replicate.first_seed,
             # The walker's physics take nearly all the time; the result is the same, bit for bit.
             jobs=1 if effort.quick else os.cpu_count() or 1,
             progress=told,
         )
-        rows += [{"environment": env_id, **row} for row in _rows(found)]
+        own = {
+            "environment": replicate.env_id,
+            "expert": replicate.name,
+            "recording": replicate.recording,
+        }
+        rows += [{**own, **row} for row in _rows(found)]
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
@@ -133,8 +145,8 @@ def episodes_of(frame: pd.DataFrame, env_id: str) -> dict[tuple[int, Snapping], 
         env_id: In it.
 
     Returns:
-        Seeds and returns of each combination, with nothing else in them; 0 and ``clip`` stand for
-        the expert as it is.
+        Seeds and returns of each combination, those of all recordings one after the other, with
+        nothing else in them; 0 and ``clip`` stand for the expert as it is.
     """
     rows = frame[(frame["environment"] == env_id) & (frame["what"] == "return")]
     found = {}
@@ -156,8 +168,28 @@ def episodes_of(frame: pd.DataFrame, env_id: str) -> dict[tuple[int, Snapping], 
     return found
 
 
+def typical_of(frame: pd.DataFrame, env_id: str) -> dict[tuple[int, Snapping], Floats]:
+    """The typical return (IQM) of each divider and way to snap in each recording.
+
+    Args:
+        frame: What `measure` gives.
+        env_id: In it.
+
+    Returns:
+        As in `episodes_of`, one number a recording.
+
+    Raises:
+        ValueError: If recordings have different numbers of episodes.
+    """
+    recordings = frame[frame["environment"] == env_id]["recording"].nunique()
+    return {
+        key: interquartile_mean(episodes.returns.reshape(recordings, -1))
+        for key, episodes in episodes_of(frame, env_id).items()
+    }
+
+
 def quantisations_of(frame: pd.DataFrame, env_id: str) -> tuple[tuple[Quantisation, ...], ...]:
-    """How the demonstrated actions are divided, out of the table.
+    """How the demonstrated actions of the first recording are divided, out of the table.
 
     Args:
         frame: What `measure` gives.
@@ -167,6 +199,7 @@ def quantisations_of(frame: pd.DataFrame, env_id: str) -> tuple[tuple[Quantisati
         For each action dimension one entry a divider.
     """
     rows = frame[frame["environment"] == env_id]
+    rows = rows[rows["recording"] == rows["recording"].iloc[0]]
     intervals, errors = rows[rows["what"] == "interval"], rows[rows["what"] == "error"]
     found = []
     for action in intervals["action"].unique():
@@ -200,15 +233,21 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
     numbers: dict[str, Any] = {}
     for env_id in _environments(frame):
         returns = {}
+        experts = experts_in(frame)[env_id]
+        typical = typical_of(frame, env_id)
         for (divider, snapping), episodes in episodes_of(frame, env_id).items():
-            found = episodes.statistics
             name = f"divider {divider}, {snapping}" if divider else "as it is"
+            over = over_recordings(typical[divider, snapping], experts)
             returns[name] = {
-                "mean": found.mean,
-                "std": found.std,
-                "iqm": found.iqm,
-                "iqm_low": found.low,
-                "iqm_high": found.high,
+                "recordings": len(experts),
+                "experts": len(set(experts)),
+                "mean": float(episodes.returns.mean()),
+                "std": float(episodes.returns.std(ddof=1)) if len(episodes) > 1 else 0.0,
+                # Over recordings, and not over episodes, which are alike within one.
+                "iqm": over.mean,
+                "iqm_low": over.low,
+                "iqm_high": over.high,
+                "iqm_of_recordings": typical[divider, snapping].tolist(),
             }
         divided = {
             parts[0].dimension.name: {
@@ -235,72 +274,106 @@ def divider_claims(frames: Frames) -> tuple[Claim, ...]:
         Its claims and ours.
     """
     frame = frames["divider"]
-    found = {env_id: episodes_of(frame, env_id) for env_id in _environments(frame)}
-    claims = [_finer(found)]
+    found = {env_id: typical_of(frame, env_id) for env_id in _environments(frame)}
+    experts = experts_in(frame)
+    claims = [_finer(found, experts)]
     if _WALKER in found:
-        claims.append(_complexity(found[_WALKER]))
+        claims.append(_complexity(found[_WALKER], experts[_WALKER]))
     return tuple(claims)
 
 
-def _finer(found: dict[str, dict[tuple[int, Snapping], Episodes]]) -> Claim:
+Typical = Mapping[tuple[int, Snapping], Floats]
+
+
+def _finer(found: Mapping[str, Typical], experts: Mapping[str, tuple[str, ...]]) -> Claim:
     told: list[str] = []
-    better: dict[str, bool] = {}
+    parts = []
     numbers: dict[str, float] = {}
-    for env_id, episodes in found.items():
+    for env_id, typical in found.items():
+        own = experts[env_id]
         centred = {
-            divider: one.statistics
-            for (divider, snapping), one in episodes.items()
+            divider: values
+            for (divider, snapping), values in typical.items()
             if snapping == "centre"
         }
         coarse = centred[PAPER_DIVIDER]
-        finer = {divider: one for divider, one in centred.items() if divider > PAPER_DIVIDER}
-        best = max(finer, key=lambda divider: finer[divider].iqm)
-        better[env_id] = finer[best].low > coarse.high
+        finer = [values for divider, values in centred.items() if divider > PAPER_DIVIDER]
+        parts.append(above(np.mean(finer, axis=0) - coarse, own, agrees=0, partly=0, show=number))
+        over = {divider: over_recordings(values, own) for divider, values in centred.items()}
         told.append(
-            f"{environment_name(env_id)} {interval(coarse)} with {PAPER_DIVIDER} intervals, "
-            f"{interval(finer[best])} with {best}, {number(episodes[0, 'clip'].statistics.iqm)} "
-            "as it is"
+            f"{environment_name(env_id)} "
+            + ", ".join(
+                f"{interval(one)} with {divider}" + (" intervals" if divider == 2 else "")
+                for divider, one in over.items()
+            )
+            + f", {number(float(typical[0, 'clip'].mean()))} as it is"
         )
-        numbers |= {f"{env_id}_{divider}": one.iqm for divider, one in centred.items()}
-    return Claim(
+        numbers |= {f"{env_id}_{divider}": one.mean for divider, one in over.items()}
+    return claim(
+        together(
+            parts,
+            f"{parts[0].rule} So in every environment with continuous actions; partly, if in some.",
+        ),
         paper="A finer division of the actions may have a positive effect (left open).",
         where="Conclusion and Prospects",
-        ours="Typical returns of the expert itself, each action replaced by the centre of its "
+        ours="Typical returns of the experts themselves, each action replaced by the centre of its "
         f"interval: {'; '.join(told)}.",
-        verdict=judge(all(better.values()), any(better.values())),
-        decided_by=f"{COMPARED}; agrees if a finer division lies above {PAPER_DIVIDER} intervals, "
-        "in every environment with continuous actions; partly, in some.",
+        measured="What all finer divisions bring on average, over that in "
+        f"{PAPER_DIVIDER} intervals.",
         numbers=numbers,
     )
 
 
-def _complexity(episodes: dict[tuple[int, Snapping], Episodes]) -> Claim:
-    whole = episodes[0, "clip"].statistics
-    centre, expert = (
-        episodes[PAPER_DIVIDER, snapping].statistics for snapping in ("centre", "expert")
+def _complexity(typical: Typical, experts: tuple[str, ...]) -> Claim:
+    whole = typical[0, "clip"]
+    ways: tuple[Snapping, Snapping] = ("centre", "expert")
+    centre, median = (over_recordings(typical[PAPER_DIVIDER, way], experts) for way in ways)
+    better = max(ways, key=lambda way: float(typical[PAPER_DIVIDER, way].mean()))
+    kept = np.divide(
+        typical[PAPER_DIVIDER, better], whole, out=np.zeros(len(whole)), where=whole > 0
     )
-    kept = max(centre.iqm, expert.iqm) / whole.iqm if whole.iqm > 0 else 0.0
-    return Claim(
+    before = over_recordings(whole, experts)
+    return claim(
+        above(kept, experts, agrees=_STAYS, partly=_SOME),
         paper="That no rules help on BipedalWalker is put down to poor demonstrations and to an "
         "environment that is too complex.",
         where="text on Figure 7",
-        ours="Two intervals alone, without any rule, bring the expert from "
-        f"{interval(whole)} to {interval(centre)} if each action becomes the centre of its "
-        f"interval, as under the shield of Figure 7, and to {interval(expert)} if it becomes what "
-        f"the expert typically did in it. That leaves {_of_typical(centre, whole)} and "
-        f"{_of_typical(expert, whole)} of its typical return.",
-        verdict=judge(kept >= _STAYS, kept >= _SOME),
-        decided_by=f"Agrees if the expert, its actions divided into {PAPER_DIVIDER} intervals, "
-        "keeps half of its typical return with the better of the two, the centre and its own "
-        "typical value; partly if it keeps a quarter.",
-        numbers={"as_it_is": whole.iqm, "centre": centre.iqm, "expert": expert.iqm},
+        ours="Two intervals alone, without any rule, bring the experts from "
+        f"{interval(before)} to {interval(centre)} if each action becomes the centre of its "
+        f"interval, as under the shield of Figure 7, and to {interval(median)} if it becomes what "
+        f"the expert typically did in it. That leaves {_of_typical(centre, before)} and "
+        f"{_of_typical(median, before)} of their typical return.",
+        measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
+        "its typical return with the better of the two, the centre and its own typical value.",
+        numbers={"as_it_is": before.mean, "centre": centre.mean, "expert": median.mean},
     )
 
 
-def _of_typical(found: Interval, whole: Interval) -> str:
-    if min(found.iqm, whole.iqm) <= 0:
+def _of_typical(found: MeanInterval, whole: MeanInterval) -> str:
+    if min(found.mean, whole.mean) <= 0:
         return "nothing"
-    return share_text(min(found.iqm / whole.iqm, 1.0))
+    return share_text(min(found.mean / whole.mean, 1.0))
+
+
+def divisions_exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """The same episodes with dividers and ways to snap dealt out anew, alike in all recordings.
+
+    Args:
+        frame: What `measure` gives.
+        rng: Random numbers.
+
+    Returns:
+        A table as `measure` gives it.
+    """
+    rows = frame["what"] == "return"
+    names = list(zip(frame["divider"], frame["snapping"], strict=True))
+    keys = list(dict.fromkeys(key for key, own in zip(names, rows, strict=True) if own))
+    order = rng.permutation(len(keys))
+    dealt = dict(zip(keys, [keys[number] for number in order], strict=True))
+    new = [dealt[key] if own else key for key, own in zip(names, rows, strict=True)]
+    return frame.assign(
+        divider=[divider for divider, _ in new], snapping=[snapping for _, snapping in new]
+    )
 
 
 def _draw(frame: pd.DataFrame, part: str, dark: bool) -> tuple[Drawing, ...]:
@@ -346,9 +419,20 @@ def _settings(effort: Effort) -> dict[str, Any]:
         "environments": list(continuous()),
         "dividers": list(STUDIED_DIVIDERS),
         "snappings": list(SNAPPINGS),
-        "episodes": effort.snapped_episodes,
-        "expert": "the shipped one, its likeliest actions",
-        "seeds": {"episodes": [FIRST_SEED, FIRST_SEED + effort.snapped_episodes - 1]},
+        "episodes_a_recording": effort.snapped_episodes,
+        "expert": "that of the recording, its likeliest actions",
+        "seeds": {
+            "recordings": {
+                env_id: recorded_seeds(env_id, effort.recordings) for env_id in continuous()
+            },
+            "episodes": {
+                env_id: [
+                    [one.first_seed, one.first_seed + effort.snapped_episodes - 1]
+                    for one in replicates_of(env_id, effort.recordings)
+                ]
+                for env_id in continuous()
+            },
+        },
     }
 
 
@@ -359,12 +443,14 @@ DIVIDING = Study(
     about="Not in the paper, which leaves it open: the expert itself acts, and each of its actions "
     "is replaced by what stands for its own interval, the centre or what the expert typically did "
     "in it. Clip, the nearest value in the interval, is the action itself. What is lost is lost to "
-    "the division alone. Below, how often each interval was demonstrated; those that never were, "
-    "and that no rule can ask for, are hatched.",
+    "the division alone. Each recording has its expert, its typical values and its episodes. "
+    "Below, how often each interval was demonstrated in the shipped recording; those that never "
+    "were, and that no rule can ask for, are hatched.",
     measure=measure,
     settings=_settings,
     numbers=_numbers,
     claims=divider_claims,
+    exchanged=divisions_exchanged,
     parts=lambda frame: tuple(environment_name(one) for one in _environments(frame)),
     draw=_draw,
     columns=_COLUMNS,

@@ -13,11 +13,11 @@ from sarl_core.mining.landscape import (
     Landscape,
     threshold_landscape,
 )
-from sarl_core.reproducing.shipped import (
+from sarl_core.reproducing.replicates import (
     PAPER_DIVIDER,
-    TREE_SEEDS,
     demonstrations_of,
     environments,
+    replicates_of,
     trees_of,
 )
 from sarl_core.reproducing.study import Effort
@@ -27,36 +27,36 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
-COLUMNS = ("environment", "divider", "tree_seed", "support", "confidence", *_LAYERS)
+COLUMNS = ("environment", "expert", "recording", "divider", "support", "confidence", *_LAYERS)
 
 
-def measure(_: Effort, progress: Progress | None) -> pd.DataFrame:
-    """The landscapes of every shipped environment over the paper's grid, one a tree seed.
+def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
+    """The landscapes of every shipped environment over the paper's grid, one a recording.
 
     Args:
-        _: Takes a minute, whatever the effort.
+        effort: How many recordings.
         progress: Called with (landscapes done, in all); returning False stops.
 
     Returns:
-        One row a cell: `environment`, `divider` (0 for discrete actions), `tree_seed`, `support`,
-        `confidence`, `rule_count`, `mean_length`, `coverage`, `fidelity`.
+        One row a cell: `environment`, `expert`, `recording`, `divider` (0 for discrete actions),
+        `support`, `confidence`, `rule_count`, `mean_length`, `coverage`, `fidelity`.
     """
     import pandas as pd
 
-    wanted = [(env_id, seed) for env_id in environments() for seed in TREE_SEEDS]
+    wanted = [one for env_id in environments() for one in replicates_of(env_id, effort.recordings)]
     parts = []
     report(progress, 0, len(wanted))
-    for done, (env_id, seed) in enumerate(wanted, 1):
-        trees = trees_of(env_id, seed=seed)
-        found = threshold_landscape(trees, PAPER_SUPPORTS, PAPER_CONFIDENCES)
+    for done, replicate in enumerate(wanted, 1):
+        found = threshold_landscape(trees_of(replicate), PAPER_SUPPORTS, PAPER_CONFIDENCES)
         supports, confidences = np.meshgrid(found.supports, found.confidences, indexing="ij")
-        discrete = demonstrations_of(env_id).is_discrete
+        discrete = demonstrations_of(replicate).is_discrete
         parts.append(
             pd.DataFrame(
                 {
-                    "environment": env_id,
+                    "environment": replicate.env_id,
+                    "expert": replicate.name,
+                    "recording": replicate.recording,
                     "divider": 0 if discrete else PAPER_DIVIDER,
-                    "tree_seed": seed,
                     "support": supports.ravel(),
                     "confidence": confidences.ravel(),
                     **{layer: getattr(found, layer).ravel() for layer in _LAYERS},
@@ -67,19 +67,24 @@ def measure(_: Effort, progress: Progress | None) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def landscape_of(frame: pd.DataFrame, env_id: str, seed: int | None = None) -> Landscape:
-    """The landscape of one environment, out of the table.
+def landscapes_of(frame: pd.DataFrame) -> dict[str, dict[int, Landscape]]:
+    """The landscapes in a table.
 
     Args:
         frame: What `measure` gives.
-        env_id: In it.
-        seed: Of its trees; the first in the table where not given.
 
     Returns:
-        Without the parts of single action dimensions.
+        By environment and recording, in the table's order; without the parts of single action
+        dimensions.
     """
-    rows = frame[frame["environment"] == env_id]
-    rows = rows[rows["tree_seed"] == (tree_seeds_in(frame)[0] if seed is None else seed)]
+    found: dict[str, dict[int, Landscape]] = {}
+    for _, rows in frame.groupby(["environment", "recording"], sort=False):
+        env_id, recording = str(rows["environment"].iloc[0]), int(rows["recording"].iloc[0])
+        found.setdefault(env_id, {})[recording] = _landscape(rows)
+    return found
+
+
+def _landscape(rows: pd.DataFrame) -> Landscape:
     supports, confidences = np.unique(rows["support"]), np.unique(rows["confidence"])
 
     def layer(name: str) -> NDArray[Any]:
@@ -95,11 +100,20 @@ def landscape_of(frame: pd.DataFrame, env_id: str, seed: int | None = None) -> L
     )
 
 
-def environments_in(frame: pd.DataFrame) -> tuple[str, ...]:
-    """The environments of a table, in its order."""
-    return tuple(frame["environment"].unique().tolist())
+def cells_exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
+    """The same numbers at other thresholds, dealt out alike in all landscapes.
 
+    Args:
+        frame: What `measure` gives.
+        rng: Random numbers.
 
-def tree_seeds_in(frame: pd.DataFrame) -> tuple[int, ...]:
-    """The tree seeds of a table, in its order."""
-    return tuple(int(seed) for seed in frame["tree_seed"].unique())
+    Returns:
+        A table as `measure` gives it.
+    """
+    cells = len(frame.drop_duplicates(["support", "confidence"]))
+    order = rng.permutation(cells)
+    layers = list(_LAYERS)
+    values = frame[layers].to_numpy().reshape(-1, cells, len(layers))[:, order]
+    dealt = frame.copy()
+    dealt[layers] = values.reshape(-1, len(layers))
+    return dealt

@@ -2,7 +2,8 @@
 
 One JSON object:
 
-- ``format``: "sarl-paper"; ``version``: 1.
+- ``format``: "sarl-paper"; ``version``: 2.
+- ``by_chance``: how many claims would agree by chance, in words; empty if it is known of none.
 - ``studies``: one object for each figure or table that was finished, by its name ("2" to "7",
   "table-1", ...), of
     - ``place`` and ``title``: as "Figure 2" and "Number of rules";
@@ -10,13 +11,16 @@ One JSON object:
     - ``command``: that makes it again;
     - ``made``: the day; ``seconds``: how long it took;
     - ``settings``: what it was run with, under ``seeds`` every seed;
-    - ``inputs``: for each environment the digest of the ``demonstrations`` and of the ``expert``;
+    - ``inputs``: for each environment the digests of its ``recordings`` by number and of its
+      ``experts`` by name;
     - ``versions``: of Python and the packages that matter;
     - ``files``: ``table`` (CSV, every single value), ``page`` (HTML) and ``picture`` (PNG);
     - ``numbers``: what sums the table up, by environment, arm or rule set;
     - ``claims``: a list, each with ``paper`` (what it says), ``where``, ``ours`` (what we found),
-      ``verdict`` ("agrees", "partly" or "does not agree"), ``decided_by`` (the rule that decided)
-      and ``numbers`` (what it was decided on).
+      ``verdict`` ("agrees", "partly", "does not agree" or "cannot be judged"), ``decided_by`` (the
+      rule that decided), ``numbers`` (what it was decided on), ``by_chance`` (how often it would
+      agree by chance, 0 to 1, or null) and ``constructed`` (why it holds whatever is demonstrated;
+      empty if it may fail).
 
 Claims follow from the tables alone and are worked out again whenever one of these changes.
 """
@@ -32,9 +36,10 @@ from typing import Any
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
-from sarl_core.reproducing.study import VERDICTS, Claim
+from sarl_core.reproducing.chance import chance_text
+from sarl_core.reproducing.verdicts import VERDICTS, Claim
 
-FORMAT, VERSION = "sarl-paper", 1
+FORMAT, VERSION = "sarl-paper", 2
 REPORT = "report.json"
 MAX_BYTES = 20_000_000
 
@@ -111,7 +116,15 @@ def report_document(report: Report) -> dict[str, Any]:
         As the module says; numbers that are not finite are null.
     """
     studies = {name: asdict(entry) for name, entry in report.studies.items()}
-    document: dict[str, Any] = _plain({"format": FORMAT, "version": VERSION, "studies": studies})
+    claims = [claim for entry in report.studies.values() for claim in entry.claims]
+    document: dict[str, Any] = _plain(
+        {
+            "format": FORMAT,
+            "version": VERSION,
+            "by_chance": chance_text(claims),
+            "studies": studies,
+        }
+    )
     return document
 
 
@@ -200,9 +213,11 @@ def _entry(name: str, entry: Any) -> Entry:
 def _claim(name: str, claim: Any) -> Claim:
     names = {one.name for one in fields(Claim)}
     _expect(isinstance(claim, dict) and set(claim) == names, name, "claims")
-    texts = names - {"numbers"}
+    texts = names - {"numbers", "by_chance"}
     _expect(all(isinstance(claim[key], str) for key in texts), name, "claims")
     _expect(claim["verdict"] in VERDICTS, name, "claims")
+    chance = claim["by_chance"]
+    _expect(chance is None or (_is_number(chance) and 0 <= chance <= 1), name, "claims")
     numbers = claim["numbers"]
     _expect(isinstance(numbers, dict), name, "claims")
     _expect(all(one is None or _is_number(one) for one in numbers.values()), name, "claims")

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 from sarl_core.errors import InputError
 from sarl_core.explaining.pictures import drawing_pictures
 from sarl_core.files import whole_file
+from sarl_core.reproducing.chance import with_chance
+from sarl_core.reproducing.replicates import fingerprints
 from sarl_core.reproducing.report import Entry, Report, read_report, write_report
 from sarl_core.reproducing.sheets import SCRIPT, page, picture
-from sarl_core.reproducing.shipped import fingerprints
 from sarl_core.reproducing.studies import STUDIES
 from sarl_core.reproducing.study import FULL, Effort, Study
 from sarl_core.reproducing.tables import read_table, write_table
@@ -70,7 +71,11 @@ def reproduce(
             entry = _entry(study, frames[study.name], effort)
             entries = {**report.studies, study.name: entry}
             report = Report(
-                {name: _judged(entries[name], name, frames) for name in STUDIES if name in entries}
+                {
+                    name: _judged(entries[name], name, frames, anew=name == study.name)
+                    for name in STUDIES
+                    if name in entries
+                }
             )
             content = picture(study, frames[study.name], draw)
             entry = replace(
@@ -130,11 +135,15 @@ def _read_tables(folder: Path, report: Report, anew: set[str]) -> dict[str, pd.D
     return frames
 
 
-def _judged(entry: Entry, name: str, frames: Mapping[str, pd.DataFrame]) -> Entry:
+def _judged(entry: Entry, name: str, frames: Mapping[str, pd.DataFrame], *, anew: bool) -> Entry:
     """An entry with its claims worked out again: some compare one figure with another."""
     if name not in frames:  # its table is damaged, and it is still to be done anew
         return entry
-    return replace(entry, claims=STUDIES[name].claims(frames))
+    study = STUDIES[name]
+    before = tuple(replace(claim, by_chance=None) for claim in entry.claims)
+    if not anew and before == study.claims(frames):
+        return entry
+    return replace(entry, claims=with_chance(study, frames))
 
 
 def _entry(study: Study, frame: pd.DataFrame, effort: Effort) -> Entry:
@@ -149,7 +158,7 @@ def _entry(study: Study, frame: pd.DataFrame, effort: Effort) -> Entry:
         made=datetime.now(UTC).date().isoformat(),
         seconds=0.0,
         settings=settings,
-        inputs={env_id: fingerprints(env_id) for env_id in own},
+        inputs={env_id: fingerprints(env_id, effort.recordings) for env_id in own},
         versions=_versions(),
         files={
             "table": f"{study.slug}.csv",

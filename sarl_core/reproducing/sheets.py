@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.pictures import Draw, sheet
+from sarl_core.reproducing.chance import how_decided
 from sarl_core.reproducing.report import Entry
-from sarl_core.reproducing.study import Drawing, Study
+from sarl_core.reproducing.study import Drawing, Study, replication
+from sarl_core.reproducing.verdicts import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +46,12 @@ code { overflow-wrap: anywhere; }
   td { display: block; border: none; padding: 3px 0; }
 }
 """
-_COLOURS = {"agrees": "#00694b", "partly": "#8a5a00", "does not agree": "#a83f00"}
+_COLOURS: dict[Verdict, str] = {
+    "agrees": "#00694b",
+    "partly": "#8a5a00",
+    "does not agree": "#a83f00",
+    "cannot be judged": "#51606c",
+}
 
 
 def in_rows(drawings: Sequence[Drawing]) -> list[list[Drawing]]:
@@ -89,7 +96,7 @@ def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
             figures.append("</div>")
     claims = [
         f"<tr><td>{escape(one.paper)}<small>{escape(one.where)}</small></td>"
-        f"<td>{escape(one.ours)}<small>{escape(one.decided_by)}</small></td>"
+        f"<td>{escape(one.ours)}<small>{escape(how_decided(one))}</small></td>"
         f'<td class="verdict" style="color: {_COLOURS[one.verdict]}">{one.verdict}</td></tr>'
         for one in entry.claims
     ]
@@ -107,7 +114,8 @@ def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{title}</title><script src="{SCRIPT}"></script>{_LIVE}<style>{_STYLE}</style>'
         "</head>"
-        f'<body><main><h1>{title}</h1><p class="about">{escape(study.about)}</p>{quick}'
+        f'<body><main><h1>{title}</h1><p class="about">{escape(study.about)} Made from '
+        f"{replication(frame)} for each environment.</p>{quick}"
         f"{_still(study, entry)}{''.join(figures)}{table}"
         f"<footer><p>Made on {escape(entry.made)} by <code>{escape(entry.command)}</code>, with "
         f"{escape(versions)}. Every value is in "

@@ -7,23 +7,20 @@ verdicts, follows from that table. So who has the table, as a CSV file, can draw
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
+from sarl_core.explaining.language import counted
+from sarl_core.reproducing.verdicts import Claim
 from sarl_core.rollouts.progress import Progress
-from sarl_core.rollouts.seeds import REPRODUCED
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
     import plotly.graph_objects as go
 
-Verdict = Literal["agrees", "partly", "does not agree"]
-VERDICTS: tuple[Verdict, ...] = ("agrees", "partly", "does not agree")
-
-FULL_MINUTES = 75
-"""What all studies together took when their results were committed, on two busy cores."""
-
-FIRST_SEED = REPRODUCED  # of the episodes; no expert was trained or chosen by them
+FULL_MINUTES = 90
+"""What all studies together take on two cores with nothing else to do."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +29,16 @@ class Effort:
 
     Attributes:
         quick: Whether this only shows that everything works; its numbers mean little.
-        learners: Learners of Figure 4, each with a seed of its own.
-        phases: Phases of learning of each.
+        recordings: Of each environment, in turn of one expert and the next. Each has a learner of
+            its own in Figure 4, and episodes of its own elsewhere.
+        phases: Phases of learning of each learner.
         test_steps: Steps of each test between them.
-        episodes: Episodes of each way to act in Figures 5 to 7.
-        snapped_episodes: Episodes of each way to divide actions.
+        episodes: Episodes of each way to act in Figures 5 to 7, for each recording.
+        snapped_episodes: Episodes of each way to divide actions, likewise.
     """
 
     quick: bool
-    learners: int
+    recordings: int
     phases: int
     test_steps: int
     episodes: int
@@ -49,41 +47,20 @@ class Effort:
 
 FULL = Effort(
     quick=False,
-    learners=5,
+    recordings=6,
     phases=100,
     test_steps=20_000,
-    episodes=100,
-    snapped_episodes=100,
+    episodes=35,
+    snapped_episodes=18,
 )
 QUICK = Effort(
     quick=True,
-    learners=2,
+    recordings=2,
     phases=3,
     test_steps=2_000,
     episodes=3,
     snapped_episodes=1,
 )
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A sentence of the paper beside our number.
-
-    Attributes:
-        paper: What the paper says, in one sentence.
-        where: Where it says so.
-        ours: What we found, in one sentence.
-        verdict: Whether the two agree, decided by `decided_by` and nothing else.
-        decided_by: By which rule.
-        numbers: What went into `ours` and the verdict.
-    """
-
-    paper: str
-    where: str
-    ours: str
-    verdict: Verdict
-    decided_by: str
-    numbers: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -120,6 +97,8 @@ class Study:
         settings: What the work was done with, seeds included, for the report.
         numbers: From the table, what sums it up, for the report.
         claims: From the tables at hand, its own among them, the paper's claims and ours.
+        exchanged: From the table and random numbers, the same table with the names of what the
+            claims compare dealt out anew; by it one sees what would agree by chance.
         parts: From the table, what can be looked at one by one, as environments; at least one.
         draw: From the table and one of its parts (and whether the ground is dark), its figures;
             those whose shares add up to 1 stand in a row.
@@ -134,6 +113,7 @@ class Study:
     settings: Callable[[Effort], dict[str, Any]]
     numbers: Callable[[pd.DataFrame], dict[str, Any]]
     claims: Callable[[Frames], tuple[Claim, ...]]
+    exchanged: Callable[[pd.DataFrame, np.random.Generator], pd.DataFrame]
     parts: Callable[[pd.DataFrame], tuple[str, ...]]
     draw: Callable[[pd.DataFrame, str, bool], tuple[Drawing, ...]]
     columns: tuple[str, ...]
@@ -144,14 +124,30 @@ class Study:
         return f"figure_{self.name}" if self.name.isdigit() else self.name.replace("-", "_")
 
 
-def judge(agrees: bool, partly: bool = False) -> Verdict:
-    """A verdict.
+def experts_in(frame: pd.DataFrame) -> dict[str, tuple[str, ...]]:
+    """The expert of each recording in a table.
 
     Args:
-        agrees: Whether the claim holds.
-        partly: Whether it holds in part.
+        frame: With columns `environment`, `expert` and `recording`.
 
     Returns:
-        The verdict.
+        By environment, in the order of the recordings' first rows.
     """
-    return "agrees" if agrees else "partly" if partly else "does not agree"
+    rows = frame.drop_duplicates(["environment", "recording"])
+    return {
+        str(env_id): tuple(own["expert"].tolist())
+        for env_id, own in rows.groupby("environment", sort=False)
+    }
+
+
+def replication(frame: pd.DataFrame) -> str:
+    """How many recordings and experts an environment has in a table, for people.
+
+    Args:
+        frame: With columns `environment`, `expert` and `recording`.
+
+    Returns:
+        As "6 recordings of 3 experts"; of the environment that has the fewest.
+    """
+    fewest = min(experts_in(frame).values(), key=len)
+    return f"{counted(len(fewest), 'recording')} of {counted(len(set(fewest)), 'expert')}"

@@ -4,29 +4,41 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sarl_core.explaining.language import share_text
-from sarl_core.reproducing.shield_claims import HALF, OFTEN, Returns
+import numpy as np
+
+from sarl_core.reproducing.shield_claims import (
+    HALF,
+    OFTEN,
+    OTHER,
+    SIMILAR,
+    SOMETIMES,
+    WAY,
+    share_above,
+)
 from sarl_core.reproducing.shields import (
     EXPERT,
     FILTERED,
     NOVICE,
     UNFILTERED,
+    Runs,
     dividers_of,
-    returns_of,
+    runs_of,
 )
-from sarl_core.reproducing.study import Claim, Frames, judge
-from sarl_core.reproducing.words import (
-    COMPARED,
-    interval,
-    number,
-    part_of_the_way,
-    percent,
-    summary,
+from sarl_core.reproducing.study import Frames
+from sarl_core.reproducing.verdicts import (
+    Claim,
+    above,
+    below,
+    claim,
+    share_over_recordings,
+    together,
 )
-from sarl_core.rollouts.statistics import interquartile_mean
+from sarl_core.reproducing.words import number, percent, shares
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_CLEARLY = 0.2  # of the way from the lone novice to the expert
 
 
 def walker_claims(frames: Frames) -> tuple[Claim, ...]:
@@ -40,93 +52,97 @@ def walker_claims(frames: Frames) -> tuple[Claim, ...]:
     """
     frame = frames["7"]
     paper, finer = dividers_of(frame)[0], dividers_of(frame)[1:]
-    returns = returns_of(frame, paper)
+    runs = runs_of(frame, paper)
     claims = [
-        _expert_drops(returns),
-        _below_the_expert(returns, paper),
-        _no_help(returns, UNFILTERED, paper),
-        _no_help(returns, FILTERED, paper),
-        _no_fluctuation(returns, paper),
+        _expert_drops(runs),
+        _below_the_expert(runs, paper),
+        _no_help(runs, UNFILTERED, paper),
+        _no_help(runs, FILTERED, paper),
+        _no_fluctuation(runs, paper),
     ]
     if finer:
         claims.append(_finer_division(frame, paper, finer))
     return tuple(claims)
 
 
-def _expert_drops(returns: Returns) -> Claim:
-    values = returns[EXPERT]
-    deep = HALF * float(interquartile_mean(values))
-    share = float((values < deep).mean())
-    return Claim(
+def _expert_drops(runs: Runs) -> Claim:
+    values = runs.returns[EXPERT]
+    dropped = values < HALF * runs.typical(EXPERT)[:, None]
+    return claim(
+        share_above(dropped, runs.experts, agrees=OFTEN, partly=SOMETIMES),
         paper="The expert shows strong drops and does not solve the task.",
         where="text on Figure 7",
-        ours=f"Our expert has a mean return of {number(values.mean())} and at least "
-        f"{number(values.min())}; {share_text(share)} of its episodes are below half of its "
-        "typical return.",
-        verdict=judge(share >= OFTEN, share > 0),
-        decided_by=f"Agrees if {percent(OFTEN)} of the episodes are below half of its typical "
-        "return, partly if one is.",
-        numbers={"mean": float(values.mean()), "lowest": float(values.min()), "share": share},
+        ours=f"Our experts have a typical return of {runs.told(EXPERT)}, a mean of "
+        f"{number(values.mean())} and at least {number(values.min())}; "
+        f"{shares(share_over_recordings(dropped, runs.experts))} of their episodes are below half "
+        "of the typical return.",
+        measured="The share of the episodes below half of the expert's typical return.",
+        numbers={"mean_return": float(values.mean()), "lowest": float(values.min())},
     )
 
 
-def _below_the_expert(returns: Returns, divider: int) -> Claim:
-    many, expert = summary(returns[UNFILTERED]), summary(returns[EXPERT])
-    return Claim(
+def _below_the_expert(runs: Runs, divider: int) -> Claim:
+    behind = 1.0 - runs.way(runs.typical(UNFILTERED))
+    return claim(
+        above(behind, runs.experts, agrees=_CLEARLY, partly=0),
         paper="With unfiltered rules the novice is clearly below the expert.",
         where="Figure 7",
-        ours=f"Typical returns with divider {divider}: {interval(many)} with the rules, "
-        f"{interval(expert)} for the expert.",
-        verdict=judge(many.high < expert.low, many.iqm < expert.iqm),
-        decided_by=f"{COMPARED}; agrees if that with the rules lies below the expert's.",
-        numbers={"unfiltered": many.iqm, "expert": expert.iqm},
+        ours=f"Typical returns with divider {divider}: {runs.told(UNFILTERED)} with the rules, "
+        f"{runs.told(EXPERT)} for the expert.",
+        measured=f"How far it is behind the expert, {WAY}.",
+        numbers={"unfiltered": runs.over(UNFILTERED).mean, "expert": runs.over(EXPERT).mean},
     )
 
 
-def _no_help(returns: Returns, name: str, divider: int) -> Claim:
-    shielded, novice, expert = (summary(returns[arm]) for arm in (name, NOVICE, EXPERT))
-    way = part_of_the_way(shielded.iqm, novice.iqm, expert.iqm)
-    return Claim(
+def _no_help(runs: Runs, name: str, divider: int) -> Claim:
+    way = runs.way(runs.typical(name))
+    return claim(
+        below(way, runs.experts, agrees=SIMILAR, partly=OTHER),
         paper=f"With {name} rules there is no improvement over the lone novice.",
         where="Figure 7",
-        ours=f"Typical returns with divider {divider}: {interval(shielded)} with the rules, "
-        f"{interval(novice)} without: "
-        f"{percent(way)} of the way to the expert.",
-        verdict=judge(shielded.low <= novice.high, way < 0.5),
-        decided_by=f"{COMPARED}; agrees if that with the rules does not lie above that without, "
-        "partly if it does, but by less than half of the way to the expert.",
-        numbers={"with": shielded.iqm, "without": novice.iqm, "way": way},
+        ours=f"Typical returns with divider {divider}: {runs.told(name)} with the rules, "
+        f"{runs.told(NOVICE)} without: {percent(float(way.mean()))} of the way to the expert.",
+        measured=f"What the rules bring, {WAY}.",
+        numbers={"with": runs.over(name).mean, "without": runs.over(NOVICE).mean},
     )
 
 
-def _no_fluctuation(returns: Returns, divider: int) -> Claim:
-    level = 0.5 * sum(float(interquartile_mean(returns[name])) for name in (NOVICE, EXPERT))
-    best = max(float(returns[name].max()) for name in (FILTERED, UNFILTERED))
-    shares = [float((returns[name] >= level).mean()) for name in (FILTERED, UNFILTERED)]
-    return Claim(
+def _no_fluctuation(runs: Runs, divider: int) -> Claim:
+    levels = 0.5 * (runs.typical(NOVICE) + runs.typical(EXPERT))
+    both = np.concatenate([runs.returns[name] for name in (FILTERED, UNFILTERED)], axis=1)
+    reached = both >= levels[:, None]
+    share = share_over_recordings(reached, runs.experts)
+    return claim(
+        below(reached.mean(axis=1), runs.experts, agrees=SOMETIMES, partly=OFTEN, interval=share),
         paper="The curves with rules show no fluctuation upwards.",
         where="text on Figure 7",
-        ours=f"With divider {divider}, the best of their episodes returns {number(best)}; half of "
-        f"the way from the lone novice to the expert would be {number(level)}.",
-        verdict=judge(best < level, max(shares) < OFTEN),
-        decided_by="Agrees if no episode gets half of the way from the lone novice's typical "
-        f"return to the expert's, partly if fewer than {percent(OFTEN)} do.",
-        numbers={"best": best, "level": level},
+        ours=f"With divider {divider}, the best of {both.size} episodes with rules returns "
+        f"{number(both.max())}; {shares(share)} of them get half of the way from the lone novice "
+        f"to the expert, to {number(float(levels.mean()))}.",
+        measured="The share of the episodes with rules that get half of the way from the lone "
+        "novice's typical return to the expert's.",
+        numbers={"best": float(both.max()), "level": float(levels.mean())},
     )
 
 
 def _finer_division(frame: pd.DataFrame, paper: int, finer: tuple[int, ...]) -> Claim:
-    found = {
-        divider: summary(returns_of(frame, divider)[UNFILTERED]) for divider in (paper, *finer)
-    }
-    told = ", ".join(f"divider {divider} {interval(one)}" for divider, one in found.items())
-    holds = [found[divider].low > found[paper].high for divider in finer]
-    return Claim(
+    runs = {divider: runs_of(frame, divider) for divider in (paper, *finer)}
+    told = ", ".join(f"divider {divider} {one.told(UNFILTERED)}" for divider, one in runs.items())
+    coarse = runs[paper].typical(UNFILTERED)
+    gains = [
+        above(
+            runs[paper].way(runs[divider].typical(UNFILTERED)) - runs[paper].way(coarse),
+            runs[paper].experts,
+            agrees=0,
+            partly=0,
+        )
+        for divider in finer
+    ]
+    return claim(
+        together(gains, f"{gains[0].rule} So for every finer divider; partly, if for some."),
         paper="A finer division of the actions may have a positive effect (left open).",
         where="Conclusion and Prospects",
         ours=f"Typical returns with unfiltered rules: {told}.",
-        verdict=judge(all(holds), any(holds)),
-        decided_by=f"{COMPARED}; agrees if every finer divider lies above the paper's, partly if "
-        "one does.",
-        numbers={f"divider_{divider}": one.iqm for divider, one in found.items()},
+        measured=f"What a finer divider brings over the paper's with unfiltered rules, {WAY}.",
+        numbers={f"divider_{divider}": one.over(UNFILTERED).mean for divider, one in runs.items()},
     )

@@ -2,29 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
-import numpy as np
-from numpy.typing import NDArray
-
-from sarl_core.rollouts.statistics import Interval, summarise
-
-COMPARED = "The 95 % intervals of the typical returns (IQM) are compared"
-
-
-def summary(values: NDArray[np.float64]) -> Interval:
-    """`summarise`, worked out once for the same values."""
-    return _summary(values.tobytes())
-
-
-@lru_cache(maxsize=64)
-def _summary(values: bytes) -> Interval:
-    return summarise(np.frombuffer(values))
-
-
-def part_of_the_way(value: float, start: float, goal: float) -> float:
-    """How far a value is on the way from a start (0) to a goal (1); 0 where there is no way."""
-    return (value - start) / (goal - start) if goal != start else 0.0
+from sarl_core.explaining.language import share_text
+from sarl_core.rollouts.statistics import MeanInterval
 
 
 def number(value: float) -> str:
@@ -32,9 +11,15 @@ def number(value: float) -> str:
     return f"{float(value):,.0f}".replace("-", "−") if abs(value) >= 0.5 else "0"
 
 
-def interval(found: Interval) -> str:
-    """A typical return with its 95 % interval, for people."""
-    return f"{number(found.iqm)} ({number(found.low)} to {number(found.high)})"
+def interval(found: MeanInterval) -> str:
+    """A return with its 95 % interval, for people."""
+    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
+
+
+def shares(found: MeanInterval) -> str:
+    """A share with its 95 % interval, for people."""
+    low, high = (share_text(min(max(end, 0.0), 1.0)) for end in (found.low, found.high))
+    return f"{share_text(found.mean)} ({low} to {high})"
 
 
 def percent(share: float) -> str:

@@ -20,7 +20,7 @@ from sarl_core.rollouts.agents import PolicyAgent
 from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.recording import record
-from sarl_core.rollouts.seeds import RELEVANCE
+from sarl_core.rollouts.seeds import MOST_LEARNERS, RELEVANCE, SEEDS_A_LEARNER
 from sarl_core.shielding.shield import Shield
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 PAPER_LEARNING = 500  # steps between two tests
 PAPER_TEST = 20_000  # steps of a test
-
-_BETWEEN_LEARNERS = 1_000_000  # a test has fewer episodes than this
 
 # PPO's own defaults, but for what lets it learn CartPole in some dozen updates. A learning phase is
 # one update.
@@ -192,8 +190,15 @@ def study_relevance(
     ):
         if value < least:
             raise InputError(f"{name} is {value} and must be at least {least}; give more")
-    if len(set(seeds)) < len(seeds) or min(seeds) < 0:
-        raise InputError("the seeds of the learners must differ and be 0 or more; give others")
+    if test_steps > SEEDS_A_LEARNER:
+        raise InputError(
+            f"test_steps is {test_steps} and must be at most {SEEDS_A_LEARNER}; give fewer"
+        )
+    if len(set(seeds)) < len(seeds) or min(seeds) < 0 or max(seeds) >= MOST_LEARNERS:
+        raise InputError(
+            f"the seeds of the learners must differ and be from 0 to {MOST_LEARNERS - 1}; give "
+            "others"
+        )
     shields = [shield_for(env_id, Shield(rules)) for rules in rule_sets.values()]
     shape = (len(shields), len(seeds), phases + 1)
     applied, broken = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
@@ -250,7 +255,7 @@ def _test(
 
     first = np.array(describe_environment(env_id).label_first, dtype=np.int64)
     agent = PolicyAgent("learner", export_policy(learner, env_id=env_id), True, first)
-    shown = record(env_id, agent, steps=steps, seed=RELEVANCE + _BETWEEN_LEARNERS * seed)
+    shown = record(env_id, agent, steps=steps, seed=RELEVANCE + SEEDS_A_LEARNER * seed)
     applied, broken = [], []
     for shield in shields:
         decision = shield.decide_batch(shown.observations, shown.actions)

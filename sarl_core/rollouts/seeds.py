@@ -12,62 +12,97 @@ first seed            what its episodes are for
 `EXPERT_REPORT`       and reports it on these
 `TRIAL`               what learning under a shield (`learn`) has come to; its learners have the
                       seeds below, 100,000 for each
+`RECORDED`            further recordings that claims of the paper are decided over,
+                      `SEEDS_A_RECORDING` for each
+`REPRODUCED`          figures of the paper (`reproduce`), `SEEDS_A_REPLICATE` for each recording
+`RELEVANCE`           steps at which learners are tested for the paper's Figure 4,
+                      `SEEDS_A_LEARNER` for each
 `ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
 `VALIDATION`          the best of its rounds is chosen by them
 `SECOND_VALIDATION`   the best point of its refinement is chosen by them
-`REPRODUCED`          figures of the paper (`reproduce`), the study of the divider in it
 `REFINEMENT`          the search of its refinement
 `REPORT`              what came of it is reported on them
-`RELEVANCE`           steps at which learners are tested for the paper's Figure 4
 ====================  =====================================================================
 
 `aggregate --seed s` begins s times `SEEDS_A_RUN` further on, whatever the purpose. Within one run
-no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that.
+no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that. What the paper is
+reproduced with lies below all of them, so no run, however far on, reaches it.
 
-Ranges that do meet, and why that does no harm:
+`RANGES` says how far each purpose goes. Ranges that do meet, `SHARED`, and why that does no harm:
 
 - `TRIAL` and `EXPERT_REPORT` are the same seeds: an expert and a learner are two policies, and
   neither is chosen by what is told of the other.
 - Learners of `learn` pass over `DEMONSTRATED`, `FRESH` and `EXPERT_CHOICE`. They are tried on
   `TRIAL`, which none of them reaches.
-- `REPRODUCED` and `VALIDATION` are the same seeds. What `reproduce` plays is mined at the paper's
-  thresholds and chosen by no episode. Compact rules are chosen by these seeds and are therefore
-  never to be judged by them.
-- The numbers in the README for rules at the paper's thresholds begin at `REFINEMENT`. They too are
+
+They stay as they are, because shipped files name them. Besides:
+
+- The numbers in the README for rules at the paper's thresholds begin at `REFINEMENT`. They are
   chosen by no episode.
-- `RELEVANCE` and `REPORT` are the same seeds. Nothing is chosen by either.
 - Runs of `aggregate` whose seeds are ten apart: the rounds of one are the validation of the other.
   They share no rules.
 - `FRESH` serves all pages, the search for gaps included. Nothing that is shipped is chosen by it.
-
-They stay as they are, because shipped files name them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 DEMONSTRATED = 0
+LEARNERS = 0
 FRESH = 100_000  # far from those the demonstrations were recorded with
 
 EXPERT_CHOICE = 5_000_000
 EXPERT_REPORT = 9_000_000
 TRIAL = 9_000_000
 
+RECORDED = 10_000_000
+REPRODUCED = 12_000_000
+RELEVANCE = 14_000_000
+
 ROUNDS = 20_000_000
 VALIDATION = 30_000_000
 SECOND_VALIDATION = 30_500_000
-REPRODUCED = 30_000_000
 REFINEMENT = 40_000_000
 REPORT = 50_000_000
-RELEVANCE = 50_000_000
 
 SEEDS_A_RUN = 1_000_000  # between two values of the seed of `aggregate`
 SEEDS_A_ROUND = 10_000
+SEEDS_A_RECORDING = 100_000  # more than its steps
+SEEDS_A_REPLICATE = 10_000
+SEEDS_A_LEARNER = 100_000
 
 MOST_EPISODES_A_ROUND = SEEDS_A_ROUND
 MOST_ROUNDS = (VALIDATION - ROUNDS) // SEEDS_A_ROUND
 MOST_VALIDATION = SECOND_VALIDATION - VALIDATION
+MOST_LEARNERS = (ROUNDS - RELEVANCE) // SEEDS_A_LEARNER
+
+RANGES: Mapping[str, range] = {
+    "DEMONSTRATED": range(DEMONSTRATED, FRESH),
+    "LEARNERS": range(LEARNERS, TRIAL),
+    "FRESH": range(FRESH, 1_000_000),
+    "EXPERT_CHOICE": range(EXPERT_CHOICE, EXPERT_REPORT),
+    "EXPERT_REPORT": range(EXPERT_REPORT, RECORDED),
+    "TRIAL": range(TRIAL, RECORDED),
+    "RECORDED": range(RECORDED, REPRODUCED),
+    "REPRODUCED": range(REPRODUCED, RELEVANCE),
+    "RELEVANCE": range(RELEVANCE, ROUNDS),
+    "ROUNDS": range(ROUNDS, VALIDATION),
+    "VALIDATION": range(VALIDATION, SECOND_VALIDATION),
+    "SECOND_VALIDATION": range(SECOND_VALIDATION, SECOND_VALIDATION + MOST_VALIDATION),
+    "REFINEMENT": range(REFINEMENT, REPORT),
+    "REPORT": range(REPORT, REPORT + MOST_VALIDATION),
+}
+"""The seeds of each purpose, those of `aggregate` for its run of seed 0."""
+
+SHARED = frozenset(
+    {
+        frozenset({"TRIAL", "EXPERT_REPORT"}),
+        *(frozenset({"LEARNERS", one}) for one in ("DEMONSTRATED", "FRESH", "EXPERT_CHOICE")),
+    }
+)
+"""Purposes whose seeds meet; the module says why that does no harm."""
 
 
 class RunSeeds(NamedTuple):

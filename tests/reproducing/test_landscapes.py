@@ -6,15 +6,11 @@ import pytest
 
 from sarl_core import grow_policy_trees, mine_rules
 from sarl_core.reproducing import landscape_table
-from sarl_core.reproducing.landscape_table import landscape_of
+from sarl_core.reproducing.landscape_table import landscapes_of
 from sarl_core.reproducing.landscapes import COUNT, LENGTH
-from sarl_core.reproducing.shipped import (
-    TREE_SEEDS,
-    demonstrations_of,
-    environments,
-    trees_of,
-)
-from sarl_core.reproducing.study import QUICK, Verdict
+from sarl_core.reproducing.replicates import demonstrations_of, replicates_of
+from sarl_core.reproducing.study import QUICK
+from sarl_core.reproducing.verdicts import Verdict
 from tests.reproducing.frames import landscapes
 
 # Rows are supports 0, 0.1 and 0.2; columns are confidences 0, 0.5, 0.75 and 1.
@@ -28,39 +24,34 @@ def verdicts(frame: pd.DataFrame, name: str = "2") -> list[Verdict]:
 
 
 def test_the_table_is_what_mining_at_each_cell_gives(monkeypatch: pytest.MonkeyPatch) -> None:
-    seeds = (0, 4)
-    assert set(seeds) < set(TREE_SEEDS)
-    monkeypatch.setattr(landscape_table, "TREE_SEEDS", seeds)  # two are enough here
+    monkeypatch.setattr(landscape_table, "environments", lambda: ("CartPole-v1", "Pendulum-v1"))
     told = []
     frame = COUNT.measure(QUICK, lambda done, total: told.append((done, total)))
-    every = len(environments()) * len(seeds)
-    assert told == [(done, every) for done in range(every + 1)]
-    assert len(frame) == 231 * every
+    assert told == [(done, 4) for done in range(5)]
+    assert len(frame) == 231 * 4
     assert tuple(frame.columns) == COUNT.columns
-    lander = frame[frame["environment"] == "LunarLander-v3"]
-    last = lander[lander["tree_seed"] == seeds[-1]]
-    trees = grow_policy_trees(demonstrations_of("LunarLander-v3"), seed=seeds[-1])
+    for replicate in replicates_of("CartPole-v1", 2):
+        rows = frame[
+            (frame["environment"] == "CartPole-v1") & (frame["recording"] == replicate.recording)
+        ]
+        assert rows["expert"].unique().tolist() == [replicate.name]
+        for row in rows.iloc[[0, 20, 34, 52, 230]].itertuples():
+            rules = mine_rules(
+                demonstrations_of(replicate), supp_min=row.support, conf_min=row.confidence
+            )
+            assert row.rule_count == rules.rule_count
+            assert row.mean_length == pytest.approx(rules.mean_length)
+            assert row.coverage == pytest.approx(rules.coverage)
+    pendulum = frame[(frame["environment"] == "Pendulum-v1") & (frame["recording"] == 0)]
+    assert pendulum["divider"].unique().tolist() == [2]
+    trees = grow_policy_trees(demonstrations_of(replicates_of("Pendulum-v1", 1)[0]))
     corner = mine_rules(trees, supp_min=0, conf_min=1)
-    assert last["rule_count"].iloc[20] == corner.rule_count
-    assert last["mean_length"].iloc[20] == pytest.approx(corner.mean_length)
-    chosen = lander[lander["tree_seed"] == 0]
-    for row in chosen.iloc[[0, 20, 34, 52, 230]].itertuples():
-        rules = mine_rules(
-            demonstrations_of("LunarLander-v3"), supp_min=row.support, conf_min=row.confidence
-        )
-        assert row.rule_count == rules.rule_count
-        assert row.mean_length == pytest.approx(rules.mean_length)
-        assert row.coverage == pytest.approx(rules.coverage)
-    walker = frame[(frame["environment"] == "BipedalWalker-v3") & (frame["tree_seed"] == 0)]
-    assert walker["divider"].unique().tolist() == [2]
-    assert walker["rule_count"].max() == sum(
-        len(mine_rules([tree], supp_min=0, conf_min=1)) for tree in trees_of("BipedalWalker-v3")
-    )
+    assert pendulum["rule_count"].iloc[20] == corner.rule_count
 
 
 def test_a_landscape_comes_back_out_of_the_table() -> None:
     frame = landscapes({"CartPole-v1": AS_THE_PAPER, "LunarLander-v3": SMALL})
-    found = landscape_of(frame, "LunarLander-v3")
+    found = landscapes_of(frame)["LunarLander-v3"][5]
     assert (found.rule_count == SMALL).all()
     assert found.supports.tolist() == [0, 0.1, 0.2]
     assert np.isnan(found.fidelity).all()
@@ -72,7 +63,7 @@ def test_what_the_paper_shows_agrees_with_the_paper() -> None:
     assert verdicts(frame) == ["agrees", "agrees", "partly", "agrees"]
     claims = COUNT.claims({"2": frame})
     assert "90 rules" in claims[0].ours
-    assert "2 of 2 environments" in claims[0].ours
+    assert "It holds in 12 of 12 recordings, with 6 of 6 experts" in claims[0].ours
     assert "from 90 to 1" in claims[1].ours
     assert "from 90 to 40 rules, between confidence 1 and 0.75" in claims[1].ours
     # Fewer at supports 0.1 and 0.2, more at support 0.
@@ -140,44 +131,50 @@ def test_numbers_name_the_greatest_value_and_its_place() -> None:
         "at_support": 0.0,
         "at_confidence": 1.0,
         "at_support_0_confidence_1": 90.0,
-        "at_support_0_confidence_1_over_tree_seeds": [90.0, 90.0],
-        "mean_range_over_tree_seeds": 0.0,
-        "widest_range_over_tree_seeds": 0.0,
+        "at_support_0_confidence_1_over_recordings": [90.0, 90.0],
+        "mean_range_over_recordings": 0.0,
+        "widest_range_over_recordings": 0.0,
     }
 
 
-# --- several tree seeds --------------------------------------------------------------------------
+# --- several recordings --------------------------------------------------------------------------
 
 
-def seeded(*counts: np.ndarray) -> pd.DataFrame:
-    """A table of Cart Pole with one landscape a tree seed."""
+def recorded(*counts: np.ndarray) -> pd.DataFrame:
+    """A table of Cart Pole with one landscape a recording."""
     parts = [
-        landscapes({"CartPole-v1": one}).assign(tree_seed=seed) for seed, one in enumerate(counts)
+        landscapes({"CartPole-v1": one}, recordings=(number,)) for number, one in enumerate(counts)
     ]
     return pd.concat(parts, ignore_index=True)
 
 
-def test_numbers_tell_how_far_tree_seeds_lead_apart() -> None:
+def test_numbers_tell_how_far_recordings_lead_apart() -> None:
     other = AS_THE_PAPER.copy()
     other[0, 3], other[1, 2] = 96, 1
-    found = COUNT.numbers(seeded(AS_THE_PAPER, other))["CartPole-v1"]
+    found = COUNT.numbers(recorded(AS_THE_PAPER, other))["CartPole-v1"]
     assert found["at_support_0_confidence_1"] == 90  # of the first
-    assert found["at_support_0_confidence_1_over_tree_seeds"] == [90, 96]
-    assert found["widest_range_over_tree_seeds"] == 6
-    assert found["mean_range_over_tree_seeds"] == pytest.approx((6 + 2) / 12)
+    assert found["at_support_0_confidence_1_over_recordings"] == [90, 96]
+    assert found["widest_range_over_recordings"] == 6
+    assert found["mean_range_over_recordings"] == pytest.approx((6 + 2) / 12)
 
 
-def test_a_verdict_holds_for_every_tree_seed() -> None:
-    same = COUNT.claims({"2": seeded(AS_THE_PAPER, AS_THE_PAPER, AS_THE_PAPER)})
-    assert [claim.verdict for claim in same] == ["agrees", "agrees", "partly", "agrees"]
-    assert all(claim.ours.endswith("with all of 3 tree seeds.") for claim in same)
+@pytest.mark.parametrize(
+    ("others", "expected"),
+    [(0, "agrees"), (1, "agrees"), (2, "partly"), (5, "does not agree"), (6, "does not agree")],
+)
+def test_a_verdict_is_that_of_most_recordings(others: int, expected: Verdict) -> None:
     more = AS_THE_PAPER.copy()
     more[1, 2] = 91  # more rules there than at support 0 and confidence 1
-    most = COUNT.claims({"2": seeded(AS_THE_PAPER, more, AS_THE_PAPER)})[0]
-    assert most.verdict == "partly"
-    assert "90 rules" in most.ours  # tree seed 0 is told, and how many are like it
-    assert "of 3, 2 lead to its verdict" in most.ours
-    assert most.numbers["tree_seeds_of_this_verdict"] == 2
+    most = COUNT.claims({"2": recorded(*[more] * others, *[AS_THE_PAPER] * (6 - others))})[0]
+    assert most.verdict == expected
+    assert f"It holds in {6 - others} of 6 recordings" in most.ours
+    assert most.numbers["held_in"] == 6 - others
+
+
+def test_one_recording_decides_nothing() -> None:
+    frame = recorded(AS_THE_PAPER)
+    assert set(verdicts(frame)) == {"cannot be judged"}
+    assert set(verdicts(recorded(*[AS_THE_PAPER] * 4))) == {"cannot be judged"}
 
 
 @pytest.mark.parametrize("dark", [False, True])

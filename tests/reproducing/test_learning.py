@@ -5,7 +5,9 @@ import pandas as pd
 import pytest
 
 from sarl_core.reproducing.learning import LEARNING
-from sarl_core.reproducing.study import Effort, Verdict
+from sarl_core.reproducing.replicates import named_rules, replicates_of
+from sarl_core.reproducing.study import Effort
+from sarl_core.reproducing.verdicts import Verdict
 from tests.reproducing.frames import learning
 
 DOWN = list(np.linspace(0.5, 0.05, 20))
@@ -56,7 +58,7 @@ def test_where_violations_were_fewest_is_said_if_they_rise_again() -> None:
 
 
 def test_learners_far_apart_leave_a_doubt() -> None:
-    apart = [(0.5 + shift, 0.4 - shift) for shift in (-0.2, 0.0, 0.2)]
+    apart = [(0.5 + shift, 0.4 - shift) for shift in (-0.2, 0.0, 0.2) * 2]
     frame = learning(DOWN, A_LITTLE)
     rows = frame["rules"] == "unfiltered"
     for seed, (first, last) in enumerate(apart):
@@ -71,20 +73,27 @@ def test_learners_far_apart_leave_a_doubt() -> None:
 def test_rules_that_leave_states_out_are_noticed() -> None:
     frame = learning(DOWN, A_LITTLE)
     row = frame.index[(frame["rules"] == "unfiltered")][7]
-    for missing, expected in ((5, "agrees"), (50, "partly"), (500, "does not agree")):
+    for missing, expected in ((5, "agrees"), (50, "partly"), (500, "cannot be judged")):
         frame.loc[row, "applied"] = 10_000 - missing
         assert verdicts(frame)[3] == expected
     assert "95 % of the steps or more" in LEARNING.claims({"4": frame})[3].ours
+    # One learner of six leaves it open; all of them do not.
+    frame.loc[frame["rules"] == "unfiltered", "applied"] = 9_500
+    assert verdicts(frame)[3] == "does not agree"
 
 
 def test_numbers_are_means_over_learners_with_intervals() -> None:
     numbers = LEARNING.numbers(learning(DOWN, A_LITTLE))
-    assert numbers["filtered"]["rules"] == 5
-    assert numbers["filtered"]["applied_first"] == {"mean": 0.8, "low": 0.8, "high": 0.8}
+    assert numbers["filtered"]["rules"] == [5, 5]
+    assert numbers["filtered"]["applied_first"] == pytest.approx(
+        {"mean": 0.8, "low": 0.8, "high": 0.8}
+    )
     first = numbers["unfiltered"]["kept_first"]
     assert first["mean"] == pytest.approx(0.5)
-    # Student's interval of 0.49, 0.50, 0.51.
-    assert first["high"] - first["low"] == pytest.approx(2 * 4.303 * 0.01 / 3**0.5, rel=1e-3)
+    # Student's interval of 0.495, 0.5, 0.505, each twice; the means of the three experts are equal.
+    assert first["high"] - first["low"] == pytest.approx(
+        2 * 2.5706 * 0.005 * 0.8**0.5 / 6**0.5, rel=1e-3
+    )
     assert numbers["mean_return_first"]["mean"] == 20
 
 
@@ -107,7 +116,7 @@ def test_figures_have_a_line_for_kept_and_broken_of_each_set() -> None:
 
 def test_a_small_study_is_run_as_asked() -> None:
     effort = Effort(
-        quick=True, learners=2, phases=1, test_steps=150, episodes=1, snapped_episodes=1
+        quick=True, recordings=2, phases=1, test_steps=150, episodes=1, snapped_episodes=1
     )
     told = []
     frame = LEARNING.measure(effort, lambda done, total: told.append((done, total)))
@@ -115,6 +124,14 @@ def test_a_small_study_is_run_as_asked() -> None:
     assert told[-1] == (4, 4)
     assert frame["learned_steps"].unique().tolist() == [0, 500]
     assert frame["test_steps"].unique().tolist() == [150]
-    assert LEARNING.settings(effort)["seeds"] == {"learners": [0, 1]}
+    assert LEARNING.settings(effort)["seeds"]["learners"] == [0, 1]
     assert frame["seed"].unique().tolist() == [0, 1]
+    # Each learner is watched by the rules of a recording of its own.
+    assert frame.drop_duplicates("seed")["expert"].tolist() == ["cartpole", "cartpole_seed_1"]
+    assert frame["rules"].tolist() == ["filtered"] * 4 + ["unfiltered"] * 4
+    unfiltered = frame[frame["rules"] == "unfiltered"].drop_duplicates("seed")
+    assert unfiltered["rule_count"].tolist() == [
+        len(named_rules(one)["unfiltered"]) for one in replicates_of("CartPole-v1", 2)
+    ]
+    assert {claim.verdict for claim in LEARNING.claims({"4": frame})} == {"cannot be judged"}
     assert len(LEARNING.claims({"4": frame})) == 5

@@ -20,8 +20,8 @@ from sarl_core.reproducing.report import (
     write_report,
 )
 from sarl_core.reproducing.studies import STUDIES, find_study
-from sarl_core.reproducing.study import Claim
 from sarl_core.reproducing.tables import read_table, write_table
+from sarl_core.reproducing.verdicts import Claim
 from tests.reproducing.frames import landscapes
 
 ENTRY = Entry(
@@ -102,8 +102,8 @@ STUDY = ("studies", "2")
     [
         ([], "format"),
         ({}, "format"),
-        ({"format": "sarl-rules", "version": 1}, "format"),
-        (changed("version", value=2), "version is 2"),
+        ({"format": "sarl-rules", "version": 2}, "format"),
+        (changed("version", value=1), "version is 1"),
         (changed("studies", value=[]), "studies"),
         (without(*STUDY, "files"), "'2'"),
         (changed(*STUDY, "more", value=1), "'2'"),
@@ -123,6 +123,9 @@ STUDY = ("studies", "2")
         (changed(*STUDY, "claims", 0, value="agrees"), "'claims'"),
         (changed(*STUDY, "claims", 0, "verdict", value="wonderful"), "'claims'"),
         (changed(*STUDY, "claims", 0, "ours", value=None), "'claims'"),
+        (changed(*STUDY, "claims", 0, "by_chance", value=1.5), "'claims'"),
+        (changed(*STUDY, "claims", 0, "by_chance", value="often"), "'claims'"),
+        (changed(*STUDY, "claims", 0, "constructed", value=None), "'claims'"),
         (changed(*STUDY, "claims", 0, "numbers", value={"n": "many"}), "'claims'"),
         (without(*STUDY, "claims", 0, "where"), "'claims'"),
     ],

@@ -17,7 +17,8 @@ from sarl_core.reproducing import run
 from sarl_core.reproducing.report import read_report
 from sarl_core.reproducing.run import reproduce
 from sarl_core.reproducing.sheets import SCRIPT
-from sarl_core.reproducing.study import QUICK, Claim, Drawing, Frames, Study
+from sarl_core.reproducing.study import QUICK, Drawing, Frames, Study
+from sarl_core.reproducing.verdicts import Claim
 from sarl_core.rollouts.progress import CancelledError, Progress, report
 
 A_PICTURE = bytes.fromhex(  # one white point
@@ -31,13 +32,18 @@ ALL_FILES = {
 }
 
 
+NAMES = {"environment": "CartPole-v1", "expert": "cartpole", "recording": 0}
+OWN = "CartPole-v1,cartpole,0,"
+HEAD = f"environment,expert,recording,x,value\n{OWN}"
+
+
 def toy(name: str, value: float = 1.0) -> Study:
     """A study that measures one number; its claim compares it with that of the other one."""
 
     def measure(_: Any, progress: Progress | None) -> pd.DataFrame:
         report(progress, 0, 2)
         report(progress, 1, 2)
-        return pd.DataFrame({"x": [0, 1], "value": [value, 2 * value]})
+        return pd.DataFrame({**NAMES, "x": [0, 1], "value": [value, 2 * value]})
 
     def claims(frames: Frames) -> tuple[Claim, ...]:
         others = sorted(set(frames) - {name})
@@ -58,6 +64,7 @@ def toy(name: str, value: float = 1.0) -> Study:
         settings=lambda _: {"environments": ["CartPole-v1"], "seeds": {"toy": 7}},
         numbers=lambda frame: {"sum": float(frame["value"].sum())},
         claims=claims,
+        exchanged=lambda frame, rng: frame,
         parts=lambda frame: ("left", "right"),
         draw=draw,
         columns=("x", "value"),
@@ -100,10 +107,10 @@ def test_every_study_leaves_its_files_and_its_entry(tmp_path: Path, toys: dict[s
     assert entry["quick"] is True
     assert entry["settings"]["seeds"] == {"toy": 7}
     assert entry["numbers"] == {"sum": 3.0}
-    assert set(entry["inputs"]["CartPole-v1"]) == {"demonstrations", "expert"}
+    assert set(entry["inputs"]["CartPole-v1"]) == {"recordings", "experts"}
     assert {"python", "numpy", "gymnasium", "torch"} <= set(entry["versions"])
     assert entry["command"].endswith("--figure 2 --quick --out DIR")
-    assert (folder / "figure_2.csv").read_text() == "x,value\n0,1.0\n1,2.0\n"
+    assert (folder / "figure_2.csv").read_text() == HEAD + "0,1.0\n" + OWN + "1,2.0\n"
 
 
 def test_a_page_shares_the_script_and_shows_text_as_text(
@@ -271,7 +278,7 @@ def test_a_damaged_table_is_named_unless_it_is_made_anew(
     with pytest.raises(InputError, match=r"figure_3.csv is not the table of Figure 3"):
         reproduce(tmp_path, (toys["2"],))
     reproduce(tmp_path, (toys["3"],))
-    assert (tmp_path / "figure_3.csv").read_text() == "x,value\n0,5.0\n1,10.0\n"
+    assert (tmp_path / "figure_3.csv").read_text() == HEAD + "0,5.0\n" + OWN + "1,10.0\n"
 
 
 def test_a_full_disk_is_said_and_what_was_there_stays(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 from pathlib import Path
 
 from sarl_core.rollouts import seeds
@@ -20,6 +21,24 @@ def test_parts_of_one_run_cannot_meet_however_large_it_is():
     for first, count in ends.items():
         assert first + count <= later[later.index(first) + 1]
     assert seeds.MOST_EPISODES_A_ROUND <= seeds.SEEDS_A_ROUND
+
+
+def test_purposes_share_no_seeds_but_those_that_shipped_files_name():
+    for (one, first), (other, second) in combinations(seeds.RANGES.items(), 2):
+        meet = max(first.start, second.start) < min(first.stop, second.stop)
+        assert meet == (frozenset({one, other}) in seeds.SHARED), (one, other)
+
+
+def test_every_first_seed_is_the_beginning_of_its_range():
+    own = {name: value for name, value in vars(seeds).items() if name in seeds.RANGES}
+    assert own == {name: each.start for name, each in seeds.RANGES.items()}
+    # Nothing that chose a rule set has the seeds of what the paper is reproduced with.
+    assert not {"VALIDATION", "REPRODUCED", "REPORT"} & set().union(*seeds.SHARED)
+
+
+def test_no_run_of_aggregate_reaches_what_the_paper_is_reproduced_with():
+    for name in ("RECORDED", "REPRODUCED", "RELEVANCE"):
+        assert seeds.RANGES[name].stop <= seeds.ROUNDS
 
 
 def test_no_other_file_of_the_library_has_seeds_of_its_own():
