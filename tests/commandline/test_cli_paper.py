@@ -11,8 +11,8 @@ from PIL import Image
 from sarl_core.cli import main
 from sarl_core.reproducing.report import read_report
 from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import VERDICTS
 from sarl_core.reproducing.tables import read_table
+from sarl_core.reproducing.verdicts import VERDICTS
 from tests.reproducing.test_report import ENTRY
 
 

@@ -102,7 +102,7 @@ def test_a_caller_who_wants_no_more_is_heard(rules: dict[str, RuleSet]) -> None:
         ({"learning_steps": 1}, "learning_steps is 1"),
         ({"seeds": ()}, "seeds is 0"),
         ({"seeds": (1, 1)}, "must differ"),
-        ({"seeds": (-1,)}, "0 or more"),
+        ({"seeds": (-1,)}, "from 0 to 59"),
     ],
 )
 def test_numbers_out_of_range_are_refused(
