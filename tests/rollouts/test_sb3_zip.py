@@ -141,6 +141,30 @@ def test_other_zips_are_one_sentence(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"Q", b"0"),  # a tensor without its storage
+        (b"}q", b"Kq"),  # no dictionary where one should be
+    ],
+)
+def test_damage_inside_the_weights_is_one_sentence(
+    old: bytes, new: bytes, model_zip: Path, tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(model_zip) as archive:
+        weights = io.BytesIO(archive.read("policy.pth"))
+    inner, target = zipfile.ZipFile(weights), io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as damaged:
+        for entry in inner.infolist():
+            content = inner.read(entry)
+            if entry.filename.endswith("data.pkl"):
+                content = content.replace(old, new)
+            damaged.writestr(entry.filename, content)
+    path = rewrite(model_zip, tmp_path / "damaged.zip", policy_pth=target.getvalue())
+    with pytest.raises(InputError, match="holds something else than weights"):
+        make_agent(path, "CartPole-v1")
+
+
 def test_what_is_no_model_is_refused(tmp_path: Path) -> None:
     text = tmp_path / "text.zip"
     text.write_text("hello")
