@@ -88,11 +88,12 @@ def environment_name(env_id: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", family)
 
 
-def experts_of(env_id: str) -> tuple[Path, ...]:
+def experts_of(env_id: str, count: int = EXPERTS) -> tuple[Path, ...]:
     """The experts of an environment.
 
     Args:
         env_id: One of `environments`.
+        count: How many are needed.
 
     Returns:
         Their `.npz` files, the shipped one first.
@@ -101,10 +102,10 @@ def experts_of(env_id: str) -> tuple[Path, ...]:
         InputError: If some are missing.
     """
     name = SHIPPED[env_id]
-    others = sorted(REPLICATE_FOLDER.glob(f"{name}_seed_*.npz"))[: EXPERTS - 1]
-    if len(others) < EXPERTS - 1:
+    others = sorted(REPLICATE_FOLDER.glob(f"{name}_seed_*.npz"))[: count - 1]
+    if len(others) < count - 1:
         raise InputError(
-            f"{REPLICATE_FOLDER} has {len(others)} further experts of {env_id} and {EXPERTS - 1} "
+            f"{REPLICATE_FOLDER} has {len(others)} further experts of {env_id} and {count - 1} "
             f"are needed; train others with `train-expert --env {env_id} --seed S --out "
             f"{REPLICATE_FOLDER / f'{name}_seed_S.npz'}`"
         )
@@ -124,7 +125,7 @@ def replicates_of(env_id: str, count: int) -> tuple[Replicate, ...]:
     Raises:
         InputError: If an expert is missing.
     """
-    experts = experts_of(env_id)
+    experts = experts_of(env_id, min(count, EXPERTS))
     return tuple(
         Replicate(env_id, number, experts[number % len(experts)]) for number in range(count)
     )

@@ -12,7 +12,6 @@ from sarl_core.cli import main
 from sarl_core.reproducing.report import read_report
 from sarl_core.reproducing.studies import STUDIES
 from sarl_core.reproducing.tables import read_table
-from sarl_core.reproducing.verdicts import VERDICTS
 from tests.reproducing.test_report import ENTRY
 
 
@@ -100,17 +99,22 @@ def test_control_c_says_what_was_finished(done, words, capsys, monkeypatch):
     assert line == f"error: {words}"
 
 
+# The others wait for experts that are still being trained.
+THERE = ["4", "5", "6"]
+
+
 @pytest.mark.slow
-def test_the_whole_paper_quickly(capsys, tmp_path):
+def test_the_paper_quickly(capsys, tmp_path):
     """Every study is measured, drawn and judged; only the numbers mean little."""
     folder = tmp_path / "paper"
-    assert main(["reproduce", "--quick", "--out", str(folder)]) == 0
+    figures = [word for name in THERE for word in ("--figure", name)]
+    assert main(["reproduce", "--quick", *figures, "--out", str(folder)]) == 0
     printed = capsys.readouterr()
     assert printed.err == ""
     assert "This was a quick run" in printed.out
     report = read_report(folder)
     assert report is not None
-    assert list(report.studies) == list(STUDIES)
+    assert list(report.studies) == THERE
     left = {"report.json", "plotly.min.js"}
     for name, entry in report.studies.items():
         study = STUDIES[name]
@@ -128,7 +132,9 @@ def test_the_whole_paper_quickly(capsys, tmp_path):
         assert entry.quick
         assert entry.settings["seeds"]
         assert entry.claims
-        assert all(claim.verdict in VERDICTS for claim in entry.claims)
+        # Two recordings decide nothing.
+        assert {claim.verdict for claim in entry.claims} == {"cannot be judged"}
+        assert all(claim.by_chance is None for claim in entry.claims)
         assert "nan" not in " ".join(claim.ours for claim in entry.claims)
     assert {path.name for path in folder.iterdir()} == left
     assert sum(path.stat().st_size for path in folder.iterdir()) < 10_000_000
@@ -136,7 +142,7 @@ def test_the_whole_paper_quickly(capsys, tmp_path):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert main(["reproduce", "--quick", "--figure", "5", "--out", str(folder), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert list(document["studies"]) == list(STUDIES)
+    assert list(document["studies"]) == THERE
     after = {path.name: path.read_bytes() for path in folder.iterdir()}
     changed = {name for name in after if after[name] != before[name]}
     assert "figure_5.csv" not in changed
