@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.requirements import rises_steadily
+
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
 
@@ -23,7 +25,6 @@ _MOST_GROUPS = 10  # of a continuous action that has only a few values
 _SURE = 0.98  # of the steps
 _LEFT = 0.1  # of the errors that the most frequent action would make
 _MONOTONE = 0.999  # rank correlation of a copy
-_STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
 _LEAST_CHANGES = 5
 _EARLIER = re.compile(r"prev|last|lag|old|past|before|earlier", re.I)
 
@@ -107,10 +108,7 @@ def _ranks(values: NDArray[Any]) -> NDArray[np.float64]:
 def _is_clock(values: NDArray[np.float32], together: NDArray[np.bool_]) -> bool:
     if len(values) > _LOOKED_AT and not _is_clock(values[:_LOOKED_AT], together[: _LOOKED_AT - 1]):
         return False
-    rises = np.diff(values.astype(np.float64))[together]
-    if len(rises) < _LEAST_ROWS // 2 or rises.min() <= 0:
-        return False
-    return bool(rises.max() - rises.min() <= _STEADY * rises.mean())
+    return rises_steadily(values, together, least=_LEAST_ROWS // 2)
 
 
 def _next_states(

@@ -13,6 +13,7 @@ from sarl_core.errors import InputError
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
 
 _FEW_STEPS = 2**12  # of float32 between the least and the largest value of a feature
+_STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
 _MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
 _EXACT = 2**53  # up to here every whole number is a float64
 # Nothing is measured beyond it, and the sum of as many numbers as fit in memory is a float32 yet.
@@ -158,6 +159,29 @@ def counts_up(values: NDArray[Any], together: NDArray[np.bool_] | None = None) -
     if together is not None:
         rises = rises[together]
     return len(rises) > 0 and bool(np.all(rises == 1))
+
+
+def rises_steadily(
+    values: NDArray[Any], together: NDArray[np.bool_] | None = None, *, least: int = 1
+) -> bool:
+    """Whether a column rises by the same amount from row to row, as a clock does.
+
+    Args:
+        values: Shape (N,).
+        together: Shape (N - 1,), whether a row and the next one are to be compared; None for all.
+        least: How many must be compared.
+
+    Returns:
+        False where there are fewer.
+    """
+    if values.dtype.kind == "b":
+        return False
+    rises = np.diff(values.astype(np.float64))
+    if together is not None:
+        rises = rises[together]
+    if len(rises) < least or not rises.min() > 0:
+        return False
+    return bool(rises.max() - rises.min() <= _STEADY * rises.mean())
 
 
 def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:

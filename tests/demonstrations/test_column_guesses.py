@@ -6,7 +6,7 @@ import pytest
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations
 from sarl_core.errors import InputError
-from tests.bad_inputs import csv_bytes
+from tests.bad_inputs import csv_bytes, npz_bytes
 
 N, EPISODE = 60, 15
 
@@ -65,6 +65,7 @@ def refusal(**columns: object) -> str:
         (("state_0", "state_1"), ("state_prime_0", "state_prime_1")),
         (("s0", "s1"), ("sp0", "sp1")),
         (("x", "v"), ("x_t+1", "v_t+1")),
+        (("x", "v"), ("x_", "v_")),
     ],
 )
 def test_next_states_are_no_features(names: tuple[str, str], later: tuple[str, str]) -> None:
@@ -95,6 +96,24 @@ def test_next_states_of_rows_in_any_order_are_known_by_their_names() -> None:
 def test_a_name_that_only_resembles_a_next_state_is_a_feature() -> None:
     found = uses(read(x=noise(0), nx=noise(1), new_load=noise(2), action=LABELS))
     assert (found["nx"], found["new_load"]) == ("feature", "feature")
+
+
+@pytest.mark.parametrize("names", [("s1", "s2"), ("x1", "x2"), ("left_1", "left_2")])
+def test_numbered_features_are_all_features(names: tuple[str, str]) -> None:
+    columns = dict(zip(names, (noise(0), noise(1)), strict=True))
+    assert list(uses(read(**columns, action=LABELS)).values()) == ["feature", "feature", "action"]
+
+
+def test_two_sensors_are_not_a_state_and_the_next() -> None:
+    names = ("lidar1_x", "lidar1_y", "lidar2_x", "lidar2_y")
+    columns = {name: noise(seed) for seed, name in enumerate(names)}
+    assert read(**columns, action=LABELS).feature_names == names
+
+
+def test_the_letters_of_textbooks() -> None:
+    x = noise(0)
+    found = uses(read(s=x, a=LABELS, r=noise(1), s_=moved(x), episode=EPISODES))
+    assert (found["a"], found["r"], found["s_"]) == ("action", "reward", "not used")
 
 
 def test_an_earlier_state_is_a_feature() -> None:
@@ -155,6 +174,8 @@ def test_r_is_the_reward_only_where_the_other_names_speak_so() -> None:
         ("timestamp", 1.7e9 + np.arange(N)),
         ("t", np.arange(N) * 0.5),
         ("elapsed_s", noise(5)),
+        ("unix", 1.7e9 + np.arange(N)),
+        ("anything", np.arange(N) * 20),
     ],
 )
 def test_a_counter_is_no_feature(name: str, values: np.ndarray) -> None:
@@ -243,6 +264,16 @@ def test_every_column_is_told_in_the_order_of_the_file() -> None:
         ("episode", "episode number"),
     ]
     assert all(use.why for use in demonstrations.columns)
+
+
+def test_the_arrays_of_a_npz_are_told_too() -> None:
+    arrays = {"obs": np.zeros((4, 2)), "acts": np.array([0, 1, 0, 1]), "indices": np.array([2])}
+    found = uses(read_demonstrations(npz_bytes(**arrays, infos=np.zeros(4)), "demo.npz"))
+    assert found == {
+        "obs": "features",
+        "acts": "actions",
+        "indices": "rows at which episodes begin",
+    }
 
 
 def test_names_of_any_length_are_read_or_refused_in_a_short_sentence() -> None:

@@ -128,7 +128,7 @@ def test_values_that_float32_cannot_tell_apart_are_told(kind: str, tmp_path: Pat
         found = Demonstrations(np.stack([UNIX, SPEED], axis=1), LABELS, EPISODES)
     else:
         (tmp_path / "obs.csv").write_bytes(
-            csv_bytes(*[row.rsplit(",", 1)[0] for row in rows], header="unix,speed")
+            csv_bytes(*[row.rsplit(",", 1)[0] for row in rows], header="obs_unix,obs_speed")
         )
         (tmp_path / "actions.csv").write_bytes(csv_bytes(*map(str, LABELS), header=None))
         found = load_demonstrations(tmp_path)

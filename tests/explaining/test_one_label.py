@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from sarl_core import (
     Demonstrations,
     RuleSet,
     Shield,
+    ShieldedEnv,
     grow_policy_trees,
     mine_rules,
     threshold_landscape,
@@ -24,7 +26,7 @@ from sarl_core.explaining.language import action_text, label_text
 from sarl_core.explaining.test_vectors import make_vectors
 from sarl_core.mining.quantisation import quantise
 from tests.bad_inputs import csv_bytes
-from tests.explaining.exported import expected, run_c, run_onnx, run_python, same
+from tests.explaining.exported import agree, expected, run_c, run_onnx, run_python
 
 N = 120
 STATES = np.random.default_rng(1).uniform(-1, 1, (N, 2)).astype(np.float32)
@@ -66,19 +68,36 @@ def test_the_shield_and_its_exports_agree(name: str, projection: Any, tmp_path: 
     shown = ACTIONS[name].reshape(N, -1)
     states, proposed = STATES, (shown + np.random.default_rng(2).integers(-1, 2, shown.shape))
     proposed = np.clip(proposed, shown.min(axis=0), shown.max(axis=0) + 1).astype(shown.dtype)
-    executed, found, changed = expected(rules, projection, states, proposed)
-    assert (found[:, 0] == 0).all()
+    wanted = expected(rules, projection, states, proposed)
+    assert not wanted.invalid.all()
+    assert (wanted.rules[~wanted.invalid, 0] == 0).all()
     in_c = run_c(rules, projection, states, proposed, tmp_path)
-    assert same(in_c[0], executed)
-    assert np.array_equal(in_c[2], changed)
-    assert same(run_onnx(rules, projection, states, proposed)[0], executed)
-    assert same(run_python(rules, projection, states, proposed)[0], executed)
+    agree(in_c, wanted)
+    assert np.array_equal(in_c.changed, wanted.changed)
+    agree(run_onnx(rules, projection, states, proposed), wanted)
+    agree(run_python(rules, projection, states, proposed), wanted)
+
+
+class Lift(gymnasium.Env[Any, Any]):
+    """Two numbers to see and four things to do."""
+
+    observation_space = gymnasium.spaces.Box(-1, 1, (2,))
+    action_space = gymnasium.spaces.Discrete(4)
+
+    def reset(self, **_: Any) -> tuple[Any, dict[str, Any]]:
+        return STATES[0], {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        return STATES[1], float(action), False, False, {}
 
 
 def test_what_differs_from_the_only_number_is_replaced() -> None:
-    shield = Shield(rules_of("one number"))
-    assert shield.decide(STATES[0], 2).executed == 3
-    assert not shield.decide(STATES[0], 3).intervened
+    env = ShieldedEnv(Lift(), Shield(rules_of("one number")))
+    env.reset()
+    for proposed in range(4):
+        _, executed, _, _, info = env.step(proposed)
+        assert executed == 3
+        assert info["shield"].intervened == (proposed != 3)
 
 
 def test_a_file_whose_action_never_changes() -> None:

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.columns import Guess, listed, unclear_columns
 from sarl_core.demonstrations.formats.vocabulary import plain
-from sarl_core.demonstrations.requirements import FEW_VALUES, counts_up, is_whole
+from sarl_core.demonstrations.requirements import (
+    FEW_VALUES,
+    counts_up,
+    is_whole,
+    rises_steadily,
+)
 from sarl_core.errors import InputError
 
 Values = Mapping[str, NDArray[Any]]
@@ -78,7 +83,11 @@ def counters(values: Values) -> dict[str, str]:
     Returns:
         Why each of them is no feature and no action.
     """
-    return {name: "it counts the rows" for name in values if _counts(values[name], None)}
+    return {
+        name: "it rises by the same amount in every row, as a counter or a clock does"
+        for name, held in values.items()
+        if len(held) >= _LEAST_ROWS and rises_steadily(held)
+    } | {name: "it counts the rows" for name, held in values.items() if _counts(held, None)}
 
 
 def same_episode(guess: Guess, values: Values) -> NDArray[np.bool_]:
@@ -185,12 +194,12 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
             for name, base in named.items()
             if follows.get(name) == base
         }
-    perhaps = vocabulary.perhaps_next_states(features)
-    bases = set(perhaps.values())
+    lettered = vocabulary.perhaps_next_states(features, numbered=False)
+    bases = set(lettered.values())
     # "ns0" and "ns1" beside "s0" and "s1" and nothing else: as textbooks write it.
-    complete = set(features) == bases | set(perhaps) and not bases & set(perhaps)
+    complete = set(features) == bases | set(lettered) and not bases & set(lettered)
     written = complete and (len(bases) > 1 or all(map(vocabulary.is_state_word, bases)))
-    for name, base in perhaps.items():
+    for name, base in vocabulary.perhaps_next_states(features, numbered=True).items():
         if written or follows.get(name) == base:
             found[name] = f"it holds the next {base!r}"
     for name, base in follows.items():

@@ -447,7 +447,8 @@ def _textbook(guess: Guess) -> bool:
     """Whether other columns speak of the same notation as "r" and "a" do."""
     columns = guess.columns
     ends = (columns.terminated, columns.truncated, columns.first, columns.last)
-    return guess.prefixed or any(ends) or only_counted(columns.observations)
+    states = map(vocabulary.is_state_word, columns.observations)
+    return guess.prefixed or any(ends) or only_counted(columns.observations) or all(states)
 
 
 def _own_name(column: str, prefixes: str) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.archives import Promise, array_of, arrays_in, opened, promise_of
-from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.formats.columns import listed
+from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
+from sarl_core.demonstrations.formats.columns import USE_WORDS, listed
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
     Metadata,
@@ -39,6 +39,17 @@ _KEYS = {
     "truncated": ("truncated", "timeouts", "timeout", "truncations"),
     "indices": ("indices",),
     "starts": ("episode_starts",),
+}
+_USES = {
+    "observations": "features",
+    "actions": "actions",
+    "episodes": USE_WORDS["episode"],
+    "steps": USE_WORDS["step"],
+    "rewards": "reward",
+    "terminated": USE_WORDS["terminated"],
+    "truncated": USE_WORDS["truncated"],
+    "indices": "rows at which episodes begin",
+    "starts": USE_WORDS["first"],
 }
 
 
@@ -119,6 +130,11 @@ def read_npz(data: memoryview) -> Recording:
             if key in keys
         },
         metadata=metadata,
+        columns=tuple(
+            ColumnUse(key, _USES[what], "the array's name says so")
+            for what, key in keys.items()
+            if what in _USES
+        ),
     )
 
 

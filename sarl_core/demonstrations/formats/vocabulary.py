@@ -33,7 +33,7 @@ ROW_NUMBERS = re.compile(
 TIMES = re.compile(
     r"((unix|wall|sim|real|elapsed|clock|utc|local)_?)?"
     r"(time|time_?stamp|date|date_?time|ts)(_(s|sec|secs|seconds|ms|us|ns|utc|unix))?"
-    r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc"
+    r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc|unix|ms|secs?|seconds|t_(s|ms)"
 )
 # What learners write along, and no agent sees.
 BOOKKEEPING = re.compile(
@@ -41,7 +41,7 @@ BOOKKEEPING = re.compile(
 )
 UNCLEAR = re.compile(r"id|.*_ids?|uid|uuid|seeds?|returns?|values?|q_values?")
 CONTROLS = re.compile(
-    r"brakes?|braking|throttle|gas|steer(ing)?|steering_.*|pedal|torque|force|thrust|u|move|button"
+    r"brakes?|braking|throttle|gas|steer(ing)?(_.*)?|pedal|torque|force|thrust|u|move|button"
     r"|decision|choice|(.*_)?(cmd|command|control|action)"
 )
 
@@ -98,12 +98,20 @@ def next_states(names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def perhaps_next_states(names: Sequence[str]) -> dict[str, str]:
-    """As `next_states`, for names as "ns0", "sp_0" and "obs2_0", which may mean something else."""
+def perhaps_next_states(names: Sequence[str], *, numbered: bool) -> dict[str, str]:
+    """As `next_states`, for names as "ns0" and "sp_0", which may mean something else.
+
+    Args:
+        names: Of all columns.
+        numbered: Whether "obs2_0" may be the next "obs1_0".
+
+    Returns:
+        The other column for each of them.
+    """
     keys = {_words(name): name for name in names}
     found = {}
     for words, name in keys.items():
-        for base in _shortened(words):
+        for base in _shortened(words) + (_first_of_two(words) if numbered else []):
             if base in keys and keys[base] != name:
                 found[name] = keys[base]
                 break
@@ -135,7 +143,7 @@ def says_before(name: str) -> bool:
 
 def _words(name: str) -> tuple[str, ...]:
     """The words and numbers of a name: "s'_0" has s, prime and 0."""
-    text = re.sub(r"['′’]", "_prime_", plain(name))
+    text = re.sub(r"['′’]|(?<=[^\W_])_$", "_prime_", plain(name))  # "s_" is an "s'" too
     text = re.sub(r"_t(_?\+_?|p)1$", "_next", text)
     return tuple(re.findall(r"[^\W\d_]+|\d+|[^\w\s]", text))
 
@@ -155,7 +163,7 @@ def _unmarked(word: str) -> str:
 
 
 def _shortened(words: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """What "ns0", "sp_0", "n_x", "obs2_0" and "newpos" may be the next of."""
+    """What "ns0", "sp_0", "n_x" and "newpos" may be the next of."""
     if not words:
         return []
     first, rest = words[0], words[1:]
@@ -166,8 +174,13 @@ def _shortened(words: tuple[str, ...]) -> list[tuple[str, ...]]:
         found.append((first[:-1], *rest))
     if first in ("n", "p"):
         found.append(rest)
-    if rest[:1] == ("2",):
-        found += [(first, *rest[1:]), (first, "1", *rest[1:])]
     if rest[:1] in (("n",), ("p",)):
         found.append((first, *rest[1:]))
     return found
+
+
+def _first_of_two(words: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """What "obs2_0" may be the next of; "s2" is the second of several."""
+    if words[1:2] != ("2",) or len(words) < 3:
+        return []
+    return [(words[0], *words[2:]), (words[0], "1", *words[2:])]
