@@ -336,7 +336,7 @@ def state_vector(observation: Any, space: Any = None) -> Any:
         Its numbers as float32, whether or not they are finite and as many as they should be;
         what came, where it holds something else.
     """
-    if type(observation) is np.ndarray and observation.dtype == _FLOAT32 and space is None:
+    if space is None and type(observation) is np.ndarray and observation.dtype == _FLOAT32:
         return observation.copy()
     if _is_masked(observation):
         return observation

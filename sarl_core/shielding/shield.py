@@ -27,7 +27,7 @@ Outside = Literal["act", "abstain"]
 OnInvalid = Literal["raise", "pass"]
 """What becomes of a step whose state is no state, or whose action is none of the space."""
 
-_FLOAT32, _INT64 = np.dtype(np.float32), np.dtype(np.int64)
+_ARRAY, _FLOAT32 = np.ndarray, np.dtype(np.float32)
 
 
 class Decision(NamedTuple):
@@ -154,7 +154,8 @@ class Shield:
         self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
         self._states = StateReader(rule_set)
-        self._state_shape = (len(rule_set.source.features),)
+        self._n_features = len(rule_set.source.features)
+        self._match_label = self._matchers[0].match
         self._take_form(ActionForm.of_rules(rule_set))
 
     def _take_form(self, form: ActionForm) -> None:
@@ -164,7 +165,12 @@ class Shield:
         self._replace = replacements(self.rule_set, self.projection, form.dtype)
         self._discrete = bool(form.labels)
         self._single = len(form.labels) == 1 and form.shape in (None, ())
-        self._plain_label = self._single and form.dtype == _INT64
+        self._scalar = form.dtype.type
+        self._wanted: list[int] = []
+        self._wanted_scalars: list[Any] = []
+        if self._single:
+            wanted = (self._labels + self._actions[0].first).astype(form.dtype)
+            self._wanted, self._wanted_scalars = wanted.tolist(), list(wanted)
         self._first, count = form.labels[0] if form.labels else (0, 0)
         self._beyond = self._first + count
         self._shape = (len(self._actions),) if form.shape is None else form.shape
@@ -208,25 +214,22 @@ class Shield:
                 `on_invalid` lets such actions pass.
         """
         # The plain cases are told by a few comparisons; everything else is read with care.
-        if (
-            type(observation) is np.ndarray
-            and observation.dtype == _FLOAT32
-            and observation.shape == self._state_shape
-        ):
+        if type(observation) is _ARRAY and observation.ndim == 1 and observation.dtype == _FLOAT32:
             state = observation.tolist()
-            if isfinite(sum(state)):  # a sum of float32 numbers does not overflow in float64
+            # A sum of float32 numbers does not overflow in float64.
+            if len(state) == self._n_features and isfinite(sum(state)):
                 kind = type(action)
-                if self._plain_label:
+                if self._single:
                     if (
-                        kind is int
-                        or kind is np.int64
-                        or (kind is np.ndarray and action.dtype == _INT64 and action.shape == ())
+                        kind is self._scalar
+                        or kind is int
+                        or (kind is _ARRAY and not action.ndim and action.dtype == self._form.dtype)
                     ):
                         value = int(action)
                         if self._first <= value < self._beyond:
                             return self._decide_label(state, action, action, value)
                 elif (
-                    kind is np.ndarray
+                    kind is _ARRAY
                     and action.dtype == self._form.dtype
                     and action.shape == self._shape
                     and not self._discrete
@@ -272,17 +275,25 @@ class Shield:
 
     def _decide_label(self, state: list[float], action: Any, handed: Any, value: int) -> Decision:
         """Decide one discrete action, a valid one."""
-        rule, margin = self._matchers[0].match(state)
+        rule, margin = self._match_label(state)
         if rule is None:
             return Decision(handed, action, (None,), False, margin)
-        wanted = self._label_list[rule] + self._actions[0].first
-        if value == wanted:
+        if value == self._wanted[rule]:
             return Decision(handed, action, (rule,), False, margin)
         sides = self._sides[rule]
         outside = sides is not None and leaves_out(sides, state)
         if outside and self._abstains:
             return Decision(handed, action, (rule,), False, margin, True)
-        return Decision(_like(handed, wanted), action, (rule,), True, margin, outside)
+        # A discrete action of the same kind as the one that would have been handed on.
+        kind = type(handed)
+        executed = (
+            self._wanted_scalars[rule]
+            if kind is self._scalar
+            else self._wanted[rule]
+            if kind is int
+            else np.full_like(handed, self._wanted[rule])
+        )
+        return Decision(executed, action, (rule,), True, margin, outside)
 
     def _decide_each(
         self, state: list[float], action: Any, handed: Any, values: NDArray[Any]
@@ -524,10 +535,3 @@ def _passed(executed: NDArray[Any], proposed: NDArray[Any], unread: list[int]) -
     for row in unread:
         objects[row] = proposed[row]
     return objects
-
-
-def _like(action: Any, value: int) -> Any:
-    """A discrete action of the same kind as one of the environment's dtype."""
-    if isinstance(action, np.ndarray):
-        return np.full_like(action, value)
-    return action.dtype.type(value) if isinstance(action, np.generic) else value

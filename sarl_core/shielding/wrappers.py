@@ -99,21 +99,23 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         if self._episode < 0:
             raise gymnasium.error.ResetNeeded("call reset before step")
         state = self._observation
-        decision = self.shield.decide(state, action)
-        observation, reward, terminated, truncated, info = self.env.step(decision.executed)
+        executed, proposed, rules, intervened, margin, outside, invalid = self.shield.decide(
+            state, action
+        )
+        observation, reward, terminated, truncated, info = self.env.step(executed)
         info["shield"] = StepRecord(
             self._episode,
             self._step,
             state,
-            decision.proposed,
-            decision.executed,
-            decision.rules,
-            decision.intervened,
-            decision.margin,
-            decision.outside,
-            decision.invalid,
+            proposed,
+            executed,
+            rules,
+            intervened,
+            margin,
+            outside,
+            invalid,
         )
-        if decision.intervened and self.penalty:
+        if intervened and self.penalty:
             reward = float(reward) - self.penalty
         self._step += 1
         self._remember(observation)
