@@ -88,9 +88,7 @@ def lander_claims(frames: Frames) -> tuple[Claim, ...]:
         _by_the_shield_alone(runs),
     ]
     if "5" in frames:
-        cart = first_runs(frames, "5")
-        if len(cart.experts) == len(runs.experts):
-            claims.insert(3, _deeper_falls(runs, cart))
+        claims.insert(3, _deeper_falls(runs, first_runs(frames, "5")))
     return tuple(claims)
 
 
@@ -310,9 +308,14 @@ def _closely_followed(runs: Runs) -> Claim:
 
 
 def _deeper_falls(lander: Runs, cart: Runs) -> Claim:
-    depths = {name: (_depth(lander, name), _depth(cart, name)) for name in (FILTERED, UNFILTERED)}
+    count = min(len(lander.experts), len(cart.experts))  # one may be of a quick run
+    depths = {
+        name: (_depth(lander, name)[:count], _depth(cart, name)[:count])
+        for name in (FILTERED, UNFILTERED)
+    }
     parts = [
-        above(here - there, lander.experts, agrees=0, partly=0) for here, there in depths.values()
+        above(here - there, lander.experts[:count], agrees=0, partly=0)
+        for here, there in depths.values()
     ]
     told = ", ".join(
         f"{name} {percent(float(here.mean()))} (Cart Pole {percent(float(there.mean()))})"

@@ -67,7 +67,7 @@ class Finding:
         if self.too_few:
             return (
                 f"{text}; that is too little to judge by, {LEAST_RECORDINGS} recordings of "
-                f"{LEAST_EXPERTS} experts are needed."
+                f"{LEAST_EXPERTS} experts are needed for each environment."
             )
         return f"{text}."
 
