@@ -23,6 +23,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rule_order import rules_for as rules_of
 from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
 from sarl_core.rollouts.agents import (
     EXPERT_FOLDER,
@@ -116,20 +117,26 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | Non
 
 
 def as_named(rule_set: RuleSet, digest: str) -> tuple[RuleSet, str]:
-    """Rules from a file, under the names given to the chosen demonstrations where they fit them.
+    """Rules from a file, in the order and under the names of the chosen demonstrations.
 
     Args:
         rule_set: As it was read.
         digest: Tells it from others.
 
     Returns:
-        The rules, and what tells them from others and from themselves under other names.
+        The rules, as they were read where they do not fit these; and what tells them from
+        others and from themselves under other names or in another order.
     """
     raw = state.raw_demonstrations()
-    names = _names.given_names(raw)
-    if raw is None or names is None or not fits(rule_set, raw):
+    if raw is None or not fits(rule_set, raw):
         return rule_set, digest
-    return renamed_rules(rule_set, names), f"{digest} {_names.digest_of_names(names)}"
+    ordered = rules_of(rule_set, raw).rule_set
+    if ordered is not rule_set:
+        digest = f"{digest} {raw.digest}"
+    names = _names.given_names(raw)
+    if names is None:
+        return ordered, digest
+    return renamed_rules(ordered, names), f"{digest} {_names.digest_of_names(names)}"
 
 
 def compact_file() -> Path:

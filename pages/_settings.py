@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, cast, get_args
 
 import streamlit as st
@@ -69,6 +69,12 @@ def outside_choice(width: Width = "stretch") -> Outside:
             "it leaves the action to the agent.",
         ),
     )
+
+
+def notes_notice(notes: Iterable[str]) -> None:
+    """Say how it was found out which feature is which, and what else a visitor should know."""
+    for note in dict.fromkeys(notes):
+        st.info(f"{note[0].upper()}{note[1:]}.", icon=":material/info:")
 
 
 def no_boxes_notice(rule_sets: list[RuleSet], outside: Outside) -> None:

@@ -32,6 +32,7 @@ from _comparisons import row_key
 from _settings import (
     environment_choice,
     no_boxes_notice,
+    notes_notice,
     offered_rule_sets,
     outside_choice,
     projection_choice,
@@ -43,6 +44,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
 from sarl_core.rollouts.ablating import LEAST_EPISODES
 from sarl_core.rollouts.ablation import MOST_RULES
+from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.shield import Shield
 
 MOST_EPISODES = 500
@@ -124,6 +126,7 @@ def settings() -> Callable[[], tuple[Wanted, str]]:
                 "choose other rules"
             )
         no_boxes_notice([rule_set], outside)
+        notes_notice(check_environment(env_id, Shield(rule_set)).notes)
         key = row_key(env_id, agent_digest, f"{rules_digest} {outside}", projection, first)
         return (
             Wanted(

@@ -22,11 +22,12 @@ from _choices import (
 )
 from _improve_view import show_outcome, show_shipped
 from _improving import Order, Outcome, Working, kept_outcomes
-from _settings import environment_choice
+from _settings import environment_choice, notes_notice
 from _words import in_full
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.demonstrations.names import in_order_of
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.language import counted
 from sarl_core.mining.budget import MIN_RULES
@@ -176,13 +177,8 @@ def make_order(choices: Choices, demonstrations: Demonstrations) -> Order:
         InputError: If it cannot be had.
     """
     env_id = environment_of(choices.env)
-    features = len(describe_environment(env_id).feature_names)
-    shown = demonstrations.observations.shape[1]
-    if features != shown:
-        raise InputError(
-            f"the demonstrations have {counted(shown, 'feature')} and {env_id} has {features}; "
-            "choose the environment that they are from"
-        )
+    demonstrations, notes = in_order_of(demonstrations, describe_environment(env_id))
+    notes_notice(notes)
     if choices.expert == NOBODY:
         return gaps_order(choices, demonstrations, env_id)
     if choices.expert == OWN_FILE:

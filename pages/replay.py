@@ -40,6 +40,7 @@ from _replays import (
 from _settings import (
     environment_choice,
     no_boxes_notice,
+    notes_notice,
     offered_rule_sets,
     outside_choice,
     projection_choice,
@@ -50,6 +51,8 @@ from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.replay import named_description
 from sarl_core.mining.rules import UNFILTERED, RuleSet
+from sarl_core.rollouts.player import shield_for
+from sarl_core.shielding.shield import Shield
 
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
 
@@ -105,6 +108,8 @@ def settings() -> Callable[[], Order]:
     def order() -> Order:
         env_id = environment_of(env)
         rule_set, rules_digest = rules_for(rules, rule_file)
+        if rule_set is not None:
+            rule_set = shield_for(env_id, Shield(rule_set)).rule_set
         make, digest = agent_for(agent, policy_file, env_id, int(seed or 0))
         described = named_description(
             describe_environment(env_id), rule_set, state.chosen_demonstrations()
@@ -195,6 +200,7 @@ st.markdown(
     + (f", {len(replayed.rule_set):,} rules ({asked.rules})" if replayed.rule_set else "")
     + ("" if same else "  \n:orange[:material/info: The settings have changed since: press Run.]")
 )
+notes_notice(note for episode in replayed.film.episodes for note in episode.remarks)
 no_boxes_notice([] if replayed.rule_set is None else [replayed.rule_set], asked.outside)
 numbers(
     replayed,

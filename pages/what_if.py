@@ -12,7 +12,7 @@ import streamlit as st
 from _cache import cached
 from _choices import PROJECTIONS
 from _replays import kept_replays
-from _settings import no_boxes_notice, outside_choice, projection_choice
+from _settings import no_boxes_notice, notes_notice, outside_choice, projection_choice
 from _what_if_view import show
 from _words import escaped
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import label_text
 from sarl_core.explaining.lit_path import PathFinder
 from sarl_core.explaining.what_if import by_use
-from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rule_order import fits, rules_for
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
@@ -255,6 +255,8 @@ def chosen_rules() -> tuple[RuleSet, str]:
     ):
         edited, digest = _edits.edited_rules()
         if fits(edited, demonstrations):
+            edited, notes = rules_for(edited, demonstrations)
+            notes_notice(notes)
             return edited, f"edited {digest}"
         st.info(
             "The edited rules speak of other features or actions than the chosen demonstrations, "

@@ -102,6 +102,8 @@ def aggregate(
     nobody = expert == _NOBODY
     terminal.check_output(out, (".csv",) if nobody else (".json",))
     with terminal.working("Starting"):
+        from sarl_core.demonstrations.environments import describe_environment
+        from sarl_core.demonstrations.names import in_order_of
         from sarl_core.rollouts.aggregation_plan import Plan
 
         plan = Plan(
@@ -117,8 +119,9 @@ def aggregate(
         )
         shown = read_demonstrations(file, env)
         agents = _agents(agent, expert, env or shown.env_id, normalise)
+        shown, notes = in_order_of(shown, describe_environment(env or shown.env_id))
     if nobody:
-        _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json)
+        _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json, notes)
         return
     with terminal.working("Asking the expert") as advance:
         from sarl_core.rollouts.aggregation import aggregate as run
@@ -137,7 +140,7 @@ def aggregate(
     if not found.is_finished:
         raise terminal.StoppedError(_what_is_left(found, written, out))
     if as_json:
-        terminal.print_json(card)
+        terminal.print_json({**card, "notes": list(notes)})
         return
     from sarl_core.explaining.language import share_text
 
@@ -162,8 +165,20 @@ def aggregate(
             f"{', refined' if found.refined else ''}.",
             f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
             f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
+            *_beside(reported),
+            *(f"note: {note}" for note in notes),
         ]
     )
+
+
+def _beside(reported: dict[str, Any]) -> list[str]:
+    """How often these episodes failed, and what the rules left to choose from."""
+    from sarl_core.commandline.answers import failures_text, freedom_text
+
+    return [
+        f"Failures: {failures_text(reported, reported['episodes'])}.",
+        f"Freedom: {freedom_text(reported)}.",
+    ]
 
 
 def _agents(
@@ -216,6 +231,7 @@ def _gaps(
     out: Path,
     jobs: int,
     as_json: bool,
+    notes: tuple[str, ...],
 ) -> None:
     """Without an expert: which states need a demonstration."""
     if plan.thresholds is None:
@@ -254,6 +270,7 @@ def _gaps(
         "met": found.met,
         "without_a_rule": len(found),
         "share": found.share,
+        "notes": list(notes),
     }
     if as_json:
         terminal.print_json(document)
@@ -263,7 +280,8 @@ def _gaps(
     terminal.print_lines(
         [
             f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
-            f"({share_text(found.share, decimals=1)}) have no rule and need a demonstration."
+            f"({share_text(found.share, decimals=1)}) have no rule and need a demonstration.",
+            *(f"note: {note}" for note in notes),
         ]
     )
 

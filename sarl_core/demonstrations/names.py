@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.demonstrations.feature_order import Named, line_up
 from sarl_core.errors import InputError
 
 
@@ -115,6 +116,63 @@ def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
         action_names=names.actions,
         label_names=names.labels if demonstrations.is_discrete else demonstrations.label_names,
     )
+
+
+class InOrder(NamedTuple):
+    """Demonstrations in the order of an environment.
+
+    Attributes:
+        demonstrations: The same pairs.
+        notes: What is to be said of that order, as clauses; none where it was the same.
+    """
+
+    demonstrations: Demonstrations
+    notes: tuple[str, ...]
+
+
+def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescription) -> InOrder:
+    """Put features and action dimensions into an environment's order, by their names.
+
+    Args:
+        demonstrations: N pairs.
+        description: Of the environment.
+
+    Returns:
+        The same object where the order is the same.
+
+    Raises:
+        InputError: If there are more or fewer, or their names are of other things.
+    """
+    own = names_of(demonstrations)
+    first = Named("the demonstrations", own.features, demonstrations.env_id)
+    second = Named(description.env_id, description.feature_names, description.env_id)
+    features = line_up(first, second)
+    orders = [features]
+    if features.how == "permuted":
+        demonstrations = replace(
+            demonstrations,
+            observations=demonstrations.observations[:, features.places],
+            feature_names=features.put(own.features),
+            feature_units=features.put(own.units),
+        )
+    if len(own.actions) > 1 or len(description.action_names) > 1:
+        actions = line_up(
+            first._replace(names=own.actions),
+            second._replace(names=description.action_names),
+            what="action dimensions",
+        )
+        orders.append(actions)
+        if actions.how == "permuted":
+            demonstrations = replace(
+                demonstrations,
+                actions=demonstrations.action_columns[:, actions.places],
+                action_names=actions.put(own.actions),
+                label_names=actions.put(demonstrations.label_names or ()) or None,
+                label_first=actions.put(demonstrations.label_first or ()) or None,
+                action_low=actions.put(demonstrations.action_low or ()) or None,
+                action_high=actions.put(demonstrations.action_high or ()) or None,
+            )
+    return InOrder(demonstrations, tuple(order.note for order in orders if order.note))
 
 
 def digest_of_pairs(demonstrations: Demonstrations) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.environments import EnvironmentDescription
-from sarl_core.demonstrations.names import Names, names_of, renamed_description
+from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
+from sarl_core.errors import InputError
 from sarl_core.explaining.colours import OUTSIDE_COLOUR
 from sarl_core.explaining.language import action_text, number_text, sentence
 from sarl_core.explaining.markup import plain
@@ -84,7 +86,7 @@ def named_description(
 
     Args:
         description: Of the environment.
-        rule_set: Of the shield, or None.
+        rule_set: Of the shield, in the environment's order, or None.
         demonstrations: At hand, perhaps of another environment, or None.
 
     Returns:
@@ -103,7 +105,8 @@ def named_description(
             )
         )
     if demonstrations is not None and demonstrations.env_id == description.env_id:
-        candidates.append(names_of(demonstrations))
+        with suppress(InputError):  # of other features: the environment's own names it is
+            candidates.append(names_of(in_order_of(demonstrations, description).demonstrations))
     for names in candidates:
         found = renamed_description(description, names)
         if found is not None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.demonstrations.names import in_order_of
 from sarl_core.errors import InputError
 from sarl_core.rollouts.agents import Agent, PolicyAgent
 from sarl_core.rollouts.spaces import Actions
@@ -133,8 +134,10 @@ class Answers:
             start: What was shown so far; the expert answers anew.
 
         Raises:
-            InputError: If the expert does not always do the same in the same state.
+            InputError: If the expert does not always do the same in the same state, or the
+                demonstrations are of other features.
         """
+        start = in_order_of(start, describe_environment(env_id)).demonstrations
         self._env_id, self._expert = env_id, expert
         self._observations = [start.observations]
         self._actions: list[Actions] = [ask(expert, start.observations)]
