@@ -13,7 +13,8 @@ from typing import Any, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.environments import describe_environment, make_environment
+from sarl_core.demonstrations.environments import catalogued, describe_environment, make_environment
+from sarl_core.demonstrations.feature_order import Named, line_up
 from sarl_core.errors import InputError
 from sarl_core.rollouts.policies import MlpPolicy, Normalisation
 from sarl_core.rollouts.spaces import Actions, label_counts
@@ -320,6 +321,44 @@ def _first_states(agent: PolicyAgent, env_id: str) -> NDArray[np.float32]:
         return np.array(rows, dtype=np.float32)
     finally:
         env.close()
+
+
+def order_notes(agent: Agent, env_id: str) -> tuple[str, ...]:
+    """What is to be said of how the features of a policy and of an environment were matched.
+
+    Args:
+        agent: Who acts.
+        env_id: Where it acts.
+
+    Returns:
+        Clauses; none where the policy is known to be of such an environment, or is no network.
+
+    Raises:
+        InputError: If it was trained in an environment whose features have other names.
+    """
+    if not isinstance(agent, PolicyAgent):
+        return ()
+    here = describe_environment(env_id)
+    names = catalogued(
+        agent.policy.env_id,
+        agent.policy.n_features,
+        len(here.action_names),
+        discrete=here.is_discrete,
+    )
+    order = line_up(
+        Named(
+            f"the policy {agent.name}",
+            tuple(name for name, _ in names.features),
+            agent.policy.env_id,
+        ),
+        Named(env_id.rsplit(":", 1)[-1], here.feature_names, env_id),
+    )
+    if order.how == "permuted":  # two environments of one catalogue: none is the other's
+        raise InputError(
+            f"the policy {agent.name} was trained on {agent.policy.env_id}, whose features come "
+            f"in another order than those of {env_id}; choose a policy trained on {env_id}"
+        )
+    return (order.note,) if order.note else ()
 
 
 def _check_fit(spec: str, policy: MlpPolicy, env_id: str) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import describe_environment, make_environment
 from sarl_core.errors import InputError, WorkError
-from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.agents import Agent, order_notes
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.film import Film
 from sarl_core.rollouts.flips import count_flips
@@ -101,6 +101,7 @@ def film_episode(
         WorkError: If drawing fails.
     """
     adapter, shield, notes = check_environment(env_id, shield)
+    notes = (*notes, *order_notes(agent, env_id))
     generator = np.random.default_rng(seed)
     rows: list[_Row] = []
     with _no_display(), _drawing(env_id, shield) as env:

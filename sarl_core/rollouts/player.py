@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import describe_environment, make_environment
-from sarl_core.rollouts.agents import Agent
+from sarl_core.rollouts.agents import Agent, order_notes
 from sarl_core.rollouts.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.rollouts.steps import StepTable
 
@@ -117,7 +117,8 @@ class _Run:
     ) -> None:
         self.env_id, self.agent = env_id, agent
         self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
-        self.adapter, self.shield, self.notes = check_environment(env_id, shield)
+        self.adapter, self.shield, notes = check_environment(env_id, shield)
+        self.notes = (*notes, *order_notes(agent, env_id))
         self.lanes: list[_Lane] = []
         self.states = np.zeros((0, self.adapter.n_features), dtype=np.float32)
         self.started = 0

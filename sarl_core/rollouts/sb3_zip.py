@@ -66,7 +66,6 @@ def load_sb3_zip(
             action_low=space.low.reshape(-1).astype(np.float32) if box else None,
             action_high=space.high.reshape(-1).astype(np.float32) if box else None,
             settings=settings,
-            env_id=env_id,
         )
         if box:
             check_actions(told.actions, (space.low, space.high), env_id)

@@ -173,3 +173,26 @@ def test_novice_and_expert_load_no_learner() -> None:
         "assert not {'torch', 'stable_baselines3'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_policy_of_other_features_is_refused_and_one_without_names_is_trusted() -> None:
+    """A number of features alone does not say which is which."""
+    from dataclasses import replace
+
+    from sarl_core.rollouts.agents import PolicyAgent, order_notes
+
+    expert = make_agent("expert", "CartPole-v1")
+    assert isinstance(expert, PolicyAgent)
+    assert order_notes(expert, "CartPole-v1") == ()
+    assert rollout("CartPole-v1", expert, episodes=1).notes == ()
+    unknown = replace(expert, policy=replace(expert.policy, env_id=""))
+    (note,) = rollout("CartPole-v1", unknown, episodes=1).notes
+    assert "no names" in note
+    assert "CartPole-v1" in note
+    walker = make_agent("expert", "BipedalWalker-v3")
+    assert order_notes(walker, "BipedalWalkerHardcore-v3") == ()
+    pendulum = make_agent("expert", "Pendulum-v1")
+    assert isinstance(pendulum, PolicyAgent)
+    lander = replace(pendulum, policy=replace(pendulum.policy, env_id="MountainCarContinuous-v0"))
+    with pytest.raises(InputError, match="ask about"):
+        order_notes(lander, "MountainCarContinuous-v0")
