@@ -144,6 +144,12 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
         InputError: If there are more or fewer, or their names are of other things.
     """
     own = names_of(demonstrations)
+    there, wanted = len(own.features), len(description.feature_names)
+    if there != wanted:
+        raise InputError(
+            f"the demonstrations have {there} feature{'' if there == 1 else 's'} and "
+            f"{description.env_id} has {wanted}; choose the environment that they are from"
+        )
     first = Named("the demonstrations", own.features, demonstrations.env_id)
     second = Named(description.env_id, description.feature_names, description.env_id)
     features = line_up(first, second)
