@@ -55,8 +55,12 @@ class Parts(NamedTuple):
 
 def chosen() -> Choice:
     """What is in force (URL: holdout, holdout_seed, left_out)."""
-    seed = url_text("holdout_seed", "0", lambda text: text.isdecimal() and int(text) <= MOST_SEED)
+    seed = url_text("holdout_seed", "0", _is_seed)
     return Choice(float(url_choice("holdout", SHARES, NOTHING)), int(seed), _left_out())
+
+
+def _is_seed(text: str) -> bool:
+    return text.isdecimal() and text.isascii() and len(text) < 10 and int(text) <= MOST_SEED
 
 
 def _left_out() -> tuple[int, ...]:

@@ -14,6 +14,7 @@ for folder in (Path(__file__).parents[1], Path(__file__).parent):
 
 import _state as state  # noqa: E402  # found by the lines above
 from _sidebar import sidebar  # noqa: E402
+from _url import absurd_parameters, say_left_out, show_left_out, without  # noqa: E402
 
 st.set_page_config(
     page_title="SARL Explorer",
@@ -113,6 +114,11 @@ GUESSED = st.Page(
 page = st.navigation([*PAGES, GUESSED], expanded=True)
 if page == GUESSED:
     st.switch_page(PAGES[0], query_params=st.query_params.to_dict())
+if absurd := absurd_parameters():
+    # Widgets take their values from the address before anything here could mend them.
+    say_left_out(absurd, page.title)
+    st.switch_page(page, query_params=without(absurd))
+show_left_out(page.title)
 sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()
 state.settle(page.title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 
 import _state as state
@@ -18,6 +19,7 @@ from sarl_core.demonstrations.formats import (
 )
 from sarl_core.errors import InputError, SarlError
 
+_LOGGER = logging.getLogger(__name__)
 ENVIRONMENTS = tuple(env_id for _, env_id in state.SHIPPED.values())
 
 
@@ -52,6 +54,15 @@ def read_upload(columns: ColumnMap | None = None) -> None:
             )
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
+        return
+    except Exception as error:  # whatever a reader did not foresee, what was chosen before stays
+        _LOGGER.exception("An upload could not be read")
+        st.session_state["_upload_error"] = str(
+            InputError(
+                f"{files[0][1]}: it cannot be read, and this program does not know why "
+                f"({type(error).__name__}); save it again in another format"
+            )
+        )
         return
     state.set_upload(demonstrations, file_name=", ".join(name for _, name in files))
     st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
@@ -161,5 +172,5 @@ def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
     """Columns of an uploaded table, () where it has none that can be read."""
     try:
         return table_columns(content, name)
-    except SarlError:
+    except Exception:  # `read_upload` has said why
         return ()

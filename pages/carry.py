@@ -202,7 +202,7 @@ def export(demonstrations: Demonstrations) -> None:
         with left:
             rules, digest = chosen_rules()
         with middle:
-            form = st.pills(
+            chosen = st.pills(
                 "Format",
                 list(FORMATS),
                 default="JSON",
@@ -211,6 +211,7 @@ def export(demonstrations: Demonstrations) -> None:
                 required=True,
                 wrap=True,  # else the last ones are cut off on a telephone
             )
+            form = chosen or "JSON"  # a link may end in "format="
             projection: Projection = PROJECTIONS[0]
             if rules.actions[0].is_interval and form in ("Python", "C", "ONNX"):
                 projection = projection_choice()

@@ -138,7 +138,7 @@ def show_rules(found: Disagreement, digests: tuple[str, str, str]) -> None:
         required=True,
         label_visibility="collapsed",
     )
-    frame = rules_frame(digests, KINDS if view == EVERY else (str(view),), found)
+    frame = rules_frame(digests, KINDS if view in (None, EVERY) else (str(view),), found)
     column = st.column_config
     action, action_width = action_column(found.first.actions, "What the rule says")
     st.dataframe(

@@ -212,3 +212,22 @@ def test_a_set_survives_the_change_of_page(tmp_path_factory: pytest.TempPathFact
     assert not app.exception
     app.switch_page("demonstrations.py").run()
     assert metrics(app)["Steps"] == "3"
+
+
+def test_whatever_reading_raises_nothing_that_was_chosen_is_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = upload(open_page("demonstrations", data="pendulum"), ("mine.csv", csv_bytes(*ROWS)))
+    for error in (MemoryError(), ZeroDivisionError("\x00" * 999)):
+
+        def fail(*given: object, error: Exception = error, **named: object) -> None:
+            raise error
+
+        monkeypatch.setattr("sarl_core.demonstrations.formats.registry._read", fail)
+        monkeypatch.setattr("sarl_core.demonstrations.formats.registry._check_signature", fail)
+        app = upload(app, ("other.csv", csv_bytes(*ROWS)))
+        assert not app.exception
+        (told,) = errors(app)
+        assert told.startswith("other.csv: it cannot be read")
+        assert type(error).__name__ in told
+        assert metrics(app)["Steps"] == "5"
