@@ -56,7 +56,7 @@ def cached(*, show_spinner: str = "") -> Callable[[Callable[P, R]], Callable[P, 
                     if found is None:
                         with _telling(show_spinner):
                             found = (function(*args, **kwargs),)
-                        RESULTS.put(key, found, owner=_owner())
+                        RESULTS.put(key, found, owner=owner())
                 _making.pop(key, None)
             return cast(tuple[R], found)[0]
 
@@ -123,7 +123,7 @@ def visit() -> Visit:
     return begun
 
 
-def _owner() -> str:
+def owner() -> str:
     """Digest of the upload that the page works on, "" where it works on none."""
     upload = st.session_state.get("_upload")
     chosen = st.session_state.get("_data")

@@ -69,10 +69,10 @@ class Mining(Job):
         key: Of what it depends on.
     """
 
-    def __init__(self, key: object, work: Work[Any]) -> None:
-        self.key, self._todo = key, work
+    def __init__(self, key: object, work: Work[Any], keep: Callable[[Any], None]) -> None:
+        self.key, self._todo, self._keep = key, work, keep
         # Streamlit's caches are asked here: the work's own thread has no session.
-        self._pool, self._kept = _processes(), _results()
+        self._pool = _processes()
         super().__init__(self._mine, 1)
 
     def _mine(self, _: Job) -> None:
@@ -82,7 +82,7 @@ class Mining(Job):
             return self.wanted()
 
         try:
-            self._kept.put(self.key, self._todo(self._pool.get(), progress))
+            self._keep(self._todo(self._pool.get(), progress))
         except CancelledError:
             return
         except WorkError:
@@ -101,7 +101,8 @@ def _at_work(place: str) -> bool:
 
 
 def _start(place: str, key: object, work: Work[Any]) -> None:
-    st.session_state[f"_job_{place}"] = Mining(key, work)
+    kept = _results()
+    st.session_state[f"_job_{place}"] = Mining(key, work, lambda found: kept.put(key, found))
 
 
 def worked_out(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _compact
+import _elsewhere
 import _hold_out
 import _state as state
 import streamlit as st
@@ -17,7 +18,9 @@ from _evidence_view import (
 from _words import in_full
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.cross_fit_words import influence_sentences
 from sarl_core.explaining.language import counted
+from sarl_core.explaining.prose import note
 
 ENOUGH, CURVE, STABILITY = "Enough demonstrations?", "Learning curve", "Stability"
 CONTRADICTIONS, LEFT_OUT = "Contradictions", "Leave episodes out"
@@ -97,6 +100,11 @@ if not evidence.rule_set.rules:
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
 else:
     show_overview(evidence)
+    _elsewhere.told(
+        evidence.thresholds,
+        evidence.rule_set.fidelity,
+        lambda judged: "".join(map(note, influence_sentences(judged))),
+    )
 enough, curve, stability, contradictions, left_out = st.tabs(
     [ENOUGH, CURVE, STABILITY, CONTRADICTIONS, LEFT_OUT],
     key="about",
@@ -122,3 +130,4 @@ elif left_out.open:
 elif evidence.rule_set.rules:
     with enough:
         show_enough(evidence)
+_elsewhere.make_ready()

@@ -8,6 +8,7 @@ from typing import Any
 
 import _compact
 import _edits
+import _elsewhere
 import _state as state
 import streamlit as st
 from _cache import cached
@@ -263,4 +264,6 @@ with st.spinner("Mining the rules …"):
 if not in_force.rules:
     nothing_in_force()
 else:
+    _elsewhere.told(thresholds, in_force.fidelity)
     search_and_rules(in_force)
+_elsewhere.make_ready()

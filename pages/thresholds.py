@@ -7,7 +7,10 @@ it in a place of its own, since every further fragment would cost a run of its o
 
 from __future__ import annotations
 
+from typing import Any
+
 import _compact
+import _elsewhere
 import _state as state
 import streamlit as st
 from _divider_view import show_divider
@@ -31,6 +34,7 @@ from _threshold_view import (
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining import threshold_figures as figures
+from sarl_core.explaining.cross_fit_words import elsewhere_text
 from sarl_core.explaining.language import share_text, threshold_text
 from sarl_core.explaining.steps import (
     CONFIDENCE_STEPS,
@@ -40,6 +44,8 @@ from sarl_core.explaining.steps import (
     neat_jumps,
     with_step,
 )
+from sarl_core.mining.cross_fitting import Judged
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 
@@ -169,7 +175,10 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
     point = (
         here(grown, thresholds, dimension) if compact is None else compact_point(compact, dimension)
     )
-    metrics(point)
+    other = _elsewhere.judged(thresholds) if dimension is None else None
+    metrics(point, other)
+    if dimension is None:
+        _elsewhere.told(thresholds, float(point.fidelity[0, 0]))
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
     if compact is not None:
@@ -206,8 +215,16 @@ def named_settings(thresholds: Thresholds) -> None:
             )
 
 
-def metrics(point: Landscape) -> None:
-    """The four numbers of the rule set in force."""
+def elsewhere(found: HeldOut | None) -> dict[str, Any]:
+    """A number in episodes that the rules were not mined from, to stand under the other."""
+    if found is None:
+        return {}
+    told = f"elsewhere {elsewhere_text(found)}"
+    return {"delta": told, "delta_color": "off", "delta_arrow": "off"}
+
+
+def metrics(point: Landscape, other: Judged | None) -> None:
+    """The four numbers of the rule set in force, and what two of them are in other episodes."""
     rules = int(point.rule_count[0, 0])
     with st.container(horizontal=True, key="metrics"):
         st.metric("Rules", f"{rules:,}")
@@ -219,12 +236,16 @@ def metrics(point: Landscape) -> None:
         st.metric(
             "Coverage",
             share_text(float(point.coverage[0, 0]), decimals=1),
-            help="Share of the demonstrated states in which some rule applies",
+            help="Share of the demonstrated states in which some rule applies; elsewhere: of the "
+            "states of an episode that the rules were not mined from, on average",
+            **elsewhere(other and other.coverage),
         )
         st.metric(
             "Fidelity",
             share_text(float(point.fidelity[0, 0]), decimals=1),
-            help="Share of those in which the expert did what the rule says",
+            help="Share of those in which the expert did what the rule says; elsewhere: in an "
+            "episode that the rules were not mined from, on average",
+            **elsewhere(other and other.fidelity),
         )
         if point.held_out_fidelity is not None:
             st.metric(
@@ -353,3 +374,4 @@ with top:
 st.page_link(
     "rules.py", label="All rules, with the evidence behind each", icon=":material/arrow_forward:"
 )
+_elsewhere.make_ready()

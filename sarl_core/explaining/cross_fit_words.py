@@ -30,22 +30,25 @@ def judged_sentence(judged: Judged) -> str:
         judged: Cross-fitted, or held out.
 
     Returns:
-        As "In 62 episodes that they were not mined from, the rules are right in 95 % of their
-        states on average (between 92 and 98 % is what that can tell), and 29 % of the states of an
-        episode have a rule (26 to 32 %)."
+        As "Where each of 62 episodes is judged by rules mined without it, they are right in 95 % of
+        their states on average (between 92 and 98 % is what that can tell), and 29 % of the states
+        of an episode have a rule (26 to 32 %)."
     """
     fidelity, coverage = judged.fidelity, judged.coverage
-    where = (
-        f"In {counted(len(judged.numbers), 'episode')}"
-        if judged.whole_episodes
-        else f"There is one episode only. In {len(judged.numbers)} stretches of it"
-    )
-    share = share_text(coverage.share or 0.0)
-    reach = "" if coverage.interval is None else f" ({range_text(coverage.interval)})"
-    one = "an episode" if judged.whole_episodes else "one"
-    covered = f"{share} of the states of {one} have a rule{reach}"
+    count = len(judged.numbers)
+    if not judged.folds:
+        where = f"In {counted(count, 'episode')} that they were not mined from, the rules"
+    elif judged.whole_episodes:
+        where = (
+            f"Where each of {counted(count, 'episode')} is judged by rules mined without it, they"
+        )
+    else:
+        where = (
+            f"There is one episode only. Where each of {count} stretches of it is judged by rules "
+            "mined without it, they"
+        )
     if fidelity.share is None:
-        return f"{where} that they were not mined from, no state has a rule."
+        return f"{where} apply in no state."
     told = share_text(fidelity.share)
     if fidelity.interval is not None:
         low, high = (share_text(end) for end in fidelity.interval)
@@ -57,7 +60,12 @@ def judged_sentence(judged: Judged) -> str:
         told += " of their states on average"
         if judged.whole_episodes:
             told += " (too few episodes to say more)"
-    return f"{where} that they were not mined from, the rules are right in {told}, and {covered}."
+    reach = "" if coverage.interval is None else f" ({range_text(coverage.interval)})"
+    one = "an episode" if judged.whole_episodes else "one"
+    return (
+        f"{where} are right in {told}, and {share_text(coverage.share or 0.0)} of the states of "
+        f"{one} have a rule{reach}."
+    )
 
 
 def parting_text(mined: float, judged: Judged) -> str:

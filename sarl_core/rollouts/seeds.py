@@ -22,6 +22,7 @@ first seed            what its episodes are for
 `SECOND_VALIDATION`   the best point of its refinement is chosen by them
 `REFINEMENT`          the search of its refinement
 `REPORT`              what came of it is reported on them
+`POOLED`              the benchmark of intervals draws its demonstrations from these
 ====================  =====================================================================
 
 `aggregate --seed s` begins s times `SEEDS_A_RUN` further on, whatever the purpose. Within one run
@@ -66,6 +67,7 @@ VALIDATION = 30_000_000
 SECOND_VALIDATION = 30_500_000
 REFINEMENT = 40_000_000
 REPORT = 50_000_000
+POOLED = 60_000_000
 
 SEEDS_A_RUN = 1_000_000  # between two values of the seed of `aggregate`
 SEEDS_A_ROUND = 10_000

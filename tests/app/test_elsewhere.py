@@ -1,0 +1,99 @@
+"""What rules are worth in episodes that they were not mined from, made while nobody waits."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import Demonstrations, load_demonstrations
+from sarl_core.explaining.cross_fit_words import elsewhere_text, judged_sentence
+from sarl_core.mining.cross_fitting import Judged, cross_fit
+from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+from tests.app.screens import ROUTER, html, metrics, open_page
+
+CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
+
+
+def expected(thresholds: Thresholds) -> Judged:
+    return cross_fit(load_demonstrations(CART)).at(thresholds)
+
+
+def until(app: AppTest, words: str) -> None:
+    """Look again until work beside the page has come to an end."""
+    for _ in range(600):
+        app.run()
+        assert not app.exception, app.exception
+        if words in html(app):
+            return
+        time.sleep(0.2)
+    raise AssertionError(html(app))
+
+
+def deltas(app: AppTest) -> dict[str, str]:
+    return {metric.label: metric.delta for metric in app.metric if metric.delta}
+
+
+def test_the_numbers_of_other_episodes_stand_beside_those_mined_from() -> None:
+    app = open_page("thresholds", data="cartpole")
+    until(app, judged_sentence(expected(FILTERED)))
+    found = expected(FILTERED)
+    assert deltas(app) == {
+        "Coverage": f"elsewhere {elsewhere_text(found.coverage)}",
+        "Fidelity": f"elsewhere {elsewhere_text(found.fidelity)}",
+    }
+    assert not app.warning
+    # Other thresholds need no other trees: it is there at once, with a warning where they part.
+    app.button(key="unfiltered").click().run()
+    found = expected(UNFILTERED)
+    assert deltas(app)["Fidelity"] == f"elsewhere {elsewhere_text(found.fidelity)}"
+    assert metrics(app)["Fidelity"] == "100 %"
+    assert "believe the second number" in app.warning[0].value
+    for page in ("rules", "evidence"):
+        app.switch_page(f"{page}.py").run()
+        assert judged_sentence(found) in html(app)
+        assert "believe the second number" in app.warning[0].value
+
+
+@pytest.mark.parametrize("episodes", [12, 1])
+def test_random_labels_end_with_a_warning(episodes: int) -> None:
+    rng = np.random.default_rng(0)
+    noise = Demonstrations(
+        rng.normal(size=(3_000, 2)).astype(np.float32),
+        rng.integers(0, 2, 3_000),
+        np.arange(3_000) * episodes // 3_000,
+    )
+    app = AppTest.from_file(ROUTER, default_timeout=120)
+    app.session_state["_upload"] = noise
+    for key, value in {"data": "upload", "support": "0", "confidence": "1"}.items():
+        app.query_params[key] = value
+    app.run()
+    app.switch_page("thresholds.py").run()
+    until(app, "mined without it, they are right in")
+    assert metrics(app)["Fidelity"] == "100 %"
+    assert "Part of what they say is chance" in app.warning[0].value
+    found = cross_fit(noise).at(UNFILTERED)
+    assert found.fidelity.share == pytest.approx(0.5, abs=0.05)
+    assert judged_sentence(found) in html(app)
+
+
+def test_compact_rules_are_not_mined_again() -> None:
+    app = open_page("thresholds", data="cartpole")
+    app.button(key="compact").click().run()
+    assert not deltas(app)
+    assert "mined without it" not in html(app)
+
+
+def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    app = open_page("thresholds", data="pendulum")
+    module = sys.modules["_elsewhere"]
+    monkeypatch.setattr(module, "UNASKED", 1_000)
+    monkeypatch.setattr(module, "RESULTS", type(module.RESULTS)(None))
+    app = open_page("thresholds", data="pendulum")
+    app.button(key="elsewhere").click().run()
+    until(app, "mined without it, they are right in")
+    assert not [button for button in app.button if button.key == "elsewhere"]
