@@ -36,6 +36,7 @@ ROWS = {
     "recorder": "pages.recorder",
     "ablation": "rollouts.ablation",
     "import": "startup.imports",
+    "intervals": "evidence.intervals",
 }
 
 

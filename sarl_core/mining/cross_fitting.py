@@ -138,7 +138,7 @@ class Judged:
         # 1 + K / (K - 1) times as much as that of as many independent numbers (Nadeau and Bengio,
         # "Inference for the generalization error", 2003).
         widened = (1.0 + self.folds / (self.folds - 1)) ** 0.5 if self.folds > 1 else 1.0
-        found = held_out_of(whole, part, widened=widened)
+        found = held_out_of(whole, part, whole_set=True, widened=widened)
         return found if self.whole_episodes else found._replace(low=None, high=None)
 
     @property

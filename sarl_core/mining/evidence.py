@@ -95,18 +95,25 @@ class EpisodeSums(NamedTuple):
         with np.errstate(invalid="ignore"):
             return np.asarray(self.total / self.episodes)
 
-    def bounds(self, *, widened: float = 1.0) -> tuple[Floats, Floats]:
+    def bounds(self, *, whole_set: bool = False, widened: float = 1.0) -> tuple[Floats, Floats]:
         """The 95 % t interval of the mean, with one pseudo-episode at 0.5.
 
+        A single rule may be right in ten episodes and wrong in the eleventh, of a kind not met so
+        far; the pseudo-episode stands for that one. A whole set meets every kind in nearly every
+        episode, and one pseudo-episode would say less than the E episodes there are: for it, it
+        counts 1 / E of one.
+
         Args:
+            whole_set: Whether it is a rule set and no single rule.
             widened: How many times wider, where the shares depend on one another.
 
         Returns:
             Lower and upper ends within 0 and 1; NaN with fewer than `FEWEST_EPISODES`.
         """
-        n = np.asarray(self.episodes + 1.0)
-        mean = np.asarray((self.total + _PSEUDO) / n)
-        spread: Floats = np.maximum(self.squares + _PSEUDO**2 - n * mean**2, 0.0)
+        weight = 1.0 / np.maximum(self.episodes, 1) if whole_set else np.ones(self.total.shape)
+        n: Floats = self.episodes + weight
+        mean: Floats = (self.total + weight * _PSEUDO) / n
+        spread: Floats = np.maximum(self.squares + weight * _PSEUDO**2 - n * mean**2, 0.0)
         reach = widened * t_reach(n, spread)
         enough = self.episodes >= FEWEST_EPISODES
         low = np.where(enough, np.clip(mean - reach, 0.0, 1.0), np.nan)
@@ -131,13 +138,16 @@ def t_reach(n: Floats, spread: Floats) -> Floats:
     return np.where(n > 1.0, reach, np.inf)
 
 
-def held_out_of(samples: ArrayLike, correct: ArrayLike, *, widened: float = 1.0) -> HeldOut:
+def held_out_of(
+    samples: ArrayLike, correct: ArrayLike, *, whole_set: bool = False, widened: float = 1.0
+) -> HeldOut:
     """Count one thing by episodes.
 
     Args:
         samples: Pairs that count in each episode, (E,); where there are none, it does not count.
         correct: Those of them that are right, (E,).
-        widened: As of `EpisodeSums.bounds`.
+        whole_set: Whether it is a rule set and no single rule, for `EpisodeSums.bounds`.
+        widened: Likewise.
 
     Returns:
         The mean over the episodes with its interval.
@@ -147,24 +157,32 @@ def held_out_of(samples: ArrayLike, correct: ArrayLike, *, widened: float = 1.0)
     sums = EpisodeSums(
         np.array([len(shares)]), np.array([shares.sum()]), np.array([np.square(shares).sum()])
     )
-    return held_outs([int(pairs.sum())], [int(right.sum())], sums, widened=widened)[0]
+    return _held_outs(
+        [int(pairs.sum())],
+        [int(right.sum())],
+        sums,
+        sums.bounds(whole_set=whole_set, widened=widened),
+    )[0]
 
 
-def held_outs(
-    samples: list[int], correct: list[int], sums: EpisodeSums, *, widened: float = 1.0
-) -> list[HeldOut]:
-    """Count many things by episodes.
+def held_outs(samples: list[int], correct: list[int], sums: EpisodeSums) -> list[HeldOut]:
+    """Count many rules by episodes.
 
     Args:
         samples: Pairs that count for each, R numbers.
         correct: Those of them that are right.
         sums: Over the episodes of each, (R,).
-        widened: As of `EpisodeSums.bounds`.
 
     Returns:
         One entry each.
     """
-    low, high = sums.bounds(widened=widened)
+    return _held_outs(samples, correct, sums, sums.bounds())
+
+
+def _held_outs(
+    samples: list[int], correct: list[int], sums: EpisodeSums, bounds: tuple[Floats, Floats]
+) -> list[HeldOut]:
+    low, high = bounds
     return [
         HeldOut(
             all_pairs,

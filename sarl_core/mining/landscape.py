@@ -299,7 +299,7 @@ def _layers(
     rules, length, covered, correct = sums
     with np.errstate(invalid="ignore"):
         fidelity = correct / covered
-    low, high = (None, None) if tried is None else tried.bounds()
+    low, high = (None, None) if tried is None else tried.bounds(whole_set=True)
     return Landscape(
         supports=supports,
         confidences=confidences,

@@ -17,12 +17,12 @@ first seed            what its episodes are for
 `REPRODUCED`          figures of the paper (`reproduce`), `SEEDS_A_REPLICATE` for each recording
 `RELEVANCE`           steps at which learners are tested for the paper's Figure 4,
                       `SEEDS_A_LEARNER` for each
+`POOLED`              the benchmark of intervals draws its demonstrations from these
 `ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
 `VALIDATION`          the best of its rounds is chosen by them
 `SECOND_VALIDATION`   the best point of its refinement is chosen by them
 `REFINEMENT`          the search of its refinement
 `REPORT`              what came of it is reported on them
-`POOLED`              the benchmark of intervals draws its demonstrations from these
 ====================  =====================================================================
 
 `aggregate --seed s` begins s times `SEEDS_A_RUN` further on, whatever the purpose. Within one run
@@ -61,13 +61,13 @@ TRIAL = 9_000_000
 RECORDED = 10_000_000
 REPRODUCED = 12_000_000
 RELEVANCE = 14_000_000
+POOLED = 19_000_000
 
 ROUNDS = 20_000_000
 VALIDATION = 30_000_000
 SECOND_VALIDATION = 30_500_000
 REFINEMENT = 40_000_000
 REPORT = 50_000_000
-POOLED = 60_000_000
 
 SEEDS_A_RUN = 1_000_000  # between two values of the seed of `aggregate`
 SEEDS_A_ROUND = 10_000
@@ -78,7 +78,7 @@ SEEDS_A_LEARNER = 100_000
 MOST_EPISODES_A_ROUND = SEEDS_A_ROUND
 MOST_ROUNDS = (VALIDATION - ROUNDS) // SEEDS_A_ROUND
 MOST_VALIDATION = SECOND_VALIDATION - VALIDATION
-MOST_LEARNERS = (ROUNDS - RELEVANCE) // SEEDS_A_LEARNER
+MOST_LEARNERS = (POOLED - RELEVANCE) // SEEDS_A_LEARNER
 
 RANGES: Mapping[str, range] = {
     "DEMONSTRATED": range(DEMONSTRATED, FRESH),
@@ -89,7 +89,8 @@ RANGES: Mapping[str, range] = {
     "TRIAL": range(TRIAL, RECORDED),
     "RECORDED": range(RECORDED, REPRODUCED),
     "REPRODUCED": range(REPRODUCED, RELEVANCE),
-    "RELEVANCE": range(RELEVANCE, ROUNDS),
+    "RELEVANCE": range(RELEVANCE, POOLED),
+    "POOLED": range(POOLED, ROUNDS),
     "ROUNDS": range(ROUNDS, VALIDATION),
     "VALIDATION": range(VALIDATION, SECOND_VALIDATION),
     "SECOND_VALIDATION": range(SECOND_VALIDATION, SECOND_VALIDATION + MOST_VALIDATION),

@@ -48,12 +48,14 @@ def rule_of(samples, correct, shares=None):
     return Rule("0.1", 0, (), 0, 0.1, correct / samples, 1.0, samples, held_out=held)
 
 
-def t_interval(shares):
-    """Of shares and one pseudo-episode at 0.5."""
-    values = np.append(shares, 0.5)
-    reach = stats.t.ppf(0.975, len(values) - 1) * stats.sem(values)
-    low, high = values.mean() - reach, values.mean() + reach
-    return max(low, 0.0), min(high, 1.0)
+def t_interval(shares, weight=1.0):
+    """Of shares and one pseudo-episode at 0.5, which counts so much."""
+    values, weights = np.append(shares, 0.5), np.append(np.ones(len(shares)), weight)
+    n = weights.sum()
+    mean = (weights * values).sum() / n
+    variance = (weights * (values - mean) ** 2).sum() / (n - 1)
+    reach = stats.t.ppf(0.975, n - 1) * (variance / n) ** 0.5
+    return max(mean - reach, 0.0), min(mean + reach, 1.0)
 
 
 # --- the split ------------------------------------------------------------------------------------
@@ -338,7 +340,8 @@ def test_the_landscapes_layer_is_what_mining_every_cell_counts(demonstrations, l
             found = landscape.held_out_fidelity[i, j]
             assert found == pytest.approx(np.mean(shares)) if shares else np.isnan(found)
             ends = landscape.held_out_low[i, j], landscape.held_out_high[i, j]
-            expected = t_interval(shares) if len(shares) >= 5 else (np.nan, np.nan)
+            few = len(shares) < 5
+            expected = (np.nan, np.nan) if few else t_interval(shares, 1 / len(shares))
             assert ends == pytest.approx(expected, nan_ok=True, abs=1e-9)
 
 
