@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from typing import Any, TypeVar
 
 from sarl_core.errors import WorkError
-from sarl_core.mining.progress import Progress, report
+from sarl_core.mining.progress import CancelledError, Progress, report
 
 _AHEAD = 8  # pieces on their way at once: each carries its demonstrations along
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it
@@ -51,7 +51,7 @@ def run_each(
         while waiting or running:
             while waiting and len(running) < _AHEAD:
                 place, task = waiting.pop()
-                running[executor.submit(work, *task)] = place
+                running[_submitted(executor, work, task)] = place
             ready, _ = wait(running, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
             for future in ready:
                 found[running.pop(future)] = future.result()
@@ -64,3 +64,15 @@ def run_each(
         for future in running:
             future.cancel()
     return [found[place] for place in range(len(tasks))]
+
+
+def _submitted(
+    executor: Executor, work: Callable[..., Result], task: tuple[Any, ...]
+) -> Future[Result]:
+    try:
+        return executor.submit(work, *task)
+    except BrokenExecutor:
+        raise
+    except RuntimeError as error:
+        # The program has come to its end, and takes no more work.
+        raise CancelledError("stopped, because the program ends; nothing was kept") from error

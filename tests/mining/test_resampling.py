@@ -208,3 +208,12 @@ def test_settings_out_of_range_are_refused(lander_like):
         rule_stability(rules, lander_like, limit=0.0)
     with pytest.raises(InputError, match="at least one order and two points"):
         learning_curve(lander_like, THRESHOLDS, points=1)
+
+
+def test_processes_that_take_no_more_work_end_it_quietly(steps_of_two):
+    from concurrent.futures import ThreadPoolExecutor
+
+    closed = ThreadPoolExecutor(1)
+    closed.shutdown()
+    with pytest.raises(CancelledError, match="the program ends"):
+        learning_curve(steps_of_two, THRESHOLDS, executor=closed)
