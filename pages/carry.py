@@ -145,8 +145,9 @@ def show_file(prepared: Prepared, key: str, form: str, projection: Projection, n
         kind = "int64" if not prepared.rule_set.actions[0].is_interval else "float32"
         st.markdown(
             f"Inputs: `state` (B, {len(prepared.rule_set.source.features)}) float32 and `proposed` "
-            f"(B, {len(prepared.rule_set.actions)}) {kind}. Outputs: `executed`, alike, and `rule` "
-            "int64, the index of the rule in force or -1."
+            f"(B, {len(prepared.rule_set.actions)}) {kind}. Outputs: `executed`, alike, `rule` "
+            "int64, the index of the rule in force or -1, and `invalid` (B, 1), whether the state "
+            "or the action is none that the rules can be asked about."
         )
         return
     lines = content.decode().splitlines()

@@ -37,9 +37,8 @@ _HEAD = """\
  *
  *   It returns 1 if an action was changed, 0 if not. An action that breaks no rule is
  *   passed on as it is. It keeps nothing between calls and may run in several threads.
- *
- *   Where a number of the state is not finite, or an action is {none}, it
- *   returns SHIELD_INVALID, and no rule is in force: {invalid}.
+ *   Where a number of the state {none}, it returns
+ *   SHIELD_INVALID, and no rule is in force: {invalid}.
  *
  * Made by `python -m sarl_core export`: {rules}{projection}.
  * The rules were learned from examples and guarantee nothing.
@@ -58,8 +57,8 @@ _HEAD = """\
 
 
 _INVALID: dict[OnInvalid, str] = {
-    "raise": "nothing\n *   is written to executed, and nothing should be done (on_invalid: raise)",
-    "pass": "the\n *   action is passed on as it is, unchecked (on_invalid: pass)",
+    "raise": "nothing is written to executed, and\n *   nothing should be done (on_invalid: raise)",
+    "pass": "the action is passed on as it is, unchecked\n *   (on_invalid: pass)",
 }
 
 
@@ -134,7 +133,9 @@ def _head(program: Program) -> str:
         signature=f" *   {signature};",
         features=counted(len(rule_set.source.features), "number"),
         actions=counted(len(program.orders), "number"),
-        none="not, either" if program.continuous else "none that there is",
+        none="or of the action is not finite"
+        if program.continuous
+        else "is not finite, or an action none that there is",
         invalid=_INVALID[program.on_invalid],
         rules=f"{counted(len(rule_set), 'rule')} for "
         f"{comment(rule_set.source.env_id) or 'an unnamed environment'}",
@@ -313,14 +314,15 @@ def _valid(program: Program) -> str:
     table = []
     asked = "!isfinite(proposed[i])"
     if not program.continuous:
-        asked = "proposed[i] < shield_label[i].first || proposed[i] > shield_label[i].last"
+        asked = "proposed[i] < shield_first[i] || proposed[i] > shield_last[i]"
+        first, last = (
+            ", ".join(f"INT64_C({end})" for end in ends)
+            for ends in zip(*program.labels, strict=True)
+        )
         table = [
             "/* The actions there are. */",
-            "static const struct {",
-            "    int64_t first, last;",
-            "} shield_label[SHIELD_ACTIONS] = {",
-            *(f"    {{INT64_C({first}), INT64_C({last})}}," for first, last in program.labels),
-            "};",
+            f"static const int64_t shield_first[SHIELD_ACTIONS] = {{{first}}};",
+            f"static const int64_t shield_last[SHIELD_ACTIONS] = {{{last}}};",
             "",
         ]
     return "\n".join(
@@ -354,17 +356,15 @@ def _decide(program: Program) -> str:
         )
     else:
         keeps, becomes = "shield_keeps(rule[i], proposed[i])", "shield_rule[rule[i]].value"
-    passes = ["            executed[i] = proposed[i];"] if program.on_invalid == "pass" else []
+    passes = program.on_invalid == "pass"
     return "\n".join(
         [
             _SIGNATURE.format(kind=_kind(program)),
             "{",
             "    int changed = 0;",
             "    if (!shield_is_valid(state, proposed)) {",
-            "        for (int i = 0; i < SHIELD_ACTIONS; i++) {",
-            *passes,
-            "            rule[i] = -1;",
-            "        }",
+            "        for (int i = 0; i < SHIELD_ACTIONS; i++)",
+            f"            rule[i] = -1{', executed[i] = proposed[i]' if passes else ''};",
             "        return SHIELD_INVALID;",
             "    }",
             *calls,
