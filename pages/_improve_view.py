@@ -376,8 +376,25 @@ def card_sentence(card: dict[str, Any]) -> str:
     return (
         f"A novice that acts at random, kept to these {size}, reached a mean return of "
         f"**{float(reported['mean']):,.1f}** over {int(reported['episodes']):,} fresh episodes "
-        f"(deviation {float(reported['std']):,.1f}, least {float(reported['min']):,.1f}). {origin}"
+        f"(deviation {float(reported['std']):,.1f}, least {float(reported['min']):,.1f})"
+        f"{_failures_of_card(reported)}. {origin}{_policy_of_card(reported)}"
     )
+
+
+def _failures_of_card(reported: dict[str, Any]) -> str:
+    """How many of a card's episodes failed; nothing where it does not say."""
+    if "failures" not in reported:
+        return ""
+    low, high = (share_text(float(reported[f"failure_{end}"])) for end in ("low", "high"))
+    return f"; {int(reported['failures']):,} of them failed (95 % interval {low} to {high})"
+
+
+def _policy_of_card(reported: dict[str, Any]) -> str:
+    """That a card's rules are a policy, where they leave nothing to choose from."""
+    if reported.get("freedom") != 0:
+        return ""
+    changed = share_text(float(reported["intervention_rate"]))
+    return f" {POLICY_TEXT}: they changed {changed} of the novice's steps."
 
 
 def show_budgets() -> None:

@@ -30,7 +30,7 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
         of 0 % of its episodes end in a crash: these rules harm it."
     """
     found = shield_effect(alone, shielded)
-    before, after = (f"{episodes.statistics.iqm:,.0f}" for episodes in (alone, shielded))
+    before, after = (_whole(episodes.statistics.iqm) for episodes in (alone, shielded))
     mean = found.returns.mean
     if not _told(found):
         change = (
@@ -94,7 +94,7 @@ def _whole(number: float) -> str:
 def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     """The same of one more shield, in a few words."""
     found = shield_effect(alone, shielded)
-    after = f"{shielded.statistics.iqm:,.0f}"
+    after = _whole(shielded.statistics.iqm)
     notes = [_difference(found, alone, shielded)]
     if alone.failures is not None and shielded.failures is not None:
         rates = [alone.failures.rate, shielded.failures.rate]

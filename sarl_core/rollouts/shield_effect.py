@@ -10,8 +10,8 @@ import numpy as np
 
 from sarl_core.errors import InputError
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.paired import holm, sign_flip_test
-from sarl_core.rollouts.statistics import MeanInterval, mean_interval
+from sarl_core.rollouts.paired import holm, sign_flip_interval, sign_flip_test
+from sarl_core.rollouts.statistics import MeanInterval
 
 ERROR_RATE = 0.05  # of both tests of one comparison together
 _TESTS = 2
@@ -26,7 +26,7 @@ class ShieldEffect:
     Attributes:
         episodes: How many pairs, E.
         returns: Return with the shield less the return without it, mean over the pairs, and
-            Student's 95 % interval of that mean.
+            the 95 % interval of that mean by the same test (`sign_flip_interval`).
         failures: The same of failures, as a share of the episodes; None where it is not known
             which ends are some.
         fell: Episodes that fail with the shield and not without it; None likewise.
@@ -89,8 +89,8 @@ def shield_effect(alone: Episodes, shielded: Episodes) -> ShieldEffect:
         harm = -float(gained.sum())
     return ShieldEffect(
         episodes=len(alone),
-        returns=mean_interval(gained),
-        failures=mean_interval(worse) if known else None,
+        returns=sign_flip_interval(gained),
+        failures=sign_flip_interval(worse) if known else None,
         fell=int((worse > 0).sum()) if known else None,
         spared=int((worse < 0).sum()) if known else None,
         return_p=return_p,

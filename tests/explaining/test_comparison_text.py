@@ -28,7 +28,7 @@ def test_a_rise_a_fall_and_neither(alone: Episodes) -> None:
     better, like = with_returns(alone, [500.0] * 8, 0), with_returns(alone, LIKE, 8)
     assert verdict("novice", "the filtered rules", alone, better) == (
         "With the filtered rules the typical return of the novice rises from 22 to 500 (its mean "
-        "from 22 to 500, a difference of 478, 95 % interval 478 to 479), and 0 % instead of 100 % "
+        "from 22 to 500, a difference of 478, 95 % interval 477 to 480), and 0 % instead of 100 % "
         "of its episodes end in a crash."
     )
     fall = verdict("expert", "the rules", better, alone)

@@ -8,6 +8,7 @@ from scipy.stats import binomtest
 
 from sarl_core.errors import InputError
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.paired import sign_flip_interval, sign_flip_test
 from sarl_core.rollouts.shield_effect import shield_effect
 from sarl_core.rollouts.statistics import rate_of
 
@@ -59,3 +60,22 @@ def test_the_interval_of_a_rate_is_clopper_and_pearsons(count, of):
     exact = binomtest(count, of).proportion_ci(method="exact")
     assert (found.count, found.of, found.rate) == (count, of, count / of)
     assert (found.low, found.high) == pytest.approx((exact.low, exact.high))
+
+
+def test_the_interval_leaves_out_zero_exactly_where_the_test_finds_a_difference():
+    rng = np.random.default_rng(4)
+    for shift in np.linspace(-1.2, 1.2, 13):
+        values = rng.exponential(size=25) - 1.0 + shift
+        found = sign_flip_interval(values)
+        assert found.low < found.mean == pytest.approx(values.mean())
+        assert found.mean < found.high
+        p_value = float(sign_flip_test(values[None])[0])
+        if abs(p_value - 0.05) > 0.01:
+            assert (found.low <= 0 <= found.high) == (p_value >= 0.05)
+
+
+def test_the_interval_covers_a_mean_that_is_known():
+    rng = np.random.default_rng(5)
+    draws = [sign_flip_interval(rng.normal(3.0, 2.0, size=15)) for _ in range(150)]
+    covered = sum(one.low <= 3.0 <= one.high for one in draws)
+    assert 134 <= covered <= 149
