@@ -36,7 +36,7 @@ def test_a_rise_a_fall_and_neither(alone: Episodes) -> None:
     assert fall.endswith("these rules harm it.")
     assert verdict("novice", "the rules", alone, like).endswith(
         "does not clearly change (22, without them 22; its mean from 22 to 22, a difference of 0, "
-        "95 % interval −1 to 1), and 100 % of its episodes end in a crash, as without."
+        "95 % interval −1 to 2), and 100 % of its episodes end in a crash, as without."
     )
 
 
