@@ -29,6 +29,8 @@ from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 
 FOLDS = 10
 """Enough that each tree is grown from nearly as many episodes as all together are."""
+FEWER_FOLDS, MANY_STEPS = 5, 100_000
+"""Of so many steps a tree takes its time and its room, and a fifth less of them are still many."""
 PARTING = 0.03
 """From so much on, the number on what was mined from is said to part from the other."""
 
@@ -176,7 +178,7 @@ def cross_fit(
     demonstrations: Demonstrations,
     *,
     divider: int = 2,
-    folds: int = FOLDS,
+    folds: int | None = None,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -187,7 +189,8 @@ def cross_fit(
         demonstrations: E episodes. A single one is cut into stretches: rules that know one
             stretch know the next, so what comes of it flatters, and no interval is given.
         divider: Number of intervals of continuous dimensions.
-        folds: How many; one an episode where there are fewer.
+        folds: How many; one an episode where there are fewer. Where not given `FOLDS`, or
+            `FEWER_FOLDS` from `MANY_STEPS` on.
         seed: Same seed, same folds.
         executor: Its processes grow the trees.
         progress: Told how many folds are done; may stop the rest.
@@ -199,6 +202,8 @@ def cross_fit(
         InputError: If there are fewer than two folds, or too few steps for two.
         CancelledError: If the caller wants no more.
     """
+    if folds is None:
+        folds = FOLDS if len(demonstrations) < MANY_STEPS else FEWER_FOLDS
     if folds < 2:
         raise InputError(f"{folds} folds leave nothing to mine from; give at least 2")
     whole = demonstrations.n_episodes > 1
