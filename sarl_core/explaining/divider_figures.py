@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from sarl_core.explaining.threshold_figures import layer_scale
 from sarl_core.mining.quantisation import SNAPPINGS, Quantisation, Snapping
 from sarl_core.rollouts.divider_study import DividerStudy
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.statistics import MeanInterval
 
 _ROW_HEIGHT = 38
 _DARK_INK, _LIGHT_INK = "#0e161b", "#ffffff"
@@ -152,28 +155,71 @@ def snapped_figure(
         dark: Whether it stands on dark ground.
 
     Returns:
-        In each cell the interquartile mean and its 95 % interval.
+        In each cell the interquartile mean, its 95 % interval, and how many of the episodes failed.
+    """
+    cells = {}
+    for key, episodes in found.items():
+        known = episodes.failures
+        typical = MeanInterval(
+            episodes.statistics.iqm, episodes.statistics.low, episodes.statistics.high
+        )
+        cells[key] = TypicalReturn(typical, math.nan if known is None else known.rate)
+    return typical_cells_figure(dividers, cells, projections=projections, dark=dark)
+
+
+@dataclass(frozen=True)
+class TypicalReturn:
+    """What stands in a cell.
+
+    Attributes:
+        typical: The typical return (IQM) and its 95 % interval.
+        failure_rate: Share of the episodes that failed; NaN where it is not known.
+    """
+
+    typical: MeanInterval
+    failure_rate: float
+
+
+def typical_cells_figure(
+    dividers: Sequence[int],
+    found: Mapping[tuple[int, Snapping], TypicalReturn],
+    *,
+    projections: Sequence[Snapping] = SNAPPINGS,
+    dark: bool = False,
+) -> go.Figure:
+    """Typical returns and shares of failures of the expert with snapped actions.
+
+    Args:
+        dividers: Columns.
+        found: By divider and way to snap; cells without any stay empty.
+        projections: Rows, from top to bottom.
+        dark: Whether it stands on dark ground.
+
+    Returns:
+        In each cell the typical return, its 95 % interval, and how many of the episodes failed.
     """
     values: list[list[float | None]] = []
     texts: list[list[str]] = []
     for projection in projections:
         each = [found.get((divider, projection)) for divider in dividers]
-        numbers = [None if episodes is None else episodes.statistics for episodes in each]
-        values.append([None if number is None else number.iqm for number in numbers])
-        texts.append(
-            [
-                ""
-                if number is None
-                else f"<b>{number.iqm:,.0f}</b><br>{number.low:,.0f} to {number.high:,.0f}"
-                for number in numbers
-            ]
-        )
+        values.append([None if one is None else one.typical.mean for one in each])
+        texts.append(["" if one is None else _typical_text(one) for one in each])
     columns = [_intervals(divider) for divider in dividers]
-    figure = _cells(columns, list(projections), values, texts, dark=dark, row_height=58)
+    figure = _cells(columns, list(projections), values, texts, dark=dark, row_height=72)
     figure.data[
         0
     ].hovertemplate = "%{y}, %{x}<br>typical return and its 95 % interval: %{text}<extra></extra>"
     return figure
+
+
+def _typical_text(one: TypicalReturn) -> str:
+    typical = one.typical
+    text = f"<b>{typical.mean:,.0f}</b>"
+    if not math.isnan(typical.low):
+        text += f"<br>{typical.low:,.0f} to {typical.high:,.0f}"
+    if math.isnan(one.failure_rate):
+        return text
+    return f"{text}<br>{share_text(one.failure_rate)} fail"
 
 
 def study_figure(study: DividerStudy, *, dark: bool = False) -> go.Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import faded
-from sarl_core.explaining.language import share_text
+from sarl_core.explaining.language import counted, share_text
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.share_axis import share_ticks
 from sarl_core.rollouts.statistics import MeanInterval
@@ -49,6 +50,12 @@ def recordings_figure(
     def text(value: float) -> str:
         return share_text(min(max(value, 0.0), 1.0)) if share else f"{value:,.1f}"
 
+    def told(mean: MeanInterval) -> str:
+        recordings = f"{counted(len(experts), 'recording')} of {counted(len(names), 'expert')}"
+        if math.isnan(mean.low):
+            return recordings
+        return f"95 % interval over {recordings}: {text(mean.low)} to {text(mean.high)}"
+
     for row, (name, own) in enumerate(values.items()):
         mean, colour = means[name], colours[name]
         figure.add_scatter(
@@ -80,9 +87,7 @@ def recordings_figure(
                 "width": 7,
                 "color": colour,
             },
-            hovertemplate=f"{plain(name)}: <b>{text(mean.mean)}</b><br>95 % interval over "
-            f"{len(own)} recordings of {len(names)} experts: {text(mean.low)} to "
-            f"{text(mean.high)}<extra></extra>",
+            hovertemplate=f"{plain(name)}: <b>{text(mean.mean)}</b><br>{told(mean)}<extra></extra>",
         )
     rows = len(values)
     axis = {"range": [-0.04, 1.06], **share_ticks(0, 1)} if share else {"nticks": 6}

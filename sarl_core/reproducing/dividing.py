@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
@@ -25,6 +26,7 @@ from sarl_core.reproducing.verdicts import Claim, Floats, above, claim, over_rec
 from sarl_core.reproducing.words import interval, number
 from sarl_core.rollouts.divider_study import DividerStudy, study_divider
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.statistics import MeanInterval, interquartile_mean
 
@@ -47,6 +49,7 @@ _COLUMNS = (
     "median",
     "seed",
     "value",
+    "crashed",
 )
 _STAYS, _SOME = 0.5, 0.25  # of the expert's typical return
 
@@ -65,10 +68,10 @@ def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
 
     Returns:
         For each recording (`environment`, `expert`, `recording`) three kinds of rows, told apart by
-        `what`: "return", an episode of the expert (`seed`, `value`; `divider` 0 is the expert as it
-        is); "error", what snapping changes in the demonstrated actions (`value`, root mean square);
-        "interval", with its edges `low` and `high`, the `count` of demonstrated values in it, and
-        their `median`.
+        `what`: "return", an episode of the expert (`seed`, `value`, and whether it `crashed`, where
+        that is known; `divider` 0 is the expert as it is); "error", what snapping changes in the
+        demonstrated actions (`value`, root mean square); "interval", with its edges `low` and
+        `high`, the `count` of demonstrated values in it, and their `median`.
     """
     import pandas as pd
 
@@ -127,13 +130,17 @@ def _rows(found: DividerStudy) -> Iterator[dict[str, Any]]:
 
 
 def _returns(divider: int, snapping: str, episodes: Episodes) -> Iterator[dict[str, Any]]:
-    for seed, value in zip(episodes.seeds.tolist(), episodes.returns.tolist(), strict=True):
+    known = failure_known(episodes.env_id)
+    for seed, value, fell in zip(
+        episodes.seeds.tolist(), episodes.returns.tolist(), episodes.failed.tolist(), strict=True
+    ):
         yield {
             "what": "return",
             "divider": divider,
             "snapping": snapping,
             "seed": seed,
             "value": value,
+            "crashed": float(fell) if known else np.nan,
         }
 
 
@@ -188,6 +195,21 @@ def typical_of(frame: pd.DataFrame, env_id: str) -> dict[tuple[int, Snapping], F
     }
 
 
+def failures_of(frame: pd.DataFrame, env_id: str) -> dict[tuple[int, Snapping], float]:
+    """The share of the episodes that failed, for each divider and way to snap.
+
+    Args:
+        frame: What `measure` gives.
+        env_id: In it.
+
+    Returns:
+        As in `episodes_of`; NaN where it is not known.
+    """
+    rows = frame[(frame["environment"] == env_id) & (frame["what"] == "return")]
+    shares = rows.groupby(["divider", "snapping"])["crashed"].mean()
+    return {key: float(shares.loc[key]) for key in episodes_of(frame, env_id)}
+
+
 def quantisations_of(frame: pd.DataFrame, env_id: str) -> tuple[tuple[Quantisation, ...], ...]:
     """How the demonstrated actions of the first recording are divided, out of the table.
 
@@ -234,7 +256,7 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
     for env_id in _environments(frame):
         returns = {}
         experts = experts_in(frame)[env_id]
-        typical = typical_of(frame, env_id)
+        typical, failures = typical_of(frame, env_id), failures_of(frame, env_id)
         for (divider, snapping), episodes in episodes_of(frame, env_id).items():
             name = f"divider {divider}, {snapping}" if divider else "as it is"
             over = over_recordings(typical[divider, snapping], experts)
@@ -248,6 +270,7 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
                 "iqm_low": over.low,
                 "iqm_high": over.high,
                 "iqm_of_recordings": typical[divider, snapping].tolist(),
+                "failure_rate": _known(failures[divider, snapping]),
             }
         divided = {
             parts[0].dimension.name: {
@@ -264,6 +287,10 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
     return numbers
 
 
+def _known(share: float) -> float | None:
+    return None if math.isnan(share) else share
+
+
 def divider_claims(frames: Frames) -> tuple[Claim, ...]:
     """What the paper leaves open, and what it supposes.
 
@@ -276,16 +303,22 @@ def divider_claims(frames: Frames) -> tuple[Claim, ...]:
     frame = frames["divider"]
     found = {env_id: typical_of(frame, env_id) for env_id in _environments(frame)}
     experts = experts_in(frame)
-    claims = [_finer(found, experts)]
+    failures = {env_id: failures_of(frame, env_id) for env_id in found}
+    claims = [_finer(found, failures, experts)]
     if _WALKER in found:
-        claims.append(_complexity(found[_WALKER], experts[_WALKER]))
+        claims.append(_complexity(found[_WALKER], failures[_WALKER], experts[_WALKER]))
     return tuple(claims)
 
 
 Typical = Mapping[tuple[int, Snapping], Floats]
+Failures = Mapping[tuple[int, Snapping], float]
 
 
-def _finer(found: Mapping[str, Typical], experts: Mapping[str, tuple[str, ...]]) -> Claim:
+def _finer(
+    found: Mapping[str, Typical],
+    failures: Mapping[str, Failures],
+    experts: Mapping[str, tuple[str, ...]],
+) -> Claim:
     told: list[str] = []
     parts = []
     numbers: dict[str, float] = {}
@@ -300,14 +333,13 @@ def _finer(found: Mapping[str, Typical], experts: Mapping[str, tuple[str, ...]])
         finer = [values for divider, values in centred.items() if divider > PAPER_DIVIDER]
         parts.append(above(np.mean(finer, axis=0) - coarse, own, agrees=0, partly=0, show=number))
         over = {divider: over_recordings(values, own) for divider, values in centred.items()}
-        told.append(
-            f"{environment_name(env_id)} "
-            + ", ".join(
-                f"{interval(one)} with {divider}" + (" intervals" if divider == 2 else "")
-                for divider, one in over.items()
-            )
-            + f", {number(float(typical[0, 'clip'].mean()))} as it is"
-        )
+        parts_told = [
+            f"{_told(one, failures[env_id][divider, 'centre'])} with {divider}"
+            + (" intervals" if divider == PAPER_DIVIDER else "")
+            for divider, one in over.items()
+        ]
+        whole = _told(over_recordings(typical[0, "clip"], own), failures[env_id][0, "clip"])
+        told.append(f"{environment_name(env_id)} {', '.join(parts_told)}, {whole} as it is")
         numbers |= {f"{env_id}_{divider}": one.mean for divider, one in over.items()}
     return claim(
         together(
@@ -324,7 +356,7 @@ def _finer(found: Mapping[str, Typical], experts: Mapping[str, tuple[str, ...]])
     )
 
 
-def _complexity(typical: Typical, experts: tuple[str, ...]) -> Claim:
+def _complexity(typical: Typical, failures: Failures, experts: tuple[str, ...]) -> Claim:
     whole = typical[0, "clip"]
     ways: tuple[Snapping, Snapping] = ("centre", "expert")
     centre, median = (over_recordings(typical[PAPER_DIVIDER, way], experts) for way in ways)
@@ -333,20 +365,33 @@ def _complexity(typical: Typical, experts: tuple[str, ...]) -> Claim:
         typical[PAPER_DIVIDER, better], whole, out=np.zeros(len(whole)), where=whole > 0
     )
     before = over_recordings(whole, experts)
+    told = [
+        _told(over_recordings(typical[key], experts), failures[key])
+        for key in ((0, "clip"), (PAPER_DIVIDER, "centre"), (PAPER_DIVIDER, "expert"))
+    ]
     return claim(
         above(kept, experts, agrees=_STAYS, partly=_SOME),
         paper="That no rules help on BipedalWalker is put down to poor demonstrations and to an "
         "environment that is too complex.",
         where="text on Figure 7",
-        ours="Two intervals alone, without any rule, bring the experts from "
-        f"{interval(before)} to {interval(centre)} if each action becomes the centre of its "
-        f"interval, as under the shield of Figure 7, and to {interval(median)} if it becomes what "
-        f"the expert typically did in it. That leaves {_of_typical(centre, before)} and "
-        f"{_of_typical(median, before)} of their typical return.",
+        ours=f"Two intervals alone, without any rule, bring the experts from {told[0]} to "
+        f"{told[1]} if each action becomes the centre of its interval, as under the shield of "
+        f"Figure 7, and to {told[2]} if it becomes what the expert typically did in it. That "
+        f"leaves {_of_typical(centre, before)} and {_of_typical(median, before)} of their typical "
+        "return.",
         measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
         "its typical return with the better of the two, the centre and its own typical value.",
         numbers={"as_it_is": before.mean, "centre": centre.mean, "expert": median.mean},
     )
+
+
+def _told(found: MeanInterval, failing: float) -> str:
+    """Typical return and share of failures, for people; the latter where it is known."""
+    if math.isnan(failing):
+        return interval(found)
+    text = interval(found)
+    fail = f"{share_text(failing)} fail)"
+    return f"{text[:-1]}; {fail}" if text.endswith(")") else f"{text} ({fail}"
 
 
 def _of_typical(found: MeanInterval, whole: MeanInterval) -> str:
@@ -378,27 +423,33 @@ def divisions_exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.Dat
 
 def _draw(frame: pd.DataFrame, part: str, dark: bool) -> tuple[Drawing, ...]:
     from sarl_core.explaining.divider_figures import (
+        TypicalReturn,
         error_figure,
         occupancy_figure,
-        snapped_figure,
+        typical_cells_figure,
     )
 
     env_id = next(one for one in _environments(frame) if environment_name(one) == part)
-    divided, episodes = quantisations_of(frame, env_id), episodes_of(frame, env_id)
+    divided = quantisations_of(frame, env_id)
     dividers = [one.divider for one in divided[0]]
+    experts = experts_in(frame)[env_id]
+    failures = failures_of(frame, env_id)
+    cells = {
+        key: TypicalReturn(over_recordings(values, experts), failures[key])
+        for key, values in typical_of(frame, env_id).items()
+    }
     # Snapped by ``clip``, an action is what it was.
-    unchanged = episodes[0, "clip"]
-    episodes |= {(divider, "clip"): unchanged for divider in dividers}
+    cells |= {(divider, "clip"): cells[0, "clip"] for divider in dividers}
     height = 60 + 38 * 2 * len(divided)
     return (
         Drawing(
-            f"Typical return of the expert with snapped actions, {part}",
-            snapped_figure(dividers, episodes, dark=dark).update_layout(height=max(height, 250)),
-            alt=f"Typical return of the snapped expert for every divider, {part}",
+            f"Typical return and failures of the expert with snapped actions, {part}",
+            typical_cells_figure(dividers, cells, dark=dark).update_layout(height=max(height, 290)),
+            alt=f"Typical return and failures of the snapped expert for every divider, {part}",
         ),
         Drawing(
             f"How far an action moves, as a share of its range, {part}",
-            error_figure(divided, dark=dark).update_layout(height=max(height, 250)),
+            error_figure(divided, dark=dark).update_layout(height=max(height, 290)),
             alt=f"Root mean square of what snapping changes, for every action and divider, {part}",
         ),
         *(

@@ -204,7 +204,7 @@ def _fewer_violations(found: Relevance, experts: tuple[str, ...]) -> Claim:
                 f", after as little as {share_text(_mean(least))} at about {steps:,} steps"
                 if again[number]
                 else ""
-                if change.low > 0
+                if not change.low <= 0  # NaN where nothing can be told
                 else f" (the change lies between {percent(-change.high)} and "
                 f"{percent(-change.low)}, so it may be none)"
             )

@@ -287,11 +287,11 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
                 "iqm_high": typical.high,
                 "least": float(episodes.returns.min()),
                 "greatest": float(episodes.returns.max()),
-                "crash_rate": failures.mean,
-                "crash_low": failures.low,
-                "crash_high": failures.high,
+                "failure_rate": failures.mean,
+                "failure_low": failures.low,
+                "failure_high": failures.high,
                 "iqm_of_recordings": runs.typical(arm.name).tolist(),
-                "crash_rate_of_recordings": runs.failed[arm.name].mean(axis=1).tolist(),
+                "failure_rate_of_recordings": runs.failed[arm.name].mean(axis=1).tolist(),
             }
             own = divider and arm.name in (FILTERED, UNFILTERED)
             numbers[f"{arm.name}, divider {divider}" if own else arm.name] = one

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.explaining.language import counted
 from sarl_core.reproducing.words import percent
-from sarl_core.rollouts.statistics import MeanInterval, mean_interval
+from sarl_core.rollouts.statistics import MeanInterval, mean_interval, rate_of
 
 Verdict = Literal["agrees", "partly", "does not agree", "cannot be judged"]
 VERDICTS: tuple[Verdict, ...] = ("agrees", "partly", "does not agree", "cannot be judged")
@@ -176,13 +176,16 @@ def over_recordings(values: ArrayLike, experts: Sequence[str]) -> MeanInterval:
         experts: The expert of each.
 
     Returns:
-        The mean of the experts' means and its interval.
+        The mean of the experts' means and its interval; of one expert alone nobody can tell how
+        experts differ, and the ends are NaN.
     """
     array = np.asarray(values, dtype=np.float64)
     names = np.asarray(experts)
     groups = mean_interval([array[names == name].mean() for name in dict.fromkeys(experts)])
     every = mean_interval(array)
     half = max(every.high - every.mean, groups.high - groups.mean)
+    if len(set(experts)) == 1:
+        half = math.nan
     return MeanInterval(groups.mean, groups.mean - half, groups.mean + half)
 
 
@@ -197,15 +200,16 @@ def share_over_recordings(found: Truths, experts: Sequence[str]) -> MeanInterval
         experts: The expert of each recording.
 
     Returns:
-        The mean share and its interval, within 0 and 1.
+        The mean share and its interval, within 0 and 1; the ends are NaN as there.
     """
-    from scipy.special import betaincinv
-
-    spread = over_recordings(found.mean(axis=1), experts)
-    count, total = int(found.sum()), found.size
-    low = float(betaincinv(count, total - count + 1, 0.025)) if count else 0.0
-    high = float(betaincinv(count + 1, total - count, 0.975)) if count < total else 1.0
-    return MeanInterval(spread.mean, max(min(spread.low, low), 0.0), min(max(spread.high, high), 1))
+    spread, whole = over_recordings(found.mean(axis=1), experts), rate_of(found)
+    if math.isnan(spread.low):
+        return spread
+    return MeanInterval(
+        spread.mean,
+        max(min(spread.low, whole.low), 0.0),
+        min(max(spread.high, whole.high), 1.0),
+    )
 
 
 # --- verdicts ------------------------------------------------------------------------------------

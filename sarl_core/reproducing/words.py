@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from sarl_core.explaining.language import share_text
 from sarl_core.rollouts.statistics import MeanInterval
 
@@ -12,12 +14,16 @@ def number(value: float) -> str:
 
 
 def interval(found: MeanInterval) -> str:
-    """A return with its 95 % interval, for people."""
+    """A return with its 95 % interval, where there is one, for people."""
+    if math.isnan(found.low):
+        return number(found.mean)
     return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
 
 
 def shares(found: MeanInterval) -> str:
-    """A share with its 95 % interval, for people."""
+    """A share with its 95 % interval, where there is one, for people."""
+    if math.isnan(found.low):
+        return share_text(found.mean)
     low, high = (share_text(min(max(end, 0.0), 1.0)) for end in (found.low, found.high))
     return f"{share_text(found.mean)} ({low} to {high})"
 

@@ -81,6 +81,8 @@ def test_every_cell_holds_the_typical_return_and_its_interval(study: DividerStud
             numbers = episodes.statistics
             assert cells.z[row][column] == numbers.iqm
             assert f"{numbers.low:,.0f} to {numbers.high:,.0f}" in cells.text[row][column]
+            known = episodes.failures
+            assert ("fail" in cells.text[row][column]) == (known is not None)
 
 
 def test_what_has_not_been_run_stays_empty(study: DividerStudy) -> None:

@@ -149,6 +149,7 @@ def divided(returns: Mapping[str, Mapping[tuple[int, str], ArrayLike]]) -> pd.Da
                     "snapping": snapping,
                     "seed": 12_000_000 + 10_000 * recording + number,
                     "value": value,
+                    "crashed": float(value < 0) if env_id == "BipedalWalker-v3" else np.nan,
                 }
                 for number, value in enumerate(np.asarray(values, dtype=float).tolist())
             ]

@@ -54,7 +54,9 @@ def test_two_intervals_that_cost_everything() -> None:
     finer, complexity = DIVIDING.claims({"divider": frame})
     assert "Bipedal Walker −35 (" in finer.ours
     assert "with 2 intervals, 180 (" in finer.ours
-    assert "with 5, 285 as it is" in finer.ours
+    assert "with 5, 285 (" in finer.ours
+    assert "; 0 % fail) as it is" in finer.ours
+    assert "; 100 % fail) with 2 intervals" in finer.ours
     assert "from 285 (" in complexity.ours
     assert " to −35 (" in complexity.ours
 

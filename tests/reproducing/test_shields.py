@@ -208,7 +208,7 @@ def test_numbers_tell_dividers_apart() -> None:
     assert numbers["filtered, divider 2"]["rules"] == [6, 6]
     assert numbers["filtered, divider 2"]["recordings"] == 6
     assert numbers["filtered, divider 2"]["intervention_rate"] == 0.4
-    assert numbers["novice alone"]["crash_rate"] == 1.0
+    assert numbers["novice alone"]["failure_rate"] == 1.0
     assert numbers["unfiltered, divider 3"]["mean"] == pytest.approx(noisy(60, 10).mean())
 
 
@@ -278,9 +278,9 @@ def test_a_typical_return_never_stands_without_failures() -> None:
             if "ypical return" in claim.ours and "half of the" not in claim.ours:
                 assert "failing in" in claim.ours, claim.paper
     numbers = STUDIES["6"].numbers(lander())["unfiltered"]
-    assert numbers["crash_rate"] == pytest.approx(5 / 40)
-    assert numbers["crash_low"] < 5 / 40 < numbers["crash_high"]
-    assert numbers["crash_rate_of_recordings"] == pytest.approx([5 / 40] * 6)
+    assert numbers["failure_rate"] == pytest.approx(5 / 40)
+    assert numbers["failure_low"] < 5 / 40 < numbers["failure_high"]
+    assert numbers["failure_rate_of_recordings"] == pytest.approx([5 / 40] * 6)
 
 
 def test_a_return_like_the_experts_with_more_failures_is_not_its_performance() -> None:

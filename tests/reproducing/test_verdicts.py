@@ -15,6 +15,7 @@ from sarl_core.reproducing.verdicts import (
     together,
     within,
 )
+from sarl_core.reproducing.words import interval, shares
 
 EXPERTS = ("a", "b", "c", "a", "b", "c")
 SPREAD = np.array([-1.0, 0.0, 1.0, 1.0, 0.0, -1.0])  # the experts' means are the same
@@ -86,6 +87,17 @@ def test_experts_that_differ_make_the_interval_wide() -> None:
     # Student's over three means of experts, and over six recordings.
     assert apart.high == pytest.approx(4.3027 * 1.0 / 3**0.5, rel=1e-3)
     assert alike.high == pytest.approx(2.5706 * (4 / 5) ** 0.5 / 6**0.5, rel=1e-3)
+
+
+def test_one_expert_alone_has_no_interval() -> None:
+    found = over_recordings(np.array([1.0, 3.0]), ("a", "a"))
+    assert found.mean == 2
+    assert np.isnan([found.low, found.high]).all()
+    assert interval(found) == "2"
+    share = share_over_recordings(np.ones((1, 20), dtype=np.bool_), ("a",))
+    assert np.isnan(share.low)
+    assert shares(share) == "100 %"
+    assert above(np.array([9.0]), ("a",), agrees=0, partly=0).verdict == "cannot be judged"
 
 
 @pytest.mark.parametrize("between", [0.0, 0.3, 0.7, 1.0])
