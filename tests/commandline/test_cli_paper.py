@@ -122,7 +122,8 @@ def test_the_paper_quickly(capsys, tmp_path):
         left |= set(entry.files.values())
         frame = read_table(study, folder / entry.files["table"])
         # What the report says follows from the table that was left.
-        assert json.loads(json.dumps(study.numbers(frame))) == entry.numbers
+        found = json.dumps(study.numbers(frame))
+        assert json.loads(found, parse_constant=lambda _: None) == entry.numbers
         with Image.open(folder / entry.files["picture"]) as picture:
             assert picture.width == 2480
             assert picture.convert("L").getextrema()[0] < 100
