@@ -16,14 +16,16 @@ from typing import Any
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
 from sarl_core.errors import InputError, SarlError
+from sarl_core.explaining.cross_fit_words import judged_sentence, parting_text
 from sarl_core.explaining.language import counted, share_text
-from sarl_core.explaining.report_again import commands_that_hold, facts
+from sarl_core.explaining.report_again import commands_that_hold, facts, mined_again
 from sarl_core.explaining.report_comparison import Result, compared
 from sarl_core.explaining.report_counts import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report_demonstrations import shown
 from sarl_core.explaining.report_gaps import gaps
 from sarl_core.explaining.report_rules import in_order, rules_part
 from sarl_core.explaining.report_thresholds import kept
+from sarl_core.mining.cross_fitting import cross_fit
 from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
@@ -40,6 +42,7 @@ from sarl_core.rollouts.progress import Progress
 TEMPLATES = Path(__file__).parent / "templates"
 MOST_IN_FULL = 60
 MOST_FRAMES = 12
+_MOST_FITTED = 50_000  # steps; to grow ten trees of more takes minutes
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +153,7 @@ def make_report(
     html = _template().render(
         title=f"Rules for {task_name(env_id)}" if env_id else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
+        elsewhere=_elsewhere(as_given, demonstrations, trees),
         shown=shown(rule_set, demonstrations, counts),
         kept=kept(rule_set, counts, trees, card),
         rules=rules_part(rule_set, demonstrations, counts, order, examples),
@@ -280,6 +284,17 @@ def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...
         (share_text(counts.coverage), "of the demonstrated states have a rule"),
         (share_text(followed.value), "of these show what the rule says"),
     )
+
+
+def _elsewhere(
+    rule_set: RuleSet, demonstrations: Demonstrations, trees: Sequence[PolicyTree] | None
+) -> tuple[str, str]:
+    """What the rules are worth where they were not mined, and a warning; "" where not known."""
+    if len(demonstrations) > _MOST_FITTED or not mined_again(rule_set, trees):
+        return "", ""
+    fit = cross_fit(demonstrations, divider=rule_set.divider)
+    judged = fit.at(rule_set.thresholds)
+    return judged_sentence(judged), parting_text(rule_set.fidelity, judged)
 
 
 @lru_cache(maxsize=1)

@@ -171,13 +171,21 @@ def commands_that_hold(
         Those that make what they say.
     """
     mining = f"{_PROGRAM} mine "
-    if not any(line.startswith(mining) for line in commands) or _mined_again(rule_set, trees):
+    if not any(line.startswith(mining) for line in commands) or mined_again(rule_set, trees):
         return tuple(commands)
     return tuple(line for line in commands if not line.startswith(mining))
 
 
-def _mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
-    """Whether trees give the same rules, under the same names."""
+def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
+    """Whether trees give the same rules, under the same names.
+
+    Args:
+        rule_set: The rules.
+        trees: Grown from demonstrations; None for rules that no thresholds cut.
+
+    Returns:
+        False without trees.
+    """
     if not trees:
         return False
     limits = rule_set.thresholds

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.cross_fit_words import judged_sentence, parting_text
 from sarl_core.explaining.language import share_text
 from sarl_core.explaining.report import Wishes, make_report
 from sarl_core.explaining.report_again import digest_of, mining_command
 from sarl_core.explaining.report_comparison import Result
 from sarl_core.explaining.report_counts import Share, tally
 from sarl_core.explaining.report_thresholds import read_card
+from sarl_core.mining.cross_fitting import cross_fit
 from sarl_core.mining.holding_out import hold_out, with_held_out
 from sarl_core.mining.rounding import merged_rules, rounded_rules
+from sarl_core.mining.rules import UNFILTERED
 
 DATA = Path(__file__).parents[2] / "data"
 PLAIN = Wishes(frames=0)
@@ -338,7 +341,7 @@ def test_what_rules_were_made_from_has_no_interval_and_other_episodes_have(
         ) in text
     # Of what they were mined from alone, nothing of that kind is said.
     plain = Page(make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, PLAIN).html)
-    assert "is what that can tell" not in plain.text
+    assert "of its states in an episode" not in plain.text
 
 
 def test_rules_of_other_demonstrations_are_judged_by_episodes(cart: Demonstrations) -> None:
@@ -372,3 +375,16 @@ def test_a_card_with_odd_values_is_told_as_far_as_it_goes(cart: Demonstrations) 
     odd = {"budget": "many", "rounds": 3, "reported": {"mean": float("nan")}, "refined": "yes"}
     page = Page(make_report(RuleSet.load(path), cart, PLAIN, card=odd).html)
     assert "The budget" not in page.text
+
+
+def test_what_rules_are_worth_elsewhere_stands_below_what_they_are_here(
+    cart: Demonstrations,
+) -> None:
+    rules = mine_rules(cart, supp_min=0.0, conf_min=1.0)
+    found = cross_fit(cart).at(UNFILTERED)
+    text = Page(make_report(rules, cart, PLAIN).html).text
+    assert judged_sentence(found) in text
+    assert parting_text(1.0, found) in text
+    # Rules that were changed cannot be mined again without an episode.
+    some = dataclasses.replace(rules, rules=rules.rules[1:])
+    assert "mined without it" not in Page(make_report(some, cart, PLAIN).html).text
