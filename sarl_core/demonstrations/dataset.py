@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, cast
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations import checks
+from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError
 
 Actions = NDArray[np.int64] | NDArray[np.float32]
@@ -25,10 +26,14 @@ class Feature:
     Attributes:
         name: In words, as "pole angle".
         unit: As "rad", or "" where there is none.
+        splits: The thresholds that trees or rules ask of it, with the demonstrated values around
+            them, so that whoever writes one knows how many digits it takes; None where nothing is
+            known of them. It is no part of what the feature is.
     """
 
     name: str
     unit: str = ""
+    splits: Splits | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.splits import written_threshold, written_value
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
 
@@ -95,7 +98,7 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
     """Whether bounds on a feature say no more than yes or no, as those on a contact do.
 
     Args:
-        feature: Its name tells.
+        feature: Its name tells, and its demonstrated values, where they are known.
         bounds: What is asked of it.
 
     Returns:
@@ -104,7 +107,62 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
     one = math.isinf(bounds.low) != math.isinf(bounds.high)
     threshold = bounds.high if math.isinf(bounds.low) else bounds.low
     named = any(word in feature.name.lower().split() for word in _FLAG_WORDS)
-    return named and one and not feature.unit and 0.0 <= threshold < 1.0
+    parts = (
+        0.0 <= threshold < 1.0
+        if feature.splits is not None and feature.splits.binary
+        # A feature with values in between may be asked for any of them; halfway is what is asked
+        # of one that is yes or no.
+        else feature.splits is None and threshold in (0.0, 0.5)
+    )
+    return named and one and not feature.unit and parts
+
+
+def limit_text(threshold: float, feature: Feature, *, beside: Sequence[float] = ()) -> str:
+    """A threshold on a feature, for people.
+
+    Args:
+        threshold: At full precision.
+        feature: Knows the demonstrated values around it.
+        beside: Values of the feature that are shown with it.
+
+    Returns:
+        As "293.42": three significant digits, more where it takes them to part the demonstrated
+        states and `beside` as the threshold does, without its unit.
+    """
+    return decimal_text(written_threshold(threshold, feature.splits, beside=beside))
+
+
+def limit_texts(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> list[str]:
+    """Both ends of an interval, as `limit_text`.
+
+    Args:
+        bounds: Any.
+        feature: It bounds.
+        beside: Values of the feature that are shown with it.
+
+    Returns:
+        The ends that there are, the lower first; never twice the same.
+    """
+    ends = [end for end in bounds[1:] if math.isfinite(end)]
+    texts = [limit_text(end, feature, beside=beside) for end in ends]
+    if len(set(texts)) < len(set(ends)):
+        return list(map(decimal_text, ends))
+    return texts
+
+
+def beside_text(value: float, bounds: Bounds, feature: Feature) -> str:
+    """A value of a feature, for people, where a bound on the feature is shown too.
+
+    Args:
+        value: Of a state.
+        bounds: Are shown with this value `beside` them.
+        feature: Of both.
+
+    Returns:
+        As "293.4": three significant digits, more where it takes them to stay on its side.
+    """
+    limits = limit_texts(bounds, feature, beside=(value,))
+    return decimal_text(written_value(value, [float(limit) for limit in limits]))
 
 
 def condition_text(bounds: Bounds, feature: Feature) -> str:
@@ -120,21 +178,21 @@ def condition_text(bounds: Bounds, feature: Feature) -> str:
     if is_flag(feature, bounds):
         return f"there is {'no ' if math.isinf(bounds.low) else ''}{feature.name}"
     unit = f" {feature.unit}" if feature.unit else ""
+    limits = limit_texts(bounds, feature)
     if math.isinf(bounds.low):
-        return f"the {feature.name} is at most {number_text(bounds.high)}{unit}"
+        return f"the {feature.name} is at most {limits[0]}{unit}"
     if math.isinf(bounds.high):
-        return f"the {feature.name} is above {number_text(bounds.low)}{unit}"
-    low = number_text(bounds.low, apart_from=bounds.high)
-    high = number_text(bounds.high, apart_from=bounds.low)
-    return f"the {feature.name} is between {low} and {high}{unit}"
+        return f"the {feature.name} is above {limits[0]}{unit}"
+    return f"the {feature.name} is between {limits[0]} and {limits[1]}{unit}"
 
 
-def short_condition(bounds: Bounds, feature: Feature) -> str:
+def short_condition(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> str:
     """The same in signs, for tables.
 
     Args:
         bounds: The feature's interval.
         feature: Its name and unit.
+        beside: Values of the feature that are shown with it.
 
     Returns:
         As "pole angle > 0.02 rad".
@@ -142,32 +200,42 @@ def short_condition(bounds: Bounds, feature: Feature) -> str:
     if is_flag(feature, bounds):
         return f"{'no ' if math.isinf(bounds.low) else ''}{feature.name}"
     unit = f" {feature.unit}" if feature.unit else ""
+    limits = limit_texts(bounds, feature, beside=beside)
     if math.isinf(bounds.low):
-        return f"{feature.name} ≤ {number_text(bounds.high)}{unit}"
+        return f"{feature.name} ≤ {limits[0]}{unit}"
     if math.isinf(bounds.high):
-        return f"{feature.name} > {number_text(bounds.low)}{unit}"
-    low = number_text(bounds.low, apart_from=bounds.high)
-    high = number_text(bounds.high, apart_from=bounds.low)
-    return f"{low} < {feature.name} ≤ {high}{unit}"
+        return f"{feature.name} > {limits[0]}{unit}"
+    return f"{limits[0]} < {feature.name} ≤ {limits[1]}{unit}"
 
 
-def query_text(condition: Condition, features: tuple[Feature, ...]) -> str:
+def query_text(
+    condition: Condition, features: tuple[Feature, ...], *, beside: Sequence[float] = ()
+) -> str:
     """One query on a path, in signs.
 
     Args:
         condition: The query.
         features: All features.
+        beside: Values of its feature that are shown with it.
 
     Returns:
         As "pole angle > 0.02 rad".
     """
-    infinite = math.inf
-    bounds = (
-        Bounds(condition.feature, -infinite, condition.threshold)
-        if condition.op == "<="
-        else Bounds(condition.feature, condition.threshold, infinite)
-    )
-    return short_condition(bounds, features[condition.feature])
+    return short_condition(bounds_of(condition), features[condition.feature], beside=beside)
+
+
+def bounds_of(condition: Condition) -> Bounds:
+    """One query as an interval.
+
+    Args:
+        condition: The query.
+
+    Returns:
+        With one end.
+    """
+    feature, op, threshold = condition
+    low, high = (-math.inf, threshold) if op == "<=" else (threshold, math.inf)
+    return Bounds(feature, low, high)
 
 
 def exact_condition(condition: Condition, features: tuple[Feature, ...]) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from sarl_core.explaining.language import action_text, conditions_text
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
 from sarl_core.mining.rules import Rule, RuleSet, Thresholds
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import PolicyTree, source_of
 
 
 def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) -> RuleSet:
@@ -39,7 +39,7 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
     return RuleSet(
         rules=tuple(rules),
         actions=tuple(tree.dimension for tree in trees),
-        source=trees[0].source,
+        source=source_of(trees),
         thresholds=thresholds,
         divider=trees[0].divider,
     )

@@ -12,7 +12,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.landscape import confidence_above
 from sarl_core.mining.rules import Condition, Operator, Rule, RuleSet, Thresholds
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees, source_of
 
 
 def cut_nodes(
@@ -85,7 +85,7 @@ def mine_rules(
     mined = RuleSet(
         rules=tuple(rules),
         actions=tuple(tree.dimension for tree in trees),
-        source=trees[0].source,
+        source=source_of(trees),
         thresholds=thresholds,
         divider=trees[0].divider,
     )

@@ -17,7 +17,14 @@ from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 from sarl_core.mining.rules import RuleSet, Thresholds
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree, fitted
+from sarl_core.mining.tree import (
+    LEAF,
+    PolicyTree,
+    TreeStructure,
+    count_tree,
+    fitted,
+    source_of,
+)
 
 MIN_RULES = 2
 _LEAST_PAIRS = 5  # a mean of fewer values is no mean
@@ -183,7 +190,7 @@ def leaf_rules(trees: Sequence[PolicyTree]) -> RuleSet:
             rule for tree in trees for rule in rules_at(tree, np.flatnonzero(tree.feature == LEAF))
         ),
         actions=tuple(tree.dimension for tree in trees),
-        source=trees[0].source,
+        source=source_of(trees),
         thresholds=Thresholds(0.0, 0.0),
         divider=trees[0].divider,
         cut="leaves",

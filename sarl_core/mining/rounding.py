@@ -10,17 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from decimal import Decimal
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import short_decimal
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Condition, Rule, RuleSet
-
-_MOST_DIGITS = 17  # tell every double from every other
 
 ONE_SIDED = "no demonstrated state tells its two sides apart"
 SHORTEST = "no shorter number decides every state as it does"
@@ -207,16 +206,10 @@ def _shortened(values: NDArray[np.float32], threshold: float) -> tuple[float, st
     least, most = float(values[below].max()), float(values[~below].min())
     if least <= 0.0 < most:
         return 0.0, SHORTEST if threshold == 0.0 else ""
-    exact = Decimal(threshold)
-    for digits in range(1, min(digits_of(threshold), _MOST_DIGITS + 1)):
-        candidates = {
-            float(Context(prec=digits, rounding=rounding).plus(exact))
-            for rounding in (ROUND_FLOOR, ROUND_CEILING)
-        }
-        fitting = [value for value in candidates if least <= value < most]
-        if fitting:
-            return min(fitting, key=lambda value: (abs(value - threshold), value)), ""
-    return threshold, SHORTEST
+    shorter = short_decimal(threshold, least, most)
+    if shorter is None or digits_of(shorter) >= digits_of(threshold):
+        return threshold, SHORTEST
+    return shorter, ""
 
 
 def _merged(rule: Rule) -> Rule:

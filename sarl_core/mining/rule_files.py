@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.requirements import LARGEST
+from sarl_core.demonstrations.splits import Splits
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
@@ -110,11 +114,15 @@ def load_rules(path: Path) -> RuleSet:
 
 def _document(rule_set: RuleSet) -> dict[str, Any]:
     source, thresholds = rule_set.source, rule_set.thresholds
+    asked: list[set[float]] = [set() for _ in source.features]
+    for rule in rule_set.rules:
+        for feature, _, threshold in rule.conditions:
+            asked[feature].add(threshold)
     return {
         "format": FORMAT,
         "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
         "env_id": source.env_id,
-        "features": [{"name": f.name, "unit": f.unit} for f in source.features],
+        "features": list(map(_feature, source.features, asked)),
         "actions": [_action(action) for action in rule_set.actions],
         "thresholds": {
             "support": thresholds.support,
@@ -132,6 +140,20 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
         },
         "rules": [_rule(rule) for rule in rule_set.rules],
     }
+
+
+def _feature(feature: Feature, asked: set[float]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"name": feature.name, "unit": feature.unit}
+    if feature.splits is not None:
+        splits = feature.splits.only(asked)
+        columns = (splits.thresholds, splits.below, splits.above)
+        entry["splits"] = [
+            [value if math.isfinite(value) else None for value in row]
+            for row in zip(*(column.tolist() for column in columns), strict=True)
+        ]
+        if splits.binary:
+            entry["binary"] = True
+    return entry
 
 
 def _action(action: LabelledDimension) -> dict[str, Any]:
@@ -246,13 +268,7 @@ class _Reader:
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         values = self.take(key, list)
-        numeric = all(
-            isinstance(value, (int, float))
-            and not isinstance(value, bool)
-            and -_LARGEST <= value <= _LARGEST
-            for value in values
-        )
-        if not numeric or len(values) != count:
+        if not all(map(_is_number, values)) or len(values) != count:
             raise self.fail(f"{key!r} must be {count} numbers")
         return tuple(map(float, values))
 
@@ -260,6 +276,14 @@ class _Reader:
         """Refuse what nobody asked for, by name."""
         if self._value:
             raise self.fail(f"{quoted(next(iter(self._value)))} is not known to this version")
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value from a file is a number that a state or an action may be."""
+    # Compared before it is converted: an integer may be too large for a float.
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return -LARGEST <= value <= LARGEST
 
 
 def _rule_set(document: _Reader) -> RuleSet:
@@ -311,9 +335,29 @@ def _read_cut(document: _Reader) -> Literal["thresholds", "leaves"]:
 
 
 def _read_feature(part: _Reader) -> Feature:
-    feature = Feature(part.take("name", str), part.take("unit", str, ""))
+    name, unit = part.take("name", str), part.take("unit", str, "")
+    splits = _read_splits(part) if part.has("splits") else None
     part.finish()
-    return feature
+    return Feature(name, unit, splits)
+
+
+def _read_splits(part: _Reader) -> Splits:
+    rows = part.take("splits", list)
+    found = np.empty((len(rows), 3))
+    for place, row in enumerate(rows):
+        if not isinstance(row, list) or len(row) != 3:
+            raise part.fail("'splits' must be a threshold and the two values around it each")
+        ends = (-math.inf, math.inf)
+        sides = (end if one is None else one for one, end in zip(row[1:], ends, strict=True))
+        filled = [row[0], *sides]
+        if not all(_is_number(one) or one in ends for one in filled):
+            raise part.fail("'splits' holds something that is no number")
+        found[place] = filled
+    thresholds, below, above = found.T
+    apart = np.isfinite(thresholds) & (below <= thresholds) & (thresholds < above)
+    if not apart.all() or not (np.diff(thresholds) > 0).all():
+        raise part.fail("'splits' are not in ascending order, each between its two values")
+    return Splits(thresholds, below, above, part.take("binary", bool, False))
 
 
 def _read_action(part: _Reader) -> LabelledDimension:
@@ -326,12 +370,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
             raise part.fail("'labels' is empty")
     elif kind == "interval":
         edges = part.take("edges", list)
-        numeric = all(
-            isinstance(edge, (int, float))
-            and not isinstance(edge, bool)
-            and -LARGEST <= edge <= LARGEST
-            for edge in edges
-        )
+        numeric = all(map(_is_number, edges))
         single = numeric and len(edges) == 2 and edges[0] == edges[1]
         if not single and (not numeric or len(edges) < 3 or sorted(set(edges)) != edges):
             raise part.fail(

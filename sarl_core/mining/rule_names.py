@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import RuleSet
@@ -25,7 +25,10 @@ def renamed_rules(rule_set: RuleSet, names: Names) -> RuleSet:
     source, actions = rule_set.source, rule_set.actions
     if len(names.features) == len(source.features):
         features = tuple(
-            Feature(name, unit) for name, unit in zip(names.features, names.units, strict=True)
+            replace(feature, name=name, unit=unit)
+            for feature, name, unit in zip(
+                source.features, names.features, names.units, strict=True
+            )
         )
         source = replace(source, features=features)
     if len(names.actions) == len(actions):
@@ -60,6 +63,10 @@ def renamed_trees(
     return tuple(
         tree
         if (tree.source, tree.dimension) == (source, dimension)
-        else replace(tree, source=source, dimension=dimension)
+        else replace(
+            tree,
+            source=source.with_splits([feature.splits for feature in tree.source.features]),
+            dimension=dimension,
+        )
         for tree, dimension in zip(trees, dimensions, strict=True)
     )

@@ -7,7 +7,8 @@ a node a slice.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 
@@ -62,6 +64,23 @@ class Source:
             digest=demonstrations.digest,
             steps=len(demonstrations),
             episodes=demonstrations.n_episodes,
+        )
+
+    def with_splits(self, splits: Sequence[Splits | None]) -> Source:
+        """The same, with what is known of thresholds.
+
+        Args:
+            splits: Of each of the d features.
+
+        Returns:
+            Features with these splits in the place of what they had.
+        """
+        return replace(
+            self,
+            features=tuple(
+                replace(feature, splits=one)
+                for feature, one in zip(self.features, splits, strict=True)
+            ),
         )
 
 
@@ -195,6 +214,41 @@ class PolicyTree:
         return walk(
             observations, self.feature, self.threshold, self.children_left, self.children_right
         )
+
+
+def source_of(trees: Sequence[PolicyTree]) -> Source:
+    """What the trees of one rule set were grown from.
+
+    Args:
+        trees: One an action dimension, over the same demonstrations.
+
+    Returns:
+        Where they come from; its features know the thresholds of all of them.
+    """
+    known = zip(*(tree.source.features for tree in trees), strict=True)
+    splits = [[one.splits for one in same if one.splits is not None] for same in known]
+    return trees[0].source.with_splits([Splits.together(some) if some else None for some in splits])
+
+
+def splits_of(
+    feature: NDArray[np.int64], threshold: NDArray[np.float64], demonstrations: Demonstrations
+) -> list[Splits | None]:
+    """What demonstrations tell of thresholds.
+
+    Args:
+        feature: Feature that each is asked of, (k,); `LEAF` where nothing is asked.
+        threshold: Shape (k,).
+        demonstrations: N states.
+
+    Returns:
+        One entry a feature; None where it is not asked.
+    """
+    states = demonstrations.observations
+    asked = np.isin(np.arange(states.shape[1]), feature)
+    return [
+        Splits.of(states[:, index], threshold[feature == index]) if asked[index] else None
+        for index in range(states.shape[1])
+    ]
 
 
 def highest_above(tree: PolicyTree, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -413,7 +467,9 @@ def count_tree(
         index=index,
         dimension=dimension,
         divider=int(divider),
-        source=Source.of(demonstrations),
+        source=Source.of(demonstrations).with_splits(
+            splits_of(structure.feature, structure.threshold, demonstrations)
+        ),
         feature=structure.feature,
         threshold=structure.threshold,
         children_left=left,

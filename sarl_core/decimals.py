@@ -1,0 +1,72 @@
+"""Decimal numbers that stand for a binary one: as short as may be, and true."""
+
+from __future__ import annotations
+
+import math
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from functools import lru_cache
+
+import numpy as np
+
+MOST_DIGITS = 17
+"""Tell every double from every other."""
+
+_AROUND = {
+    digits: tuple(Context(prec=digits, rounding=way) for way in (ROUND_FLOOR, ROUND_CEILING))
+    for digits in range(1, MOST_DIGITS + 1)
+}
+
+
+@lru_cache(maxsize=65536)
+def short_decimal(exact: float, least: float, most: float, *, fewest: int = 1) -> float | None:
+    """The decimal number of the fewest digits that lies between two numbers.
+
+    Args:
+        exact: What it stands for.
+        least: It is not below this.
+        most: It is below this.
+        fewest: Number of significant digits to begin with; zeros at the end do not count.
+
+    Returns:
+        Of those with as many digits, the nearest to `exact`, and of two the lower; None if `exact`
+        itself is needed, and is not between the two.
+    """
+    number = Decimal(exact)
+    for digits in range(fewest, MOST_DIGITS + 1):
+        candidates = {float(context.plus(number)) for context in _AROUND[digits]}
+        fitting = [value for value in candidates if least <= value < most]
+        if fitting:
+            return min(fitting, key=lambda value: (abs(value - exact), value))
+    return None
+
+
+def decimal_text(value: float) -> str:
+    """A number with every digit it has, and without an exponent unless it needs many zeros.
+
+    Args:
+        value: A finite number.
+
+    Returns:
+        As "293.42", "1700000012" or "1.2e-09"; reads back as the same number.
+    """
+    if value == 0:
+        return "0"
+    if 1e-4 <= abs(value) < 1e15:
+        return np.format_float_positional(value, trim="-")
+    return repr(float(value))
+
+
+def float32_around(value: float) -> tuple[float, float]:
+    """The 32-bit numbers on either side of a number: no other pair is parted by it.
+
+    Args:
+        value: A finite number.
+
+    Returns:
+        The largest that is at most the number, and the one after it; infinite where there is none.
+    """
+    with np.errstate(over="ignore", under="ignore"):
+        near = np.float32(value)
+        if float(near) > value:
+            return float(np.nextafter(near, np.float32(-math.inf))), float(near)
+        return float(near), float(np.nextafter(near, np.float32(math.inf)))

@@ -1,0 +1,157 @@
+"""Thresholds on a feature, and the demonstrated values on either side of each.
+
+They tell how many digits a threshold needs where it is read: so many that the number which is
+written parts the demonstrated states as the threshold does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.decimals import float32_around, short_decimal
+
+FEWEST_DIGITS = 3
+"""Of a threshold that is read: a threshold stands between two values, but not just anywhere."""
+
+_NOTHING = 0.001  # of the gap that a threshold lies in: nearer to zero than so, it is zero
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Splits:
+    """k thresholds on one feature of N demonstrated states.
+
+    Attributes:
+        thresholds: Ascending, each once, (k,).
+        below: The largest demonstrated value that is at most the threshold, -inf where there is
+            none, (k,).
+        above: The smallest demonstrated value above it, inf where there is none, (k,).
+        binary: Whether no value but 0 and 1 was demonstrated.
+    """
+
+    thresholds: Floats
+    below: Floats
+    above: Floats
+    binary: bool = False
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for values in (self.thresholds, self.below, self.above):
+            values.flags.writeable = False
+
+    @classmethod
+    def of(cls, values: NDArray[np.float32], thresholds: Floats) -> Splits:
+        """Look up what lies on either side of thresholds.
+
+        Args:
+            values: The feature in all N states, (N,).
+            thresholds: In any order, (k,).
+
+        Returns:
+            The thresholds with their neighbours.
+        """
+        asked = np.unique(thresholds)
+        ordered = np.sort(values).astype(np.float64)
+        at = np.searchsorted(ordered, asked, side="right")
+        framed = np.concatenate([[-np.inf], ordered, [np.inf]])
+        inner = ordered[np.searchsorted(ordered, 0.0, "right") : np.searchsorted(ordered, 1.0)]
+        within = len(ordered) > 0 and ordered[0] >= 0.0 and ordered[-1] <= 1.0
+        return cls(asked, framed[at], framed[at + 1], bool(within and not len(inner)))
+
+    @classmethod
+    def together(cls, several: Sequence[Splits]) -> Splits:
+        """The thresholds of several trees over the same demonstrations.
+
+        Args:
+            several: One or more.
+
+        Returns:
+            All of them, each once.
+        """
+        if len(several) == 1:
+            return several[0]
+        asked, first = np.unique(
+            np.concatenate([one.thresholds for one in several]), return_index=True
+        )
+        below, above = (
+            np.concatenate([getattr(one, side) for one in several])[first]
+            for side in ("below", "above")
+        )
+        return cls(asked, below, above, all(one.binary for one in several))
+
+    def only(self, thresholds: Iterable[float]) -> Splits:
+        """Some of the thresholds.
+
+        Args:
+            thresholds: Those to keep; those that are not there do not matter.
+
+        Returns:
+            With their neighbours.
+        """
+        kept = np.isin(self.thresholds, np.fromiter(thresholds, dtype=np.float64))
+        return Splits(self.thresholds[kept], self.below[kept], self.above[kept], self.binary)
+
+    def around(self, threshold: float) -> tuple[float, float] | None:
+        """The demonstrated values on either side of a threshold.
+
+        Args:
+            threshold: Any number.
+
+        Returns:
+            `below` and `above`; None if it is none of the k.
+        """
+        at = int(np.searchsorted(self.thresholds, threshold))
+        if at == len(self.thresholds) or self.thresholds[at] != threshold:
+            return None
+        return float(self.below[at]), float(self.above[at])
+
+
+def written_threshold(
+    threshold: float, splits: Splits | None, *, beside: Sequence[float] = ()
+) -> float:
+    """The number that is written for a threshold.
+
+    Args:
+        threshold: At full precision.
+        splits: Of its feature, where they are known. Where they are not, or not of this
+            threshold, it has to part all 32-bit numbers as the threshold does.
+        beside: Values that are shown with it and have to stay on their side, too.
+
+    Returns:
+        A decimal number of three significant digits, or of more where the demonstrated states
+        need them.
+    """
+    below, above = (splits and splits.around(threshold)) or (-math.inf, math.inf)
+    if math.isinf(below) or math.isinf(above):
+        near, next_above = float32_around(threshold)
+        below = near if math.isinf(below) else below
+        above = next_above if math.isinf(above) else above
+    below = max([below, *(value for value in beside if value <= threshold)])
+    above = min([above, *(value for value in beside if value > threshold)])
+    if below <= 0.0 < above and abs(threshold) < _NOTHING * (above - below):
+        return 0.0
+    found = short_decimal(threshold, below, above, fewest=FEWEST_DIGITS)
+    return threshold if found is None else found
+
+
+def written_value(value: float, thresholds: Sequence[float] = ()) -> float:
+    """The number that is written for a value, beside thresholds that are written too.
+
+    Args:
+        value: Any finite number.
+        thresholds: As they are written.
+
+    Returns:
+        A decimal number of three significant digits, or of more where it takes them to stay on
+        its side of each threshold.
+    """
+    least = max([-math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one < value)])
+    most = min([math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one >= value)])
+    found = short_decimal(value, float(least), float(most), fewest=FEWEST_DIGITS)
+    return value if found is None else found
