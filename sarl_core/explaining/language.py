@@ -7,11 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.demonstrations.splits import written_threshold, written_value
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
+from sarl_core.mining.written import limit_texts
 
 _DIGITS = 3
 _FLAG_WORDS = ("contact",)
@@ -107,62 +106,9 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
     one = math.isinf(bounds.low) != math.isinf(bounds.high)
     threshold = bounds.high if math.isinf(bounds.low) else bounds.low
     named = any(word in feature.name.lower().split() for word in _FLAG_WORDS)
-    parts = (
-        0.0 <= threshold < 1.0
-        if feature.splits is not None and feature.splits.binary
-        # A feature with values in between may be asked for any of them; halfway is what is asked
-        # of one that is yes or no.
-        else feature.splits is None and threshold in (0.0, 0.5)
-    )
-    return named and one and not feature.unit and parts
-
-
-def limit_text(threshold: float, feature: Feature, *, beside: Sequence[float] = ()) -> str:
-    """A threshold on a feature, for people.
-
-    Args:
-        threshold: At full precision.
-        feature: Knows the demonstrated values around it.
-        beside: Values of the feature that are shown with it.
-
-    Returns:
-        As "293.42": three significant digits, more where it takes them to part the demonstrated
-        states and `beside` as the threshold does, without its unit.
-    """
-    return decimal_text(written_threshold(threshold, feature.splits, beside=beside))
-
-
-def limit_texts(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> list[str]:
-    """Both ends of an interval, as `limit_text`.
-
-    Args:
-        bounds: Any.
-        feature: It bounds.
-        beside: Values of the feature that are shown with it.
-
-    Returns:
-        The ends that there are, the lower first; never twice the same.
-    """
-    ends = [end for end in bounds[1:] if math.isfinite(end)]
-    texts = [limit_text(end, feature, beside=beside) for end in ends]
-    if len(set(texts)) < len(set(ends)):
-        return list(map(decimal_text, ends))
-    return texts
-
-
-def beside_text(value: float, bounds: Bounds, feature: Feature) -> str:
-    """A value of a feature, for people, where a bound on the feature is shown too.
-
-    Args:
-        value: Of a state.
-        bounds: Are shown with this value `beside` them.
-        feature: Of both.
-
-    Returns:
-        As "293.4": three significant digits, more where it takes them to stay on its side.
-    """
-    limits = limit_texts(bounds, feature, beside=(value,))
-    return decimal_text(written_value(value, [float(limit) for limit in limits]))
+    # A force of contact has values in between, and is asked for more than yes or no.
+    binary = feature.splits is None or feature.splits.binary
+    return named and binary and one and not feature.unit and 0.0 <= threshold < 1.0
 
 
 def condition_text(bounds: Bounds, feature: Feature) -> str:
@@ -262,13 +208,8 @@ def action_text(label: int, dimension: LabelledDimension) -> str:
         As "push right", "action 2", or "torque from -2 to 0".
     """
     if dimension.is_interval:
-        low, high = dimension.edges[label], dimension.edges[label + 1]
-        if low == high:
-            return f"{dimension.name} {number_text(low)}"
-        return (
-            f"{dimension.name} from {number_text(low, apart_from=high)} "
-            f"to {number_text(high, apart_from=low)}"
-        )
+        from_ = "" if dimension.edges[label] == dimension.edges[label + 1] else "from "
+        return f"{dimension.name} {from_}{dimension.label_names[label]}"
     name = dimension.label_names[label]
     bare = name.lstrip("+-").replace(".", "", 1).isdigit()
     return f"{dimension.name} {name}" if bare else name
@@ -284,11 +225,6 @@ def label_text(label: int, dimension: LabelledDimension) -> str:
     Returns:
         As "push right" or "-2 to 0".
     """
-    if dimension.is_interval:
-        low, high = dimension.edges[label], dimension.edges[label + 1]
-        if low == high:
-            return number_text(low)
-        return f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}"
     return dimension.label_names[label]
 
 

@@ -11,12 +11,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text, short_decimal
 from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
 from sarl_core.errors import InputError
 
 MAX_DIVIDER = 100
 
 _ROUNDING = 1e-12  # of an interval's width
+_EDGE_ERROR = 0.005  # of it: an edge is written with no larger an error
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,7 @@ class LabelledDimension:
             A dimension with k labels.
         """
         names = tuple(
-            f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
-            for low, high in pairwise(edges)
+            low if low == high else f"{low} to {high}" for low, high in pairwise(_edge_texts(edges))
         )
         return cls(name, names, edges=tuple(map(float, edges)), bounds_from=bounds_from)
 
@@ -114,6 +115,20 @@ class LabelledDimension:
             found = np.searchsorted(self.inner_edges, values.astype(np.float64), side="right")
             return found.astype(np.int64)
         return values.astype(np.int64) - self.first
+
+
+def _edge_texts(edges: Sequence[float]) -> list[str]:
+    """Edges with three significant digits, or with more where intervals are narrow for those."""
+    width = min(high - low for low, high in pairwise(edges))
+    texts = []
+    for edge in map(float, edges):
+        if abs(edge) < _ROUNDING * width:
+            texts.append("0")
+            continue
+        room = _EDGE_ERROR * width
+        found = short_decimal(edge, edge - room, edge + room, fewest=3)
+        texts.append(decimal_text(edge if found is None else found))
+    return texts
 
 
 def label_dimensions(

@@ -1,0 +1,58 @@
+"""Thresholds and the values beside them as they are written for people, everywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.splits import written_threshold, written_value
+from sarl_core.mining.rules import Bounds
+
+
+def limit_text(threshold: float, feature: Feature, *, beside: Sequence[float] = ()) -> str:
+    """A threshold on a feature.
+
+    Args:
+        threshold: At full precision.
+        feature: Knows the demonstrated values around it.
+        beside: Values of the feature that are shown with it.
+
+    Returns:
+        As "293.42": three significant digits, more where it takes them to part the demonstrated
+        states and `beside` as the threshold does; without its unit.
+    """
+    return decimal_text(written_threshold(threshold, feature.splits, beside=beside))
+
+
+def limit_texts(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> list[str]:
+    """The ends of an interval, each as `limit_text`.
+
+    Args:
+        bounds: Any.
+        feature: That they bound.
+        beside: Values of the feature that are shown with them.
+
+    Returns:
+        The ends that there are, the lower first; two that differ do not read the same.
+    """
+    ends = [end for end in (bounds.low, bounds.high) if math.isfinite(end)]
+    texts = [limit_text(end, feature, beside=beside) for end in ends]
+    return texts if len(set(texts)) == len(set(ends)) else list(map(decimal_text, ends))
+
+
+def value_text(value: float, bounds: Bounds, feature: Feature) -> str:
+    """A value of a feature where bounds on the feature are shown, too.
+
+    Args:
+        value: Of a state.
+        bounds: Shown with the value `beside` them.
+        feature: Of both.
+
+    Returns:
+        As "293.4": three significant digits, more where it takes them to stay on its side of
+        each bound.
+    """
+    limits = limit_texts(bounds, feature, beside=(value,))
+    return decimal_text(written_value(value, tuple(map(float, limits))))
