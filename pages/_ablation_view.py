@@ -125,7 +125,7 @@ def table(found: Ablation, wanted: Wanted, linked: str | None) -> None:
         rule_set = found.shield.rule_set
         rule = rule_set.rules[found.rules[picked[0]]]
         with st.container(border=True):
-            st.markdown(f"**Rule {escaped(rule.id)}.** {escaped(sentence(rule, rule_set))}")
+            st.markdown(f"**{rule_set.name_of(rule)}.** {escaped(sentence(rule, rule_set))}")
             if linked is not None:
                 st.page_link(
                     "rules.py",

@@ -53,7 +53,7 @@ def _conflict_rows(of: Base, found: Verdicts) -> dict[str, list[Any]]:
     for one in found.conflicts:
         for who, says, at in (("Rule", "Says", one.rule), ("Takes from", "Which says", one.other)):
             rule = rule_set.rules[at]
-            rows[who].append(rule.id)
+            rows[who].append(rule_set.name_of(rule))
             rows[says].append(action_text(rule.action, rule_set.actions[rule.dimension]))
     if basis.expert is not None:
         rows["Expert as the rule"] = [one.right for one in found.conflicts]

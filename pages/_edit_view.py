@@ -39,6 +39,7 @@ EVERY, TOUCHED = "All rules", "Edited"
 def bar(of: Base) -> None:
     """Undo, redo, and the file."""
     edits = _edits.history(of)
+    rule_set = _edits.edited(of)
     error = st.session_state.pop("_edit_error", None)
     if error:
         st.error(in_full(error), icon=":material/error:")
@@ -47,7 +48,7 @@ def bar(of: Base) -> None:
             ("Undo", "undo", _edits.undo, edits.edits[-1:]),
             ("Redo", "redo", _edits.redo, edits.undone[-1:]),
         ):
-            told = edit_text(waiting[0], of.rule_set) if waiting else ""
+            told = edit_text(waiting[0], rule_set) if waiting else ""
             st.button(
                 f"{name}: {escaped(_short(told))}" if told else name,
                 on_click=step,
@@ -57,7 +58,6 @@ def bar(of: Base) -> None:
                 key=name.lower(),
                 help=escaped(told) if told else f"Nothing to {name.lower()}",
             )
-        rule_set = _edits.edited(of)
         source = rule_set.source.env_id.rsplit("/", 1)[-1] or "unnamed"
         st.download_button(
             "Rule file",
@@ -182,7 +182,10 @@ def table(of: Base, found: Verdicts) -> Rule | None:
         order = [
             at
             for at in order
-            if all(w in f"{' '.join(told[at])} {rule_set.rules[at].id}".lower() for w in wanted)
+            if all(
+                w in f"{' '.join(told[at])} {rule_set.name_of(rule_set.rules[at])}".lower()
+                for w in wanted
+            )
         ]
     if not order:
         st.info(
@@ -204,7 +207,7 @@ def table(of: Base, found: Verdicts) -> Rule | None:
             state.set_url_choice("rule", ids[rows[0]])
 
     by_hand = tuple(told[at] for at in order if rule_set.rules[at].origin == "manual")
-    written = _written(of.digest, key, by_hand, ids, [told[at] for at in order])
+    written = _written(of.digest, key, by_hand, [told[at] for at in order])
     st.dataframe(
         _with_numbers(written, order, found),
         hide_index=True,
@@ -234,7 +237,6 @@ def _written(
     digest: str,
     key: str,
     by_hand: tuple[tuple[str, str], ...],
-    _ids: list[str],
     _texts: list[tuple[str, str]],
 ) -> Any:
     """The columns that no edit changes as long as the same rules are shown, as an Arrow table."""
@@ -242,7 +244,6 @@ def _written(
 
     return pa.table(
         {
-            "Rule": _ids,
             "Action": [[does] for does, _ in _texts],
             "When": [when for _, when in _texts],
         }
@@ -259,6 +260,7 @@ def _with_numbers(written: Any, order: list[int], found: Verdicts) -> Any:
     table = (
         written.add_column(0, "On", pa.array([rule.enabled for rule in rules]))
         .add_column(1, "Kind", pa.array(kinds))
+        .add_column(2, "Rule", pa.array(list(map(found.rule_set.name_of, rules))))
         .append_column("Decides", pa.array(decided))
     )
     if found.right is not None:
@@ -277,7 +279,9 @@ def _columns(rule_set: RuleSet) -> dict[str, Any]:
         "Kind": column.TextColumn(
             width=70, help="Mined; pinned, so that it keeps its place; or added by hand"
         ),
-        "Rule": column.TextColumn(width=80, help="Its name"),
+        "Rule": column.TextColumn(
+            width=80, help="Its name: rules are numbered by their place in the set"
+        ),
         "Action": action,
         "When": column.TextColumn(
             width=570 - action_width, help="The conditions under which the rule applies"
@@ -306,7 +310,7 @@ def chosen_rule(of: Base, rule: Rule, found: Verdicts) -> str | None:
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
         decides = f"decides {counted(int(found.decided[at]), of.basis.noun)}"
-        st.caption(f"Rule {escaped(rule.id)} · {state_text(rule)} · {decides}")
+        st.caption(f"{rule_set.name_of(rule)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             on = rule.enabled
             _button(

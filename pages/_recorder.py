@@ -75,9 +75,9 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
     st.html(heading("Flight recorder"))
     recorded = source(replay, order)
     steps = recorded.steps
-    chosen, rule_id = filters(recorded)
+    chosen, name = filters(recorded)
     rows = chosen.rows(steps)
-    text = filter_text(chosen, len(rows), len(steps), rule_id)
+    text = filter_text(chosen, len(rows), len(steps), name)
     if not len(rows):
         st.info(
             f"None of the {len(steps):,} steps is as asked; take a filter away.",
@@ -138,14 +138,14 @@ def source(replay: Replay, order: Order) -> Recorded:
 
 
 def filters(recorded: Recorded) -> tuple[StepFilter, str]:
-    """The widgets that leave steps out, and the id of the rule they ask for."""
+    """The widgets that leave steps out, and what the rule they ask for is called."""
     rule_set = recorded.replay.rule_set
     rule = episode = None
     only: list[str] = []
     if rule_set is None and not recorded.several:
         return StepFilter(), ""
     with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
-        rule_id = ""
+        name = ""
         if rule_set is not None:
             only = st.pills(
                 "Only steps",
@@ -156,16 +156,19 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
                 help="Outside the data: the state lies outside what was seen of a rule that the "
                 "agent's action breaks. Only rules that keep their data box can say so.",
             )
-            ids = {rule_set.rules[index].id: int(index) for index in used_rules(recorded.steps)}
+            used = {
+                rule_set.name_of(rule_set.rules[index]): int(index)
+                for index in used_rules(recorded.steps)
+            }
             picked = st.selectbox(
                 "Rule",
-                state_kept([EVERY_RULE, *ids], "by_rule"),
+                state_kept([EVERY_RULE, *used], "by_rule"),
                 key="by_rule",
                 bind="query-params",
                 width=180,
                 help="Those in force at some step, the most frequent first.",
             )
-            rule, rule_id = ids.get(str(picked)), str(picked)
+            rule, name = used.get(str(picked)), str(picked)
         if recorded.several:
             seeds = recorded.episodes.seeds.tolist()
             seed = st.selectbox(
@@ -176,7 +179,7 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
                 width=180,
             )
             episode = seeds.index(int(seed)) if seed and seed != EVERY_EPISODE else None
-    return StepFilter(CHANGED in only, OUTSIDE in only, rule, episode), rule_id
+    return StepFilter(CHANGED in only, OUTSIDE in only, rule, episode), name
 
 
 def state_kept(options: list[str], key: str) -> list[str]:

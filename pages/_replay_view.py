@@ -17,7 +17,6 @@ from _replays import (
     Order,
     Replay,
 )
-from _words import escaped
 from streamlit.errors import StreamlitAPIException
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
@@ -290,11 +289,11 @@ def flips_text(episodes: Episodes) -> str:
 
 def link_rules(view: StepView, linked: str) -> None:
     """A way to each rule in force, on the Rules page under the set that is shown there."""
-    ids = dict.fromkeys(action.rule_id for action in view.actions if action.rule)
-    for rule_id in ids:
+    names = {action.rule_id: action.rule_name for action in view.actions if action.rule}
+    for rule_id, name in names.items():
         st.page_link(
             "rules.py",
-            label="Open this rule" if len(ids) == 1 else f"Open rule {escaped(rule_id)}",
+            label="Open this rule" if len(names) == 1 else f"Open {name}",
             icon=":material/rule:",
             query_params={**st.query_params.to_dict(), "set": linked, "rule": rule_id},
         )

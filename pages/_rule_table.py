@@ -17,6 +17,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, RuleSet
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
+_NAME = 62  # pixels: four digits
 
 
 def action_column(actions: Sequence[LabelledDimension], meaning: str) -> tuple[Any, int]:
@@ -43,9 +44,12 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
     column = st.column_config
     action, action_width = action_column(rule_set.actions, "What the expert does there")
     return {
+        "Rule": column.TextColumn(
+            width=_NAME, help="Its name: rules are numbered by their place in the set"
+        ),
         "Action": action,
         "When": column.TextColumn(
-            width=472 - action_width, help="The conditions under which the rule applies"
+            width=472 - _NAME - action_width, help="The conditions under which the rule applies"
         ),
         "Support": column.NumberColumn(
             width=80, format="%.4f", help="Share of all states to which the rule applies"

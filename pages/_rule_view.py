@@ -159,7 +159,7 @@ def features_of(
     parts = []
     if _rule.conditions:
         found = feature_evidence(_demonstrations, _tree, _rule)
-        figures = features_html(found, _demonstrations.features, label_colour(_rule.action))
+        figures = features_html(found, _tree.source.features, label_colour(_rule.action))
         parts.append(heading("What it asks, feature by feature") + figures)
     if _rule.samples:
         title = "Example states" if _rule.samples > 1 else "The one state it applies to"

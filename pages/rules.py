@@ -55,9 +55,11 @@ def listed_of(key: tuple[object, ...], _rule_set: RuleSet) -> Listed:
     import pyarrow as pa
 
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
+    table = frame(rules, _rule_set)
+    table.insert(2, "Rule", list(map(_rule_set.name_of, rules)))
     return Listed(
         rules,
-        pa.Table.from_pandas(frame(rules, _rule_set), preserve_index=False),
+        pa.Table.from_pandas(table, preserve_index=False),
         tuple(action_text(rule.action, _rule_set.actions[rule.dimension]) for rule in rules),
         tuple(map(lower_bound, rules)),
     )
@@ -171,7 +173,7 @@ def matching(listed: Listed, rule_set: RuleSet) -> list[int]:
 def has(listed: Listed, at: int, rule_set: RuleSet, wanted: list[str]) -> bool:
     """Whether a rule has all words of a search."""
     rule = listed.rules[at]
-    text = f"{conditions_text(rule, rule_set)} {listed.does[at]} {rule.id}".lower()
+    text = f"{conditions_text(rule, rule_set)} {listed.does[at]} {rule_set.name_of(rule)}".lower()
     return all(word in text for word in wanted)
 
 

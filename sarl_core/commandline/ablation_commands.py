@@ -129,13 +129,13 @@ def _print(found: Ablation, out: Path | None) -> None:
         signed,
     )
 
-    rules, known = found.shield.rule_set.rules, found.failures_known
+    rule_set, known = found.shield.rule_set, found.failures_known
     if found.rules:
         terminal.print_table(
             ("rule", "verdict", "return without it", "95 % interval", "failures", "changed"),
             [
                 (
-                    rules[effect.rule].id,
+                    rule_set.name_of(rule_set.rules[effect.rule]),
                     effect.verdict,
                     signed(effect.difference.mean),
                     interval_text(effect),

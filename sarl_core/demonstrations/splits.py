@@ -140,18 +140,21 @@ def written_threshold(
     return threshold if found is None else found
 
 
-def written_value(value: float, thresholds: Sequence[float] = ()) -> float:
+def written_value(
+    value: float, thresholds: Sequence[float] = (), *, fewest: int = FEWEST_DIGITS
+) -> float:
     """The number that is written for a value, beside thresholds that are written too.
 
     Args:
         value: Any finite number.
         thresholds: As they are written.
+        fewest: Number of significant digits to begin with.
 
     Returns:
-        A decimal number of three significant digits, or of more where it takes them to stay on
-        its side of each threshold.
+        A decimal number of so many digits, or of more where it takes them to stay on its side of
+        each threshold.
     """
     least = max([-math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one < value)])
     most = min([math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one >= value)])
-    found = short_decimal(value, float(least), float(most), fewest=FEWEST_DIGITS)
+    found = short_decimal(value, float(least), float(most), fewest=fewest)
     return value if found is None else found

@@ -51,7 +51,7 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
     rules = [rule_set.rules[effect.rule] for effect in ablation.effects]
     known = ablation.failures_known
     return {
-        "Rule": [rule.id for rule in rules],
+        "Rule": [rule_set.name_of(rule) for rule in rules],
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "Verdict": [effect.verdict.capitalize() for effect in ablation.effects],
         "Return without it": [effect.difference.mean for effect in ablation.effects],
@@ -156,7 +156,7 @@ def ablation_figure(ablation: Ablation, effects: Sequence[RuleEffect]) -> go.Fig
     Returns:
         A row a rule; to the left of the line the return is lower without it.
     """
-    rules = ablation.shield.rule_set.rules
+    rule_set = ablation.shield.rule_set
     figure = go.Figure()
     figure.add_vline(x=0, line={"color": MUTED_COLOUR, "width": 1, "dash": "dot"})
     for verdict in VERDICTS:
@@ -191,7 +191,7 @@ def ablation_figure(ablation: Ablation, effects: Sequence[RuleEffect]) -> go.Fig
     )
     figure.update_yaxes(
         tickvals=list(range(len(effects))),
-        ticktext=[plain(rules[effect.rule].id) for effect in effects],
+        ticktext=[rule_set.name_of(rule_set.rules[effect.rule]) for effect in effects],
         range=[len(effects) - 0.4, -0.6],
         fixedrange=True,
         showgrid=False,
@@ -205,7 +205,7 @@ def _hover(ablation: Ablation, effect: RuleEffect) -> str:
     rule_set = ablation.shield.rule_set
     rule = rule_set.rules[effect.rule]
     lines = [
-        f"<b>rule {plain(rule.id)}: "
+        f"<b>{rule_set.name_of(rule)}: "
         f"{plain(action_text(rule.action, rule_set.actions[rule.dimension]))}</b>",
         f"{signed(effect.difference.mean)} without it, 95 % interval {interval_text(effect)}",
         effect.verdict,

@@ -306,7 +306,7 @@ def _number(value: float) -> str:
 
 def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
     action = action_text(rule.action, rule_set.actions[rule.dimension])
-    return comment(f"rule {rule.id}: {action}")
+    return comment(f"{rule_set.name_of(rule)}: {action}")
 
 
 def _valid(program: Program) -> str:

@@ -289,4 +289,4 @@ def _number(value: float) -> str:
 
 def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
     action = action_text(rule.action, rule_set.actions[rule.dimension])
-    return one_line(f"rule {rule.id}: {action}")
+    return one_line(f"{rule_set.name_of(rule)}: {action}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import plotly.graph_objects as go
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.distributions import EpisodeSeries, Histogram
-from sarl_core.explaining.language import label_text
+from sarl_core.explaining.language import label_text, number_text
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 
@@ -175,8 +176,8 @@ def _bin_texts(histogram: Histogram, unit: str) -> list[str]:
     if histogram.values is not None:
         return [f"{value:g}{suffix}" for value in histogram.values]
     return [
-        f"{low:.3g} to {high:.3g}{suffix}"
-        for low, high in zip(histogram.edges[:-1], histogram.edges[1:], strict=True)
+        f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{suffix}"
+        for low, high in pairwise(histogram.edges.tolist())
     ]
 
 

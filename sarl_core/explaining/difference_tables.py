@@ -45,7 +45,7 @@ def rule_rows(found: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, 
             ]
     return {
         "What": [kind for kind, *_ in entries],
-        "Rule": [rule.id for _, rule, _, _ in entries],
+        "Rule": [rule_set.name_of(rule) for _, rule, rule_set, _ in entries],
         "Action": [
             action_text(rule.action, rule_set.actions[rule.dimension])
             for _, rule, rule_set, _ in entries
@@ -93,7 +93,7 @@ def example_rows(
         says = [said_text(label, action) for label in labels[rows, dimension].tolist()]
         columns[f"{_capital(name)} says"] = says
         columns[f"Rule, {name}"] = [
-            NO_ID if index == NO_RULE else rule_set.rules[index].id
+            NO_ID if index == NO_RULE else rule_set.name_of(rule_set.rules[index])
             for index in rules[rows, dimension].tolist()
         ]
     if demonstrations is not None:

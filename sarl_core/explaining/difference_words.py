@@ -238,14 +238,15 @@ def difference_lines(found: Disagreement, *, names: tuple[str, str], states_from
     ):
         if rules:
             often = sorted(rules, key=lambda rule: -rule.samples)
-            told_rules = [f"{rule.id}: {sentence(rule, rule_set)}" for rule in often]
+            told_rules = [f"{rule_set.name_of(rule)}: {sentence(rule, rule_set)}" for rule in often]
             lines += ["", f"{title}:", *_first_few(told_rules)]
     if difference.changed:
         changes = [
-            f"{change.before.id}"
-            + ("" if change.after.id == change.before.id else f" (now {change.after.id})")
-            + f": {what_text(change, found)}"
+            f"{before if before == after else f'{before} (now {after})'}: "
+            f"{what_text(change, found)}"
             for change in difference.changed
+            for before in (found.first.name_of(change.before),)
+            for after in (found.second.name_of(change.after),)
         ]
         lines += ["", "Changed:", *_first_few(changes)]
     return lines

@@ -20,12 +20,12 @@ def edit_text(edit: Edit, rule_set: RuleSet) -> str:
 
     Args:
         edit: Any.
-        rule_set: Knows the names of features and actions.
+        rule_set: Knows what features, actions and rules are called.
 
     Returns:
-        As "switch off 0.12" or "add manual.1 (always push right)".
+        As "switch off R12" or "add a rule (always push right)".
     """
-    rule = edit.rule_id
+    rule = rule_set.names.get(edit.rule_id, "a rule")
     if isinstance(edit, Switch):
         return f"switch {'on' if edit.on else 'off'} {rule}"
     if isinstance(edit, Pin):
@@ -38,7 +38,7 @@ def edit_text(edit: Edit, rule_set: RuleSet) -> str:
         return f"remove {rule}"
     told = sentence(edit.rule, rule_set, evidence=False).rstrip(".")
     told = told[:1].lower() + told[1:]
-    return f"add {rule} ({told})" if isinstance(edit, Add) else f"change {rule} ({told})"
+    return f"add a rule ({told})" if isinstance(edit, Add) else f"change {rule} ({told})"
 
 
 def state_text(rule: Rule) -> str:
@@ -108,16 +108,17 @@ def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:
         states: What the states are, as "demonstrated state".
 
     Returns:
-        As "manual.1 (push right) takes 12 demonstrated states from 0.5 (push left): ...".
+        As "R1 (push right) takes 12 demonstrated states from R5 (push left): ...".
     """
     rule, other = rule_set.rules[conflict.rule], rule_set.rules[conflict.other]
     dimension = rule_set.actions[rule.dimension]
     says, said = label_text(rule.action, dimension), label_text(other.action, dimension)
-    text = f"{rule.id} ({says}) takes {counted(conflict.states, states)} from {other.id} ({said})"
+    name, other_name = rule_set.name_of(rule), rule_set.name_of(other)
+    text = f"{name} ({says}) takes {counted(conflict.states, states)} from {other_name} ({said})"
     if conflict.right is None or conflict.other_right is None:
         return f"{text}."
     return (
-        f"{text}; the expert did as {rule.id} says in {conflict.right:,} of them, as {other.id} "
+        f"{text}; the expert did as {name} says in {conflict.right:,} of them, as {other_name} "
         f"says in {conflict.other_right:,}."
     )
 
@@ -130,7 +131,7 @@ def rule_name(rule: Rule, rule_set: RuleSet) -> str:
         rule_set: Knows the names.
 
     Returns:
-        As "0.12: pole angle > 0.02 rad → push right".
+        As "R12: pole angle > 0.02 rad → push right".
     """
     does = action_text(rule.action, rule_set.actions[rule.dimension])
-    return f"{rule.id}: {conditions_text(rule, rule_set)} → {does}"
+    return f"{rule_set.name_of(rule)}: {conditions_text(rule, rule_set)} → {does}"

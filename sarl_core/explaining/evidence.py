@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.language import label_text, query_text
+from sarl_core.demonstrations.splits import written_value
+from sarl_core.explaining.language import label_text, number_text, query_text
 from sarl_core.mining.rules import Bounds, Condition, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.written import limit_texts
 
 _TAIL = 0.002  # of the states at either end, kept from flattening the rest of a histogram
 
@@ -192,7 +194,7 @@ def example_columns(
     labels = dimension.labels_of(values)
     assert demonstrations.steps is not None
     did = (
-        [f"{value:.4g}" for value in values.tolist()]
+        list(map(number_text, values.tolist()))
         if dimension.is_interval
         else [label_text(label, dimension) for label in labels.tolist()]
     )
@@ -208,7 +210,17 @@ def example_columns(
         values = demonstrations.observations[rows, index].astype(np.float64)
         if name in (*columns, "Episode", "Step"):
             name = f"{name} [{index}]"  # a column of a table has a name of its own
-        columns[name] = np.round(values, _decimals(values)).tolist()
+        limits = [
+            float(limit)
+            for bounds in rule.bounds
+            if bounds.feature == index
+            for limit in limit_texts(bounds, tree.source.features[index])
+        ]
+        least = 0.5 * 10.0 ** -_decimals(values)  # nothing beside the largest of them
+        columns[name] = [
+            written_value(value, limits, fewest=4) if abs(value) >= least or limits else 0.0
+            for value in values.tolist()
+        ]
     columns["Episode"] = demonstrations.episodes[rows].tolist()
     columns["Step"] = demonstrations.steps[rows].tolist()
     return columns

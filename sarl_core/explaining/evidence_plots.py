@@ -118,7 +118,7 @@ def _within(share: float, interval: Interval) -> str:
 
 def _tip(rule: Rule, rule_set: RuleSet) -> str:
     does = action_text(rule.action, rule_set.actions[rule.dimension])
-    lines = (f"rule {rule.id}: {does}", evidence_text(rule), interval_text(rule.held_out))
+    lines = (f"{rule_set.name_of(rule)}: {does}", evidence_text(rule), interval_text(rule.held_out))
     return "\n".join(line for line in lines if line)
 
 

@@ -94,14 +94,11 @@ def stability_columns(rules: Sequence[Rule], rule_set: RuleSet, stability: Stabi
         "Overlap": [one.overlap for one in stability.rules],
         "States": [rule.samples for rule in rules],
         "Thresholds and their bands": [
-            "; ".join(
-                band_text(band, features[band.feature].name, features[band.feature].unit)
-                for band in one.bands
-            )
+            "; ".join(band_text(band, features[band.feature]) for band in one.bands)
             or "no conditions"
             for one in stability.rules
         ],
-        "Rule": [rule.id for rule in rules],
+        "Rule": [rule_set.name_of(rule) for rule in rules],
     }
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from html import escape
 
+from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.language import counted, number_text, share_text
 from sarl_core.mining.episode_counts import Influence
@@ -13,6 +14,7 @@ from sarl_core.mining.evidence import HeldOut, Interval
 from sarl_core.mining.holding_out import Verdict, verdict
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.stability import Band, RuleStability
+from sarl_core.mining.written import limit_text
 
 VERDICTS: dict[Verdict, str] = {
     "below": "too low",
@@ -176,19 +178,19 @@ def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int
     return counts
 
 
-def band_text(band: Band, name: str, unit: str = "") -> str:
+def band_text(band: Band, feature: Feature) -> str:
     """How far one threshold of a rule moves.
 
     Args:
         band: What was found.
-        name: Of the feature.
-        unit: Of the feature.
+        feature: Its name, its unit and what is known of the threshold.
 
     Returns:
         As "pole angle > 0.0213 rad (0.018 to 0.025)".
     """
     sign = "≤" if band.op == "<=" else ">"
-    own = f"{name} {sign} {number_text(band.threshold)}{f' {unit}' if unit else ''}"
+    limit = limit_text(band.threshold, feature)
+    own = f"{feature.name} {sign} {limit}{f' {feature.unit}' if feature.unit else ''}"
     if not band.found:
         return f"{own} (not asked again)"
     low = number_text(band.low, apart_from=band.high)

@@ -288,7 +288,7 @@ def rules_to_text(rule_set: RuleSet) -> str:
         rule_set: Any number of rules.
 
     Returns:
-        What it was mined from and how, then every rule as a numbered sentence, by action
+        What it was mined from and how, then every rule as a sentence, by action
         dimension: those that a person placed in their order, then the most general first.
     """
     source = rule_set.source
@@ -310,8 +310,8 @@ def rules_to_text(rule_set: RuleSet) -> str:
         rules = reading_order(rule_set.of_dimension(index))
         lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
         lines += [
-            f"{number:>4}. {sentence(rule, rule_set)}{_mark(rule)}"
-            for number, rule in enumerate(rules, start=1)
+            f"{rule_set.name_of(rule):>5}. {sentence(rule, rule_set)}{_mark(rule)}"
+            for rule in rules
         ]
     if any(rule.placed for rule in rule_set.rules):
         lines += ["", "Rules written by hand or pinned come before the others, in their order."]

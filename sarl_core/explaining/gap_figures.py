@@ -90,7 +90,7 @@ def gap_figure(histogram: GapHistogram, feature: Feature, *, height: int = _HEIG
     edges = histogram.edges
     unit = f" {plain(feature.unit)}" if feature.unit else ""
     ranges = [
-        f"{number_text(low)} to {number_text(high)}{unit}"
+        f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{unit}"
         for low, high in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
     ]
     figure = go.Figure()

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, label_colour
-from sarl_core.explaining.language import action_text, number_text, query_text
+from sarl_core.explaining.language import action_text, bounds_of, number_text, query_text
 from sarl_core.mining.rule_tree import NO_RULE, RuleNode, tree_of
 from sarl_core.mining.rules import Condition, RuleSet
+from sarl_core.mining.written import value_text
 
 
 class AskedQuery(NamedTuple):
@@ -124,12 +125,13 @@ def lit_path_table(path: LitPath, rule_set: RuleSet, dimension: int) -> str:
     nearest = min((query.distance for query in path.queries), default=None)
     rows = []
     for query in path.queries:
-        unit = features[query.condition.feature].unit
-        number = number_text(query.value, apart_from=query.condition.threshold)
-        value = f"{number} {unit}" if unit else number
+        feature = features[query.condition.feature]
+        number = value_text(query.value, feature, [bounds_of(query.condition)])
+        value = f"{number} {feature.unit}" if feature.unit else number
+        asked = query_text(query.condition, features, beside=(query.value,))
         css = ' class="near"' if query.distance == nearest else ""
         rows.append(
-            f"<tr{css}><td>{escape(query_text(query.condition, features))}</td>"
+            f"<tr{css}><td>{escape(asked)}</td>"
             f'<td class="n">{escape(value)}</td>'
             f'<td class="n">{number_text(query.distance)}</td></tr>'
         )
@@ -148,7 +150,7 @@ def _end(path: LitPath, rule_set: RuleSet, dimension: int) -> str:
         rule = rule_set.rules[path.rule]
         action = escape(action_text(rule.action, rule_set.actions[dimension]))
         square = f'<i style="background:{label_colour(rule.action)}"></i>'
-        text = f"Rule {escape(rule.id)}: {square}{action}"
+        text = f"{rule_set.name_of(rule)}: {square}{action}"
     return f'<div class="sarl-lit-end">{text}</div>'
 
 

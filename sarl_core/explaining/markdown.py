@@ -1,4 +1,4 @@
-"""Rules as a Markdown document: a table an action, thresholds with every digit they have."""
+"""Rules as a Markdown document: a table an action."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.explaining.evidence_words import held_out_text, interval_text
 from sarl_core.explaining.export_program import one_line
-from sarl_core.explaining.language import action_text, counted, share_text, threshold_text
+from sarl_core.explaining.language import action_text, counted, share_text
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.written import limit_texts
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
 _ORDINARY = re.compile(r"[A-Za-z0-9 ,;.+/²³°%-]*")
@@ -82,7 +83,7 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     features = rule_set.source.features
     asked = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
     action = markdown_text(action_text(rule.action, rule_set.actions[rule.dimension]))
-    name = markdown_text(rule.id)
+    name = rule_set.name_of(rule)
     if rule.origin == "manual":
         name += ", by hand"
     elif rule.pinned:
@@ -102,12 +103,12 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
 
 
 def _interval(bounds: Bounds, feature: Feature) -> str:
-    """What is asked of one feature, with every digit."""
+    """What is asked of one feature."""
     name = markdown_text(feature.name)
     unit = f" {markdown_text(feature.unit)}" if feature.unit else ""
+    limits = limit_texts(bounds, feature)
     if math.isinf(bounds.low):
-        return f"{name} ≤ {threshold_text(bounds.high)}{unit}"
+        return f"{name} ≤ {limits[0]}{unit}"
     if math.isinf(bounds.high):
-        return f"{name} &gt; {threshold_text(bounds.low)}{unit}"
-    low, high = threshold_text(bounds.low), threshold_text(bounds.high)
-    return f"{low} &lt; {name} ≤ {high}{unit}"
+        return f"{name} &gt; {limits[0]}{unit}"
+    return f"{limits[0]} &lt; {name} ≤ {limits[1]}{unit}"

@@ -40,7 +40,7 @@ def recorder_columns(
 
     Returns:
         Column name to one value a row: the seed, the step, for each dimension what the agent
-        wanted, what was done and the rule's id, then "Changed", "Outside", "Not checked" (why no
+        wanted, what was done and the rule's name, then "Changed", "Outside", "Not checked" (why no
         rule was asked), "Distance", "Reward" and the features, with their units. Where no
         threshold was looked at, the distance is NaN.
     """
@@ -60,7 +60,8 @@ def recorder_columns(
         columns[_titled(f"{before}wanted")] = list(wanted)
         columns[_titled(f"{before}done")] = list(done)
         columns[_titled(f"{before}rule")] = [
-            rule_set.rules[rule].id if rule >= 0 else "" for rule in part.rules[:, index].tolist()
+            rule_set.name_of(rule_set.rules[rule]) if rule >= 0 else ""
+            for rule in part.rules[:, index].tolist()
         ]
     if rule_set is not None:
         columns["Changed"] = part.intervened.tolist()
@@ -106,24 +107,24 @@ def page_count(rows: int) -> int:
     return max(-(-rows // PAGE), 1)
 
 
-def filter_text(chosen: StepFilter, rows: int, total: int, rule_id: str = "") -> str:
+def filter_text(chosen: StepFilter, rows: int, total: int, rule: str = "") -> str:
     """What a filter leaves, in words.
 
     Args:
         chosen: The filter.
         rows: Steps it lets through.
         total: Steps in all.
-        rule_id: Of its rule.
+        rule: What its rule is called.
 
     Returns:
-        As "12 of 300 steps: changed by the rules, under rule 0.14"; "300 steps" without a filter.
+        As "12 of 300 steps: changed by the rules, under R14"; "300 steps" without a filter.
     """
     asked = [
         words
         for words, on in (
             ("changed by the rules", chosen.intervened),
             ("outside the data", chosen.outside),
-            (f"under rule {rule_id}", chosen.rule is not None),
+            (f"under {rule}", chosen.rule is not None),
             ("of one episode", chosen.episode is not None),
         )
         if on

@@ -19,6 +19,7 @@ from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Track
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.written import value_text as number_of
 from sarl_core.rollouts.steps import StepTable
 
 
@@ -35,6 +36,7 @@ class ActionView:
         changed: Whether the shield changed it.
         rule: The rule in force as a sentence, "" where none applies.
         rule_id: Its id, "" where none applies.
+        rule_name: What it is called, "" where none applies.
         abstains: Whether the action breaks the rule and was left as it is, outside its data.
     """
 
@@ -46,6 +48,7 @@ class ActionView:
     changed: bool
     rule: str
     rule_id: str
+    rule_name: str
     abstains: bool = False
 
 
@@ -212,16 +215,34 @@ def step_view(
                 proposed_label=dimension.label_of(float(proposed)),
                 executed_label=dimension.label_of(float(executed)),
                 changed=bool(proposed != executed) and steps.invalid[row] is None,
-                rule=sentence(rule_set.rules[rule], rule_set) if known and rule_set else "",
+                rule=sentence(rule_set.rules[rule], rule_set, state=steps.observation[row])
+                if known and rule_set
+                else "",
                 rule_id=rule_set.rules[rule].id if known and rule_set else "",
+                rule_name=rule_set.name_of(rule_set.rules[rule]) if known and rule_set else "",
                 abstains=known
                 and rule_set is not None
                 and dimension.label_of(float(executed)) != rule_set.rules[rule].action,
             )
         )
+    in_force = steps.rules[row].tolist() if rule_set is not None else []
+    asked = [
+        bounds
+        for rule in in_force
+        if rule_set is not None and rule >= 0
+        for bounds in rule_set.rules[rule].bounds
+    ]
     state = tuple(
-        (feature.name, _state_text(float(value)), feature.unit)
-        for feature, value in zip(features, steps.observation[row], strict=True)
+        (
+            feature.name,
+            number_of(
+                float(value),
+                rule_set.source.features[index] if rule_set is not None else feature,
+                [bounds for bounds in asked if bounds.feature == index],
+            ),
+            feature.unit,
+        )
+        for index, (feature, value) in enumerate(zip(features, steps.observation[row], strict=True))
     )
     return StepView(
         int(steps.step[row]),
@@ -264,7 +285,7 @@ def step_texts(
             else:
                 line.append(f"{prefix}{done}")
             if rule_set is not None:
-                known = f"rule {plain(rule_set.rules[rule].id)}" if rule >= 0 else ""
+                known = rule_set.name_of(rule_set.rules[rule]) if rule >= 0 else ""
                 line.append(known or ("no rule applies" if invalid is None else "not checked"))
     for row in np.flatnonzero(steps.outside).tolist():
         lines[row].append("outside the data behind the rule")
@@ -307,12 +328,6 @@ def value_text(value: float, dimension: LabelledDimension) -> str:
     if not 0 <= label < dimension.n_labels:
         return f"{dimension.name} {value:g}"
     return action_text(label, dimension)
-
-
-def _state_text(value: float) -> str:
-    if math.isnan(value):
-        return "not a number"
-    return number_text(value) if math.isfinite(value) else f"{'-' if value < 0 else ''}infinite"
 
 
 def _edges(low: float, high: float, divider: int) -> NDArray[np.float64]:

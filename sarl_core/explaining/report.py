@@ -148,7 +148,6 @@ def make_report(
         trees = grow_policy_trees(demonstrations, divider=rule_set.divider)
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
-    numbers = {index: number for number, index in enumerate([*order[0], *order[1]], start=1)}
     env_id = demonstrations.env_id or rule_set.source.env_id
     html = _template().render(
         title=f"Rules for {task_name(env_id)}" if env_id else "Rules from demonstrations",
@@ -159,7 +158,7 @@ def make_report(
         rules=rules_part(rule_set, demonstrations, counts, order, examples),
         pictures=_about_pictures(examples, without, wishes, demonstrations),
         frame_size=examples.size if examples is not None else (0, 0),
-        gaps=gaps(rule_set, demonstrations, counts, numbers, examples),
+        gaps=gaps(rule_set, demonstrations, counts, examples),
         compared=compared(comparison),
         again=facts(
             as_given,

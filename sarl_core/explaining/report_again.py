@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import shlex
 from collections.abc import Mapping, Sequence
@@ -13,7 +12,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import counted, threshold_text
 from sarl_core.explaining.report_counts import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_files import rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
 from sarl_core.mining.tree import PolicyTree
 
@@ -28,9 +27,9 @@ def digest_of(rule_set: RuleSet) -> str:
         rule_set: The rules.
 
     Returns:
-        That of the rule file this version would write.
+        As `rules_digest`.
     """
-    return hashlib.blake2b(rules_to_json(rule_set).encode(), digest_size=16).hexdigest()
+    return rules_digest(rule_set)
 
 
 def facts(

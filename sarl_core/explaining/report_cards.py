@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.distributions import FeatureRow
 from sarl_core.explaining.evidence_words import range_text
@@ -24,10 +24,10 @@ from sarl_core.explaining.language import (
     short_condition,
 )
 from sarl_core.explaining.report_counts import Share, Tally
-from sarl_core.explaining.report_demonstrations import within
 from sarl_core.explaining.report_svg import Scale, evidence_bar, interval_bar
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.written import value_text
 from sarl_core.rollouts.example_frames import ExampleFrame, Examples
 
 _MOST_VALUES = 3  # under a picture
@@ -91,8 +91,7 @@ class Card:
     """A rule in full.
 
     Attributes:
-        number: In this report.
-        id: In the rule file.
+        name: As "R12", by its place in the rule file.
         title: The rule as a sentence.
         colour: Of its action.
         action: Its name.
@@ -103,8 +102,7 @@ class Card:
         pictures: Frames at which it applied.
     """
 
-    number: int
-    id: str
+    name: str
     title: str
     colour: str
     action: str
@@ -118,7 +116,6 @@ class Card:
 def rule_card(
     rule_set: RuleSet,
     index: int,
-    number: int,
     demonstrations: Demonstrations,
     tally: Tally,
     ranges: Sequence[FeatureRow],
@@ -129,7 +126,6 @@ def rule_card(
     Args:
         rule_set: The rules.
         index: Of the rule.
-        number: Of the rule in the report.
         demonstrations: Of the report.
         tally: The rules on them.
         ranges: Every feature of them in numbers.
@@ -145,8 +141,7 @@ def rule_card(
     rows = np.flatnonzero(rule.applies(demonstrations.observations))
     applying, decided = len(rows), len(tally.rows(index, rule.dimension))
     return Card(
-        number=number,
-        id=rule.id,
+        name=rule_set.name_of(rule),
         title=sentence(rule, rule_set, evidence=False),
         colour=label_colour(rule.action),
         action=action_text(rule.action, dimension),
@@ -156,7 +151,7 @@ def rule_card(
         conditions=tuple(
             _condition(
                 bounds,
-                demonstrations,
+                rule_set.source.features[bounds.feature],
                 ranges[bounds.feature],
                 (
                     demonstrations.observations[rows, bounds.feature].min().item(),
@@ -272,11 +267,10 @@ def _tried(source: str, found: HeldOut, threshold: float | None) -> Evidence:
 
 def _condition(
     bounds: Bounds,
-    demonstrations: Demonstrations,
+    feature: Feature,
     row: FeatureRow,
     states: Sequence[float],
 ) -> ConditionRow:
-    feature = demonstrations.features[bounds.feature]
     text = short_condition(bounds, feature)
     if is_flag(feature, bounds):
         return ConditionRow(text, "", "")
@@ -310,7 +304,7 @@ def _picture(
         f"rule applies; {frame.player} chose {did}",
         caption=f"{name}: {did}{'' if followed else ', against the rule'}",
         values="; ".join(
-            _value_text(ranges[bounds.feature], frame.observation[bounds.feature].item())
+            _value_text(frame.observation[bounds.feature].item(), features[bounds.feature], bounds)
             for bounds in rule.bounds[:_MOST_VALUES]
             if not is_flag(features[bounds.feature], bounds)
         ),
@@ -318,5 +312,8 @@ def _picture(
     )
 
 
-def _value_text(row: FeatureRow, value: float) -> str:
-    return f"{row.name} {within(value, row)}{f' {row.unit}' if row.unit else ''}"
+def _value_text(value: float, feature: Feature, bounds: Bounds) -> str:
+    return (
+        f"{feature.name} {value_text(value, feature, [bounds])}"
+        f"{f' {feature.unit}' if feature.unit else ''}"
+    )

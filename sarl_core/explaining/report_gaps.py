@@ -47,12 +47,12 @@ class Doubt:
 
     Attributes:
         text: Why, and how many they are.
-        numbers: Of the rules in this report, as far as they are named.
+        names: Of the rules, as far as they are named.
         more: How many are not named.
     """
 
     text: str
-    numbers: tuple[int, ...]
+    names: tuple[str, ...]
     more: int
 
 
@@ -98,7 +98,6 @@ def gaps(
     rule_set: RuleSet,
     demonstrations: Demonstrations,
     tally: Tally,
-    numbers: dict[int, int],
     examples: Examples | None,
 ) -> Gaps:
     """What the rules do not reach, and which of them are doubtful.
@@ -107,7 +106,6 @@ def gaps(
         rule_set: The rules.
         demonstrations: Of the report.
         tally: The rules on them.
-        numbers: Of each rule in the report, by its index.
         examples: With the episodes that were played; None without pictures.
 
     Returns:
@@ -119,7 +117,7 @@ def gaps(
             _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
         ),
         contradictions=_contradictions(demonstrations, rule_set.divider),
-        doubts=_doubts(rule_set, demonstrations, tally, numbers),
+        doubts=_doubts(rule_set, demonstrations, tally),
         beyond=tuple(
             _beyond(one, rule_set, demonstrations, boxed=boxed)
             for one in (examples.played if examples is not None else ())
@@ -162,9 +160,7 @@ def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
     )
 
 
-def _doubts(
-    rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally, numbers: dict[int, int]
-) -> tuple[Doubt, ...]:
+def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> tuple[Doubt, ...]:
     rules = [
         (index, rule) for index, rule in enumerate(rule_set.rules) if rule.enabled and rule.samples
     ]
@@ -172,7 +168,7 @@ def _doubts(
 
     def doubt(chosen: Sequence[int], one: str, many: str) -> None:
         if chosen:
-            named = sorted(numbers[index] for index in chosen)
+            named = [rule_set.name_of(rule_set.rules[index]) for index in sorted(chosen)]
             text = f"1 rule {one}" if len(chosen) == 1 else f"{len(chosen):,} rules {many}"
             found.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
 

@@ -23,8 +23,7 @@ class Line:
     """A rule in a table.
 
     Attributes:
-        number: In this report.
-        id: In the rule file.
+        name: As "R12", by its place in the rule file.
         action: Its name.
         colour: Of its action.
         when: Its conditions, in signs.
@@ -34,8 +33,7 @@ class Line:
         tags: As "switched off".
     """
 
-    number: int
-    id: str
+    name: str
     action: str
     colour: str
     when: str
@@ -128,17 +126,16 @@ def rules_part(
     """
     full, rest = order
     ranges = feature_rows(demonstrations)
-    numbers = {index: number for number, index in enumerate([*full, *rest], start=1)}
     groups = []
     for dimension, action in enumerate(rule_set.actions):
         cards = tuple(
-            rule_card(rule_set, index, numbers[index], demonstrations, tally, ranges, examples)
+            rule_card(rule_set, index, demonstrations, tally, ranges, examples)
             for index in full
             if rule_set.rules[index].dimension == dimension
         )
         if cards:
             groups.append(Group(action.name if len(rule_set.actions) > 1 else "", cards))
-    lines = tuple(_line(rule_set, index, numbers[index]) for index in rest[:MOST_IN_TABLE])
+    lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
     return Rules(
         introduction=_introduction(rule_set, tally, len(full), len(rest)),
         groups=tuple(groups),
@@ -184,11 +181,10 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
     return tuple(found)
 
 
-def _line(rule_set: RuleSet, index: int, number: int) -> Line:
+def _line(rule_set: RuleSet, index: int) -> Line:
     rule = rule_set.rules[index]
     return Line(
-        number=number,
-        id=rule.id,
+        name=rule_set.name_of(rule),
         action=action_text(rule.action, rule_set.actions[rule.dimension]),
         colour=label_colour(rule.action),
         when=conditions_text(rule, rule_set),

@@ -61,7 +61,7 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> str:
         none reaches the rule.
     """
     reached = rule.samples > 0
-    words = [f"Rule {escape(rule.id)}"]
+    words = [rule_set.name_of(rule)]
     if reached:
         words.append(measures_text(rule))
     words.append(f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}")

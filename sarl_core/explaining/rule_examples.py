@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.evidence import example_columns
 from sarl_core.explaining.html_table import TABLE_STYLE, Column, table_html
@@ -37,5 +38,5 @@ def _text(name: str, value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float) and name not in _WHOLE:
-        return f"{value + 0.0:.4g}"  # no -0
+        return decimal_text(value)
     return str(value)

@@ -11,10 +11,11 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
-from sarl_core.explaining.language import label_text, number_text, query_text, share_text
+from sarl_core.explaining.language import label_text, query_text, share_text
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
+from sarl_core.mining.written import limit_text
 
 MAX_BOXES = 2000  # more take a browser the better part of a second
 _HOVERS = 400
@@ -133,8 +134,8 @@ def node_lines(tree: PolicyTree, node: int) -> list[str]:
     ]
     feature = int(tree.feature[node])
     if feature != LEAF:
-        name = tree.source.features[feature].name
-        lines.append(f"asks: {name} ≤ {number_text(float(tree.threshold[node]))}?")
+        asked = tree.source.features[feature]
+        lines.append(f"asks: {asked.name} ≤ {limit_text(float(tree.threshold[node]), asked)}?")
     return lines
 
 

@@ -226,7 +226,7 @@ def _row(matrix: RuleMatrix, rule: Rule) -> str:
             f'width:{bar.right - bar.left:.1f}%;background:{colour}"></i></td>'
         )
     action = escape(_action(rule.action, matrix.rule_set, rule.dimension))
-    name = f"rule {escape(rule.id)}"
+    name = matrix.rule_set.name_of(rule)
     if rule.placed:
         action = f"{PLACED_MARK}{action}"
         name += ", by hand" if rule.origin == "manual" else ", pinned"

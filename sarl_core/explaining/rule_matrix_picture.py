@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.export_program import one_line
-from sarl_core.explaining.language import label_text, share_text
+from sarl_core.explaining.language import label_text, number_text, share_text
 from sarl_core.explaining.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
 from sarl_core.mining.rules import Rule
 
@@ -58,7 +58,9 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         left = first + place * _CELL
         for line, words in enumerate(_two_lines(column.name.name)):
             write(left + 4, _MARGIN + 14 * line, words, _CELL - 8)
-        scale = f"{column.low:.3g} to {column.high:.3g} {column.name.unit}"
+        low = number_text(column.low, apart_from=column.high)
+        high = number_text(column.high, apart_from=column.low)
+        scale = f"{low} to {high} {column.name.unit}"
         write(left + 4, _MARGIN + 30, scale, _CELL - 8, muted=True)
     for number, rule in enumerate(rules):
         top = _MARGIN + _HEAD + number * _ROW

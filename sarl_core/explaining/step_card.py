@@ -104,5 +104,5 @@ def _action(action: ActionView, *, shielded: bool, named: bool, checked: bool) -
         parts.append(f"<p>{said}</p>")
     parts.append(f"<p>{text}</p>")
     if action.rule:
-        parts.append(f"<p><b>Rule {escape(action.rule_id)}.</b> {escape(action.rule)}</p>")
+        parts.append(f"<p><b>{action.rule_name}.</b> {escape(action.rule)}</p>")
     return "".join(parts)

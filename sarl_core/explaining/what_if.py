@@ -14,6 +14,7 @@ from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds, Rule, RuleSet, node_of
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.written import value_text
 from sarl_core.shielding.near import Change
 
 
@@ -51,8 +52,8 @@ def condition_views(
         room = min(value - bounds.low, bounds.high - value)
         views.append(
             ConditionView(
-                short_condition(bounds, feature),
-                with_unit(number_text(value), feature),
+                short_condition(bounds, feature, beside=(value,)),
+                with_unit(value_text(value, feature, [bounds]), feature),
                 with_unit(number_text(room), feature),
             )
         )

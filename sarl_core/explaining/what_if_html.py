@@ -131,7 +131,8 @@ def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet)
         [(view.condition, view.value, view.room) for view in views],
         "The rule's conditions and the state's values",
     )
-    said = f"<p><b>Rule {escape(rule.id)}.</b> {escape(sentence(rule, rule_set))}</p>"
+    told = escape(sentence(rule, rule_set, state=values))
+    said = f"<p><b>{rule_set.name_of(rule)}.</b> {told}</p>"
     return f"{said}{table if views else ''}{_data_html(rule, values, rule_set)}"
 
 
@@ -181,7 +182,7 @@ def _change_row(
 ) -> tuple[str, ...]:
     moved = change.change
     feature, span = rule_set.source.features[moved.feature], spans[moved.feature]
-    rules = [rule_set.rules[rule].id for rule in change.rules.tolist() if rule >= 0]
+    rules = [rule_set.name_of(rule_set.rules[rule]) for rule in change.rules.tolist() if rule >= 0]
     return (
         change_text(moved, feature),
         executed_text(tuple(change.executed.astype(float).tolist()), rule_set.actions),
@@ -218,7 +219,7 @@ def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
     rule = rule_set.rules[miss.rule]
     features = rule_set.source.features
     return (
-        rule.id,
+        rule_set.name_of(rule),
         action_text(rule.action, rule_set.actions[rule.dimension]),
         near_miss_text(miss.changes, features),
         number_text(miss.distance),

@@ -125,7 +125,7 @@ def _edge_texts(edges: Sequence[float]) -> list[str]:
         if abs(edge) < _ROUNDING * width:
             texts.append("0")
             continue
-        room = _EDGE_ERROR * width
+        room = _EDGE_ERROR * width if width > 0 else abs(edge)  # nothing to tell a single one from
         found = short_decimal(edge, edge - room, edge + room, fewest=3)
         texts.append(decimal_text(edge if found is None else found))
     return texts

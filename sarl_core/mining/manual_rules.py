@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.envelope import box_of
@@ -148,7 +149,8 @@ def _refuse_empty(bounds: Bounds, name: str) -> None:
     _, low, high = bounds
     if low >= high:
         raise InputError(
-            f"{name!r} cannot be above {low:g} and at most {high:g}; change one of the two"
+            f"{name!r} cannot be above {decimal_text(low)} and at most {decimal_text(high)}; "
+            "change one of the two"
         )
     # The largest float32 that is allowed; states are float32, thresholds are not.
     largest = float(np.finfo(np.float32).max)
@@ -156,9 +158,8 @@ def _refuse_empty(bounds: Bounds, name: str) -> None:
     if float(top) > high >= -largest:
         top = np.nextafter(top, np.float32(-np.inf))
     if not low < float(top) <= high:
-        limits = [f"above {low!r}"] * math.isfinite(low) + [f"at most {high!r}"] * math.isfinite(
-            high
-        )
+        limits = [f"above {decimal_text(low)}"] * math.isfinite(low)
+        limits += [f"at most {decimal_text(high)}"] * math.isfinite(high)
         raise InputError(
             f"no value of {name!r} is {' and '.join(limits)}, because states are 32-bit numbers "
             "and there is none; leave more room"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import sys
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -42,6 +44,21 @@ def rules_to_json(rule_set: RuleSet) -> str:
         JSON; numbers read back as the same floats.
     """
     return json.dumps(_document(rule_set), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def rules_digest(rule_set: RuleSet) -> str:
+    """Fingerprint of rules, whatever file they came in.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        32 hex digits (blake2b) of the file this version would write, without what is known of the
+        data around thresholds: that is no part of the rules.
+    """
+    bare = rule_set.source.with_splits([None] * len(rule_set.source.features))
+    text = rules_to_json(replace(rule_set, source=bare))
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -244,6 +245,22 @@ class RuleSet:
         """Share of the covered pairs whose label the rule gives; NaN where none is covered."""
         covered = sum(rule.samples for rule in self.rules)
         return sum(rule.correct for rule in self.rules) / covered if covered else float("nan")
+
+    @cached_property
+    def names(self) -> Mapping[str, str]:
+        """What people call the rules, by id: R1 to Rn, by their place in the set."""
+        return {rule.id: f"R{place}" for place, rule in enumerate(self.rules, start=1)}
+
+    def name_of(self, rule: Rule) -> str:
+        """What people call a rule; its id is for files and links.
+
+        Args:
+            rule: One of the set.
+
+        Returns:
+            As "R12".
+        """
+        return self.names[rule.id]
 
     def of_dimension(self, dimension: int) -> tuple[Rule, ...]:
         """The rules of one action dimension.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
@@ -42,17 +42,23 @@ def limit_texts(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = (
     return texts if len(set(texts)) == len(set(ends)) else list(map(decimal_text, ends))
 
 
-def value_text(value: float, bounds: Bounds, feature: Feature) -> str:
-    """A value of a feature where bounds on the feature are shown, too.
+def value_text(value: float, feature: Feature, shown: Iterable[Bounds]) -> str:
+    """A value of a feature where bounds on the feature may be shown, too.
 
     Args:
-        value: Of a state.
-        bounds: Shown with the value `beside` them.
-        feature: Of both.
+        value: Of a state; any number, or none.
+        feature: Its own.
+        shown: Bounds on the feature, shown with the value `beside` them.
 
     Returns:
         As "293.4": three significant digits, more where it takes them to stay on its side of
         each bound.
     """
-    limits = limit_texts(bounds, feature, beside=(value,))
-    return decimal_text(written_value(value, tuple(map(float, limits))))
+    if math.isnan(value):
+        return "not a number"
+    if math.isinf(value):
+        return f"{'-' if value < 0 else ''}infinite"
+    limits = [
+        float(limit) for bounds in shown for limit in limit_texts(bounds, feature, beside=(value,))
+    ]
+    return decimal_text(written_value(value, limits))

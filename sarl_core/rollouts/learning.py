@@ -171,11 +171,9 @@ def rules_digest(rules: RuleSet | None) -> str:
     """
     if rules is None:
         return ""
-    from hashlib import blake2b
+    from sarl_core.mining.rule_files import rules_digest as digest_of
 
-    from sarl_core.mining.rule_files import rules_to_json
-
-    return blake2b(rules_to_json(rules).encode(), digest_size=16).hexdigest()
+    return digest_of(rules)
 
 
 def _learn(

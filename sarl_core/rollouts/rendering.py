@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.mining.written import limit_texts
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.canvas import OVERLAY_COLOURS
 from sarl_core.rollouts.encoding import encode_gif, encode_mp4, gif_bytes
@@ -294,11 +295,12 @@ def plain_descriptions(rule_set: RuleSet) -> DescribeRule:
     def describe(index: int) -> str:
         rule = rule_set.rules[index]
         parts = []
-        for feature, low, high in rule.bounds:
-            name = rule_set.source.features[feature].name
-            left = f"{_short(low)} < " if np.isfinite(low) and np.isfinite(high) else ""
-            right = f" ≤ {_short(high)}" if np.isfinite(high) else f" > {_short(low)}"
-            parts.append(f"{left}{name}{right}")
+        for bounds in rule.bounds:
+            asked = rule_set.source.features[bounds.feature]
+            limits = [text.replace("-", "−") for text in limit_texts(bounds, asked)]
+            left = f"{limits[0]} < " if len(limits) > 1 else ""
+            right = f" {'≤' if np.isfinite(bounds.high) else '>'} {limits[-1]}"
+            parts.append(f"{left}{asked.name}{right}")
         action = rule_set.actions[rule.dimension]
         conclusion = action.label_names[rule.action]
         if len(rule_set.actions) > 1 or action.is_interval:
@@ -306,7 +308,3 @@ def plain_descriptions(rule_set: RuleSet) -> DescribeRule:
         return f"If {' and '.join(parts)}: {conclusion}" if parts else f"Always: {conclusion}"
 
     return describe
-
-
-def _short(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")

@@ -125,7 +125,7 @@ def _of_rule(
         target = dimension.centre(rule.action)
     elif rule.demonstrated_value is None:
         raise InputError(
-            f"rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
+            f"the rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
             "mine the rules again, or choose centre or clip"
         )
     else:

@@ -36,7 +36,7 @@ def test_every_rule_is_what_the_library_gives_and_kept() -> None:
     )
     wanted = ablate("CartPole-v1", "novice", Shield(rules), episodes=6, seed=4000, most=3)
     table = app.dataframe[-1].value
-    assert table["Rule"].tolist() == [rules.rules[rule].id for rule in wanted.rules]
+    assert table["Rule"].tolist() == [f"R{rule + 1}" for rule in wanted.rules]
     assert table["Return without it"].tolist() == [e.difference.mean for e in wanted.effects]
     shown = metrics(app)
     assert shown["Failures, all rules"] == f"{wanted.base_failures} of 6"

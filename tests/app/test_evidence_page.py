@@ -177,7 +177,7 @@ def test_rules_are_looked_for_in_other_draws() -> None:
     rules = mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95)
     assert f"of {len(rules)} rules**" in words
     table = app.dataframe[0].value
-    assert set(table["Rule"]) == {rule.id for rule in rules.rules}
+    assert set(table["Rule"]) == set(rules.names.values())
     assert table["Comes back"].between(0, 1).all()
 
 

@@ -45,7 +45,7 @@ def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
     assert {tuple(action) for action in table["Action"]} == {("shove west",), ("push right",)}
     mined = mine_rules(load_demonstrations(CART), supp_min=0.005, conf_min=0.95)
     largest = max(mined.rules, key=lambda rule: rule.samples)
-    assert f"Rule {largest.id} ·" in html(app)
+    assert f"{mined.name_of(largest)} ·" in html(app)
     assert "lean &lt;b&gt;*of*&lt;/b&gt; the pole" in html(app)
     assert "<b>*of*" not in html(app)
     assert table["States"].tolist() == sorted((r.samples for r in mined.rules), reverse=True)
@@ -53,7 +53,7 @@ def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
     app.switch_page("carry.py").run()
     assert not app.exception
     app.button_group(key="format").set_value("C").run()
-    assert "/* rule 0.2: shove west */" in str(app.get("code")[0].value)
+    assert "/* R1: shove west */" in str(app.get("code")[0].value)
 
     app.switch_page("names.py").run()
     assert list(app.data_editor[2].value["Name"]) == ["shove west", "push right"]

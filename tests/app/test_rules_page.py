@@ -38,7 +38,7 @@ def test_the_rule_of_a_link_is_explained(data: str) -> None:
     rule = rules.rules[-1]
     app = open_page("rules", data=data, rule=rule.id)
     assert f"<h4>{escape(sentence(rule, rules))}</h4>" in html(app)
-    assert f"Rule {rule.id} ·" in html(app)
+    assert f"{rules.name_of(rule)} ·" in html(app)
     examples = min(10, rule.samples)
     assert html(app).count("<tr") == (1 + 1 + rule.length) + (1 + examples)
     assert "this is the rule" in html(app)

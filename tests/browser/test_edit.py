@@ -32,11 +32,11 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     screen.get_by_role("option", name="push left").click()
     expect(screen.get_by_text("It would decide")).to_be_visible()
     press(screen, "Add the rule")
-    expect(screen.get_by_role("button", name="Undo: add manual.1")).to_be_visible()
+    expect(screen.get_by_role("button", name="Undo: add a rule")).to_be_visible()
     assert parameters(screen)["rule"] == "manual.1"
     press(screen, "Move up")
-    screen.get_by_role("button", name="Undo: move manual.1 up").click()
-    expect(screen.get_by_role("button", name="Redo: move manual.1 up")).to_be_visible()
+    screen.get_by_role("button", name="Undo: move R1 up").click()
+    expect(screen.get_by_role("button", name="Redo: move R2 up")).to_be_visible()
     settle(screen)
     with screen.expect_download() as started:
         screen.get_by_role("button", name="Rule file").click()
@@ -56,7 +56,7 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     screen.get_by_role("link", name="Rules", exact=True).click()
     expect(screen.get_by_text("You have made 3 edits of these rules")).to_be_visible()
     screen.get_by_role("link", name="See the edited set").click()
-    expect(screen.get_by_role("button", name="Undo: add manual.1")).to_be_visible()
+    expect(screen.get_by_role("button", name="Undo: add a rule")).to_be_visible()
     no_trace(screen)
 
 

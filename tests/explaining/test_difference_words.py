@@ -56,15 +56,15 @@ HAND = manual_rule(
 @pytest.mark.parametrize(
     ("edit", "text"),
     [
-        (Switch("0.1", False), "switch off 0.1"),
-        (Switch("0.1", True), "switch on 0.1"),
-        (Pin(LOW), "pin 0.1"),
-        (Unpin("0.1"), "unpin 0.1"),
-        (Move("manual.1", True), "move manual.1 up"),
-        (Move("manual.1", False), "move manual.1 down"),
-        (Remove("manual.1"), "remove manual.1"),
-        (Add(HAND), "add manual.1 (if the angle is above 0.3 rad, then right)"),
-        (Change(HAND), "change manual.1 (if the angle is above 0.3 rad, then right)"),
+        (Switch("0.1", False), "switch off R1"),
+        (Switch("0.1", True), "switch on R1"),
+        (Pin(LOW), "pin R1"),
+        (Unpin("0.1"), "unpin R1"),
+        (Move("manual.1", True), "move a rule up"),
+        (Move("manual.1", False), "move a rule down"),
+        (Remove("manual.1"), "remove a rule"),
+        (Add(HAND), "add a rule (if the angle is above 0.3 rad, then right)"),
+        (Change(HAND), "change a rule (if the angle is above 0.3 rad, then right)"),
     ],
 )
 def test_an_edit_in_words(edit, text):
@@ -89,12 +89,12 @@ def test_a_change_and_a_conflict_in_words():
         "None of 10 states is decided differently."
     )
     assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (
-        "manual.1 (right) takes 2 states from 0.1 (left); the expert did as manual.1 says in 0 of "
-        "them, as 0.1 says in 2."
+        "R1 (right) takes 2 states from R2 (left); the expert did as R1 says in 0 of them, as R2 "
+        "says in 2."
     )
     unknown = verdicts(ground, after.rule_set)
     assert conflict_text(unknown.conflicts[0], unknown.rule_set, states="state") == (
-        "manual.1 (right) takes 2 states from 0.1 (left)."
+        "R1 (right) takes 2 states from R2 (left)."
     )
 
 
@@ -142,13 +142,13 @@ def test_a_document_and_tables():
     assert document["dimensions"][0]["confusion"] == [[0, 2, 3], [0, 0, 0], [0, 5, 0]]
     rows = rule_rows(FOUND)
     assert rows["What"] == ["changed", "added"]
-    assert rows["Rule"] == ["0.1", "manual.1"]
+    assert rows["Rule"] == ["R2", "R1"]
     assert rule_rows(FOUND, ("added",))["When"] == ["angle > 0.3 rad"]
     examples = example_rows(FOUND, 0, STATES, names=("a", "b"), demonstrations=SHOWN, most=4)
     assert examples["Step"] == [0, 3, 6, 9]
     assert examples["A says"] == ["left", "left", "no rule", "no rule"]
     assert examples["B says"] == ["no rule", "right", "right", "right"]
-    assert examples["Rule, b"] == ["–", "manual.1", "manual.1", "manual.1"]
+    assert examples["Rule, b"] == ["–", "R1", "R1", "R1"]
     assert examples["Expert did"] == ["left", "left", "right", "right"]
     assert "Expert did" not in example_rows(FOUND, 0, STATES, names=("a", "b"))
 

@@ -45,7 +45,7 @@ def test_counts_that_overlap_are_no_share_of_the_states(mined: RuleSet, edited: 
 
 
 def test_text_keeps_the_order_of_placed_rules_and_marks_those_off(edited: RuleSet) -> None:
-    lines = re.findall(r"^ +\d+\. .*", rules_to_text(edited), flags=re.M)
+    lines = re.findall(r"^ +R\d+\. .*", rules_to_text(edited), flags=re.M)
     assert lines[0].endswith("(pinned)")
     assert "Always" in lines[1]
     assert lines[1].endswith("(by hand)")
@@ -77,8 +77,8 @@ def test_the_matrix_shows_placed_rules_first_with_a_mark(mined: RuleSet, edited:
     assert [rule.id for rule in matrix.rules[:2]] == ["pinned", "hand"]
     assert sorted(rule.id for rule in matrix.rules) == sorted(rule.id for rule in edited.rules)
     html = matrix_html(matrix, matrix.rules)
-    marked = re.findall(r'title="rule ([^",]+), (pinned|by hand)"', html)
-    assert marked == [("pinned", "pinned"), ("hand", "by hand")]
+    marked = re.findall(r'title="(R\d+), (pinned|by hand)"', html)
+    assert marked == [("R1", "pinned"), ("R2", "by hand")]
     assert html.count("* ") == 3  # with the legend
     assert "Expert agrees" in html
     assert ">Right<" not in html

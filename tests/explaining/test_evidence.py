@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sarl_core import mine_rules
+from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining import evidence_figures as figures
 from sarl_core.explaining.evidence_tables import (
     enough_columns,
@@ -129,10 +130,10 @@ def test_what_is_missing_is_said(more, text):
 
 
 def test_a_band_and_a_return_are_said():
-    assert band_text(Band(0, ">", 0.0213, 0.018, 0.025, 9), "angle", "rad") == (
+    assert band_text(Band(0, ">", 0.0213, 0.018, 0.025, 9), Feature("angle", "rad")) == (
         "angle > 0.0213 rad (0.018 to 0.025)"
     )
-    assert band_text(Band(0, "<=", 2.0, float("nan"), float("nan"), 0), "speed") == (
+    assert band_text(Band(0, "<=", 2.0, float("nan"), float("nan"), 0), Feature("speed")) == (
         "speed ≤ 2 (not asked again)"
     )
     assert stability_text(RuleStability("0.1", 0.9, 0.8, ()), 30) == "came back in 27 of 30 rounds"

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -61,7 +62,9 @@ def test_no_cell_is_a_formula(unfiltered: RuleSet) -> None:
 def test_text_numbers_every_rule_and_promises_nothing(unfiltered: RuleSet) -> None:
     text = rules_to_text(unfiltered)
     assert f"{unfiltered.rule_count:,} rules" in text
-    assert f"{unfiltered.rule_count:>4}. If " in text
+    names = re.findall(r"^ +(R\d+)\. If ", text, flags=re.M)
+    assert set(names) == {f"R{place}" for place in range(1, unfiltered.rule_count + 1)}
+    assert len(names) == unfiltered.rule_count
     assert "guarantee nothing" in text
 
 

@@ -79,7 +79,7 @@ def test_the_table_says_what_was_recorded(rules: RuleSet, played: Episodes) -> N
         assert found["Step"][place] == steps.step[row]
         assert found["Wanted"][place] == names[int(steps.proposed[row, 0])]
         assert found["Done"][place] == names[int(steps.executed[row, 0])]
-        assert found["Rule"][place] == rules.rules[int(steps.rules[row, 0])].id
+        assert found["Rule"][place] == f"R{steps.rules[row, 0] + 1}"
         assert found["Changed"][place] is True
         assert found["pole angle (rad)"][place] == steps.observation[row, 2]
     alone = recorder_columns(steps, rows, dimensions, rules.source.features, None)
@@ -108,8 +108,8 @@ def test_pages_and_places() -> None:
     assert [page_count(n) for n in (0, 1, PAGE, PAGE + 1)] == [1, 1, 1, 2]
     assert filter_text(StepFilter(), 300, 300) == "300 steps"
     assert (
-        filter_text(StepFilter(intervened=True, rule=3), 12, 300, "0.14")
-        == "12 of 300 steps: changed by the rules, under rule 0.14"
+        filter_text(StepFilter(intervened=True, rule=3), 12, 300, "R14")
+        == "12 of 300 steps: changed by the rules, under R14"
     )
 
 

@@ -6,7 +6,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.replay import ActionView, StepView
 from sarl_core.explaining.step_card import picture, step_card, swatch
 
-ACTION = ActionView("engine", "left", "right", 0, 1, True, "If the angle > 0, then right.", "7")
+ACTION = ActionView(
+    "engine", "left", "right", 0, 1, True, "If the angle > 0, then right.", "7", "R8"
+)
 STEP = StepView(4, (ACTION,), 0.25, (("angle", "0.5", "rad"), ("<b>x</b>", "2", "")))
 
 
@@ -14,7 +16,7 @@ def test_a_changed_action_is_told_with_both_and_the_rule() -> None:
     card = step_card(STEP, shielded=True)
     assert "Changed by the rules" in card
     assert card.index(label_colour(0)) < card.index(label_colour(1))
-    assert "<b>Rule 7.</b> If the angle &gt; 0, then right." in card
+    assert "<b>R8.</b> If the angle &gt; 0, then right." in card
     assert "Smallest distance to a threshold on the way: 0.25" in card
     assert "<tr><td>angle</td>" in card
     assert "<b>engine</b>" not in card  # one action dimension needs no name

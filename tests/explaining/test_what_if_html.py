@@ -118,7 +118,7 @@ def test_the_rule_stands_with_its_conditions_and_its_data():
         ["Condition", "The state has", "Room to move"],
         ["0.125 < <b>angle ≤ 0.5 rad", "0.25 rad", "0.125 rad"],
     ]
-    assert "Rule 0.1<. If the <b>angle is between 0.125 and 0.5 rad, then <i>right" in words(found)
+    assert "R1. If the <b>angle is between 0.125 and 0.5 rad, then <i>right" in words(found)
     assert "The state lies inside this rule's data" in words(found)
 
 
@@ -164,7 +164,7 @@ def test_the_least_change_is_a_sentence_and_a_row():
     found = changes_html(changes_of((0.0, 0.0)), SPANS, RULES)
     assert table(found) == [
         ["If", "Executed", "Rule", "In spreads", "From exactly", "Demonstrated"],
-        ["<b>angle were 0.125 rad more", "<i>right", "0.1<", "0.25", "0.12500001 rad", "yes"],
+        ["<b>angle were 0.125 rad more", "<i>right", "R1", "0.25", "0.12500001 rad", "yes"],
     ]
     assert "Executed would be <i>right if <b>angle were 0.125 rad more." in words(found)
     helped = {one.text for one in element(found).iter("th") if one.get("title")}
@@ -186,9 +186,9 @@ def test_rules_that_nearly_apply_say_what_they_lack():
     found = misses_html(misses, RULES)
     assert table(found) == [
         ["Rule", "Says", "Would apply if", "In spreads", "In force", "From exactly"],
-        ["0.1<", "<i>right", "<b>angle were 0.125 rad more", "0.25", "yes", "0.12500001 rad"],
+        ["R1", "<i>right", "<b>angle were 0.125 rad more", "0.25", "yes", "0.12500001 rad"],
         [
-            "0.2",
+            "R2",
             "left",
             "<b>angle were 0.25 rad less and speed were 0.5 more",
             "1",
