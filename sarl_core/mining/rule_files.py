@@ -295,12 +295,12 @@ class _Reader:
             raise self.fail(f"{quoted(next(iter(self._value)))} is not known to this version")
 
 
-def _is_number(value: object) -> bool:
-    """Whether a value from a file is a number that a state or an action may be."""
+def _is_number(value: object, largest: float = _LARGEST) -> bool:
+    """Whether a value from a file is a number, and not too large."""
     # Compared before it is converted: an integer may be too large for a float.
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
-    return -LARGEST <= value <= LARGEST
+    return -largest <= value <= largest
 
 
 def _rule_set(document: _Reader) -> RuleSet:
@@ -387,7 +387,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
             raise part.fail("'labels' is empty")
     elif kind == "interval":
         edges = part.take("edges", list)
-        numeric = all(map(_is_number, edges))
+        numeric = all(_is_number(edge, LARGEST) for edge in edges)
         single = numeric and len(edges) == 2 and edges[0] == edges[1]
         if not single and (not numeric or len(edges) < 3 or sorted(set(edges)) != edges):
             raise part.fail(

@@ -99,10 +99,10 @@ NAMES = ("temp", "time", "left leg contact", "contact force")
 UNITS = ("K", "", "", "")
 
 _OFFSETS = st.one_of(
-    st.sampled_from([0.0, 293.0, 1.7e9, -40.0, 1e-9, 1e30, -1e30, 1e-30, 16777216.0, 0.5]),
+    st.sampled_from([0.0, 293.0, 1.7e9, -40.0, 1e-9, 1e28, -1e28, 1e-30, 16777216.0, 0.5]),
     st.floats(-1e9, 1e9, width=32),
 )
-_SCALES = st.sampled_from([1e-9, 1e-3, 0.37, 1.0, 1234.5, 1e9, 1e29])
+_SCALES = st.sampled_from([1e-9, 1e-3, 0.37, 1.0, 1234.5, 1e9, 1e27])
 
 
 @st.composite
@@ -182,7 +182,7 @@ def test_a_condition_and_the_value_beside_it_agree(
     state = np.where(
         rng.random(states.shape[1]) < 0.5,
         states[pick % len(states)],
-        np.nextafter(states[-1 - pick % len(states)], np.float32(rng.choice([-1e38, 1e38]))),
+        np.nextafter(states[-1 - pick % len(states)], np.float32(rng.choice([-1e29, 1e29]))),
     )
     (rule,) = (one for one in rule_set.rules if one.applies(state[None])[0])
     names = {feature.name: place for place, feature in enumerate(demonstrations.features)}
