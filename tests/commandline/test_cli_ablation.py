@@ -45,7 +45,8 @@ def test_ablate_says_what_the_library_says(run, few_rules, tmp_path):
     assert [float(row["return_difference"]) for row in rows] == differences
     text = run(*arguments(few_rules))
     assert "load-bearing" in text
-    assert all(row["rule"] in text for row in document["rules"])
+    names = RuleSet.load(few_rules).names
+    assert all(f"{names[row['rule']]} " in text for row in document["rules"])
 
 
 @pytest.mark.parametrize(
