@@ -18,6 +18,7 @@ from _rule_table import table_height
 from _words import in_full
 
 from sarl_core.demonstrations.formats import save_demonstrations
+from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.aggregation_figures import (
     RoundPoint,
@@ -29,6 +30,7 @@ from sarl_core.explaining.aggregation_figures import (
 )
 from sarl_core.explaining.comparison_text import POLICY_TEXT
 from sarl_core.explaining.language import counted, share_text
+from sarl_core.limits import limited_bytes
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.rollouts.aggregation import Aggregation
 from sarl_core.rollouts.aggregation_files import aggregation_card, card_path
@@ -335,8 +337,8 @@ def read_document(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        document = parse_json(limited_bytes(path))
+    except (OSError, ValueError, InputError) as error:
         raise InputError(f"{path.name} cannot be read ({error}); write it again") from error
     if not isinstance(document, dict):
         raise InputError(f"{path.name} holds no JSON object; write it again")

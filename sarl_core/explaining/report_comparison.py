@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from sarl_core.errors import InputError
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.comparison_text import POLICY_TEXT
 from sarl_core.explaining.language import number_text, share_text
 from sarl_core.explaining.report_svg import MUTED, NEUTRAL, Scale, dot_and_interval
+from sarl_core.limits import limited_bytes
 from sarl_core.rollouts.comparison import Comparison, comparison_row
 from sarl_core.rollouts.shield_effect import Effect
 from sarl_core.rollouts.statistics import MeanInterval
@@ -155,9 +156,9 @@ def read_results(path: Path) -> tuple[Result, ...]:
         InputError: If it is neither.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{path} has over {_MAX_BYTES >> 20} MB, more than any comparison")
-        text = path.read_bytes().decode("utf-8-sig")
+        text = limited_bytes(path, _MAX_BYTES).decode("utf-8-sig")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
         raise InputError(
@@ -252,8 +253,8 @@ def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
 
 def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        document = parse_json(text)
+    except ValueError as error:
         raise InputError(
             f"the comparison {name} is not JSON ({error}); give what `evaluate --json` printed"
         ) from error
@@ -281,9 +282,9 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
         except (TypeError, ValueError, OverflowError):
             found = math.nan
         if not math.isfinite(found):
-            shown = repr(value) if len(repr(value)) <= 40 else f"{repr(value)[:40]}..."
             raise InputError(
-                f"{key!r} in the comparison {name} is {shown}, not a number; download it again"
+                f"{key!r} in the comparison {name} is {quoted(value)}, not a number; download it "
+                "again"
             )
         return found
 
@@ -300,8 +301,8 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
     effect = str(row.get("effect") or "")
     if not low <= iqm <= high:
         raise InputError(
-            f"the interval of {row['arm']!r} in the comparison {name} does not hold its value; "
-            "download it again"
+            f"the interval of {quoted(row['arm'])} in the comparison {name} does not hold its "
+            "value; download it again"
         )
     return Result(
         name=str(row["arm"]),

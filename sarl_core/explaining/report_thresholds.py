@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from sarl_core.documents import parse_json
 from sarl_core.errors import InputError
 from sarl_core.explaining.edited_sets import edits_sentence
 from sarl_core.explaining.language import counted, number_text, share_text, threshold_text
 from sarl_core.explaining.report_counts import Tally
 from sarl_core.explaining.report_svg import layer_colour
+from sarl_core.limits import limited_bytes
 from sarl_core.mining.landscape import Landscape, threshold_landscape
 from sarl_core.mining.rules import FILTERED, NAMED_SETTINGS, UNFILTERED, RuleSet, Thresholds
 from sarl_core.mining.tree import PolicyTree
@@ -114,10 +115,8 @@ def read_card(rules: Path) -> Mapping[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        if path.stat().st_size > _CARD_BYTES:
-            raise InputError(f"{path} is far too large for a card; take it away")
-        card = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
+        card = parse_json(limited_bytes(path, _CARD_BYTES))
+    except (OSError, ValueError, InputError) as error:
         raise InputError(
             f"the card {path} cannot be read ({error}); mend it or take it away"
         ) from (error)

@@ -34,8 +34,10 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from sarl_core.errors import InputError
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 from sarl_core.reproducing.chance import chance_text
 from sarl_core.reproducing.verdicts import VERDICTS, Claim
 
@@ -154,17 +156,14 @@ def read_report(folder: Path) -> Report | None:
     try:
         if not path.exists():
             return None
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"it has more than {MAX_BYTES // 10**6} MB")
-        return parse_report(json.loads(path.read_text(encoding="utf-8")))
+        return parse_report(parse_json(limited_bytes(path, MAX_BYTES)))
     except OSError as error:
         raise InputError(
             f"{path} cannot be read ({error.strerror or error}); choose another folder"
         ) from error
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:200]
+    except (ValueError, InputError) as error:
         raise InputError(
-            f"{path} is no report of this program ({reason}); delete it or choose another folder"
+            f"{path} is no report of this program ({error}); delete it or choose another folder"
         ) from error
 
 
@@ -183,7 +182,7 @@ def parse_report(document: Any) -> Report:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f"its format is not {FORMAT}")
     if document.get("version") != VERSION:
-        raise ValueError(f"its version is {document.get('version')!r} and not {VERSION}")
+        raise ValueError(f"its version is {quoted(document.get('version'))} and not {VERSION}")
     studies = document.get("studies")
     if not isinstance(studies, dict):
         raise ValueError("it lists no studies")
@@ -194,7 +193,7 @@ def _entry(name: str, entry: Any) -> Entry:
     names = {one.name for one in fields(Entry)}
     if not isinstance(entry, dict) or set(entry) != names:
         raise ValueError(
-            f"study {name[:40]!r} does not have the entries {', '.join(sorted(names))}"
+            f"study {quoted(name)} does not have the entries {', '.join(sorted(names))}"
         )
     for key in _TEXTS:
         _expect(isinstance(entry[key], str), name, key)
@@ -226,7 +225,7 @@ def _claim(name: str, claim: Any) -> Claim:
 
 def _expect(right: bool, name: str, key: str) -> None:
     if not right:
-        raise ValueError(f"{key!r} of study {name[:40]!r} is not what it should be")
+        raise ValueError(f"{key!r} of study {quoted(name)} is not what it should be")
 
 
 def _is_number(value: Any) -> bool:

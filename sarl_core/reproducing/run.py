@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.pictures import drawing_pictures
 from sarl_core.files import whole_file
 from sarl_core.reproducing.chance import with_chance
@@ -109,8 +109,8 @@ def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFram
     unknown = next((name for name in report.studies if name not in STUDIES), None)
     if unknown is not None:
         raise InputError(
-            f"the report in {folder} has a study {unknown[:40]!r} that this version does not know; "
-            "choose another folder"
+            f"the report in {folder} has a study {quoted(unknown)} that this version does not "
+            "know; choose another folder"
         )
     return _read_tables(folder, report, {study.name for study in studies}), report
 

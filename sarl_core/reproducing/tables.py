@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 from sarl_core.reproducing.study import Study
 
 if TYPE_CHECKING:
@@ -43,7 +45,7 @@ def read_table(study: Study, path: Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        frame = pd.read_csv(path)
+        frame = pd.read_csv(io.BytesIO(limited_bytes(path)))
         missing = [column for column in study.columns if column not in frame.columns]
         if missing:
             raise ValueError(f"it has no column {missing[0]!r}")

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.errors import InputError, WorkError
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
 from sarl_core.rollouts.learning_arms import ARMS, LearningArm
 from sarl_core.rollouts.learning_curves import LearningCurve, Trial
 
@@ -23,6 +25,8 @@ VERSION = 1
 PLAN, RESULTS, CURVES = "plan.json", "results.json", "curves.csv"
 RUNS, POLICIES = "runs", "policies"
 
+# What a document leads to that is of another form than ours.
+_MALFORMED = (KeyError, TypeError, ValueError, OverflowError, AttributeError)
 _DECIMALS = 4  # of returns in files
 _COLUMNS = ("ends", "returns", "lengths", "crashed", "interventions", "covered", "shielded")
 _HEADINGS = ("step", "return", "length", "crashed", "interventions", "covered", "shielded")
@@ -123,16 +127,17 @@ def read_json(path: Path) -> dict[str, Any]:
         InputError: If it is no such file, or of another version.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        document = parse_json(limited_bytes(path))
+    except (OSError, ValueError, InputError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(
-            f"{path} cannot be read ({error}); choose a folder that `learn` wrote"
+            f"{path} cannot be read ({reason}); choose a folder that `learn` wrote"
         ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f"{path} is not of a study of learning; choose a folder `learn` wrote")
     if document.get("version") != VERSION:
         raise InputError(
-            f"{path} has version {document.get('version')!r} of the format, and this program "
+            f"{path} has version {quoted(document.get('version'))} of the format, and this program "
             f"reads version {VERSION}; use a program of its version"
         )
     return document
@@ -178,7 +183,7 @@ def load_run(path: Path) -> LearningRun:
     document = read_json(path)
     try:
         return _run(document, LearningCurve.from_dict(document["curve"]))
-    except (KeyError, TypeError, ValueError) as error:
+    except _MALFORMED as error:
         raise InputError(f"{path} lacks a part of its run ({error}); delete it") from error
 
 
@@ -199,8 +204,11 @@ def load_study(folder: Path) -> LearningStudy:
         arms = tuple(ARMS[name] for name in plan["arms"])
         seeds = tuple(int(seed) for seed in plan["seeds"])
         env_id, steps = str(plan["env_id"]), int(plan["steps"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{folder / PLAN} lacks a part of its plan ({error})") from error
+    except _MALFORMED as error:
+        raise InputError(
+            f"{folder / PLAN} lacks a part of its plan ({error}); choose a folder that `learn` "
+            "wrote"
+        ) from error
     if (folder / RUNS).is_dir():
         paths = [run_path(folder, arm, seed) for seed in seeds for arm in arms]
         runs = tuple(load_run(path) for path in paths if path.is_file())
@@ -303,7 +311,7 @@ def _from_tables(folder: Path) -> tuple[LearningRun, ...]:
 
     entries: Sequence[Mapping[str, Any]] = read_json(folder / RESULTS).get("runs", [])
     try:
-        table = pd.read_csv(folder / CURVES)
+        table = pd.read_csv(io.BytesIO(limited_bytes(folder / CURVES)))
         curves = {
             key: LearningCurve.from_dict(
                 {
@@ -317,5 +325,8 @@ def _from_tables(folder: Path) -> tuple[LearningRun, ...]:
         return tuple(
             _run(entry, curves.get((entry["arm"], int(entry["seed"])), empty)) for entry in entries
         )
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{folder / CURVES} does not fit {RESULTS} ({error})") from error
+    except (OSError, *_MALFORMED) as error:
+        raise InputError(
+            f"{folder / CURVES} does not fit {RESULTS} ({error}); copy both from a folder that "
+            "`learn` wrote"
+        ) from error
