@@ -111,7 +111,7 @@ def entry_content(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, size: int) -
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise InputError(
             f"its entry {quoted(entry.filename)} is compressed in a way that is not read; save it "
-            "with numpy.savez or numpy.savez_compressed"
+            "with the usual one of ZIP files (deflate), or with none"
         )
     with archive.open(entry) as file:
         return file.read(size)

@@ -6,10 +6,7 @@ Two entries are looked at: `policy.pth`, by torch's reader for weights only, and
 from __future__ import annotations
 
 import io
-import lzma
 import warnings
-import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.archives import entry_content, opened
 from sarl_core.errors import InputError
+from sarl_core.limits import limited_bytes
 from sarl_core.rollouts.files import MAX_POLICY_BYTES, check_unpacked_size
 from sarl_core.rollouts.plain_pickle import MAX_BYTES
 from sarl_core.rollouts.policies import MlpPolicy
@@ -26,6 +25,8 @@ from sarl_core.rollouts.sb3_normalisation import find_statistics
 from sarl_core.rollouts.sb3_settings import read_settings
 from sarl_core.rollouts.sb3_weights import policy_from_state
 from sarl_core.rollouts.spaces import label_counts
+
+_MAX_STRUCTURE = 2**20  # bytes that say which weights there are; some kilobytes do
 
 
 def load_sb3_zip(
@@ -91,57 +92,56 @@ def load_sb3_zip(
 def _entries(path: Path) -> tuple[bytes, bytes]:
     """The weights and the text."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with opened(limited_bytes(path, MAX_POLICY_BYTES)) as archive:
             check_unpacked_size(archive, path)
+            found = []
             # Half of what a policy may take: the weights are in memory twice while they are read.
-            for entry, most in (("policy.pth", MAX_POLICY_BYTES // 2), ("data", MAX_BYTES)):
-                if archive.getinfo(entry).file_size > most:
+            for name, most in (("policy.pth", MAX_POLICY_BYTES // 2), ("data", MAX_BYTES)):
+                entry = archive.getinfo(name)
+                if entry.file_size > most:
                     raise InputError(
-                        f"{path}: its {entry} unpacks to more than {most // 2**20} MB, more than "
-                        "any MlpPolicy has; give a policy file"
+                        f"its {name} unpacks to more than {most // 2**20} MB, more than any "
+                        "MlpPolicy has; give a policy file"
                     )
-            return archive.read("policy.pth"), archive.read("data")
-    except InputError:
-        raise
+                found.append(entry_content(archive, entry, most))
+            return found[0], found[1]
     except KeyError as error:
         raise InputError(
             f"{path} is not a model of Stable-Baselines3 (it lacks policy.pth or data); "
             "give what model.save() wrote"
         ) from error
-    except (
-        OSError,
-        zipfile.BadZipFile,
-        EOFError,
-        NotImplementedError,
-        RuntimeError,
-        ValueError,
-        zlib.error,
-        lzma.LZMAError,
-    ) as error:
+    except OSError as error:
         raise InputError(
-            f"{path} cannot be read as a zip file (it is damaged, encrypted, or packed in a way "
-            "that is not known); give what model.save() wrote"
+            f"{path} cannot be read as a zip file ({error.strerror or type(error).__name__}); "
+            "give what model.save() wrote"
         ) from error
+    except InputError as error:
+        raise InputError(f"{path} cannot be read as a zip file: {error}") from error
 
 
 def _state(data: bytes, path: Path) -> dict[str, NDArray[np.float32]]:
     """Weights by name, from the bytes of `policy.pth`."""
     import torch
 
+    if not data.startswith(b"PK"):
+        raise _no_weights()
     try:
         # Torch's older format is a bare pickle stream; only the zip has sizes to check first.
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        with opened(data) as archive:
             check_unpacked_size(archive, path)
+            for entry in archive.infolist():
+                # Each byte of a pickle may become an object of a hundred.
+                if entry.filename.endswith(".pkl") and entry.file_size > _MAX_STRUCTURE:
+                    raise InputError(
+                        "its policy.pth lists more than any MlpPolicy has; give a policy file"
+                    )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a pickle protocol that is not its own
             loaded = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     except InputError:
         raise
     except Exception as error:  # torch's reader may raise anything on what is damaged
-        raise InputError(
-            "its policy.pth holds something else than weights, and is not opened; "
-            "give a file that model.save() wrote"
-        ) from error
+        raise _no_weights() from error
     if not isinstance(loaded, dict):
         raise InputError("its policy.pth holds no weights by name; save the model again")
     tensors = {str(name): value for name, value in loaded.items() if torch.is_tensor(value)}
@@ -151,6 +151,13 @@ def _state(data: bytes, path: Path) -> dict[str, NDArray[np.float32]]:
     if sum(tensor.numel() for tensor in tensors.values()) * 4 > MAX_POLICY_BYTES:
         raise InputError("its weights claim more memory than any MlpPolicy has; give a policy")
     return {name: tensor.detach().to(torch.float32).numpy() for name, tensor in tensors.items()}
+
+
+def _no_weights() -> InputError:
+    return InputError(
+        "its policy.pth holds something else than weights, and is not opened; give a file that "
+        "model.save() wrote"
+    )
 
 
 def _is_plain(tensor: Any) -> bool:
