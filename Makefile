@@ -12,7 +12,7 @@ FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
 	  $$name -c 'import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	    2>/dev/null && echo $$name && break; done
 
-.PHONY: app test lint format bench clean
+.PHONY: app test lint format bench fuzz clean
 .DELETE_ON_ERROR:
 
 app: $(VENV)/runtime.stamp  ## start the dashboard
@@ -35,8 +35,13 @@ format: $(VENV)/development.stamp  ## bring every file into shape
 bench: $(VENV)/development.stamp $(BROWSER)  ## measure, and compare with what is to be reached
 	$(PYTHON) -m benchmarks
 
+MINUTES ?= 10
+
+fuzz: $(VENV)/development.stamp  ## try every reader with damaged files, MINUTES each; READERS="csv npz" for some
+	$(PYTHON) -m tests.fuzz --minutes $(MINUTES) $(READERS)
+
 clean:  ## remove what the tools made; the .venv stays
-	$(RM) -r .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	$(RM) -r .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis .fuzz
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec $(RM) -r {} +
 
 $(PYTHON):

@@ -10,6 +10,7 @@ import io
 import lzma
 import math
 import struct
+import sys
 import warnings
 import zipfile
 import zlib
@@ -194,6 +195,11 @@ def array_of(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, promise: Promise)
             free[: len(chunk)] = np.frombuffer(chunk, dtype=np.uint8)
             free = free[len(chunk) :]
         if len(free) or file.read(1):
+            raise _damaged(entry)
+    # Python does not look at the signs of a text that NumPy hands it, and fails on it later.
+    if array.dtype.kind == "U" and array.nbytes:
+        signs = array.ravel().view(array.dtype.byteorder + "u4")
+        if int(signs.max()) > sys.maxunicode:
             raise _damaged(entry)
     return array
 

@@ -262,14 +262,15 @@ def told_of_whole_numbers(
 
 
 def as_numbers(given: Any, what: str) -> NDArray[Any]:
-    """Booleans, integers or floats as an array; anything else is refused."""
+    """Booleans, integers or floats of 32 bits or more as an array; anything else is refused."""
     try:
         array = np.asarray(given)
     except ValueError as error:
         raise InputError(f"{what} must have the same length in every step") from error
     if array.dtype.kind not in "biuf":
         raise InputError(f"{what} must be numbers, not {array.dtype}")
-    return array
+    # Half precision ends at 65504, before what numbers are compared with here.
+    return array.astype(np.float32) if array.dtype == np.float16 else array
 
 
 def frozen(array: NDArray[Any], dtype: Any) -> NDArray[Any]:

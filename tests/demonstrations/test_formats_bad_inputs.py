@@ -22,11 +22,11 @@ from tests.bad_inputs import (
     changed,
     csv_bytes,
     good_arrays,
-    malicious_npz,
     npz_bytes,
     parquet_bytes,
     with_value,
 )
+from tests.hostile_archives import malicious_npz
 
 
 def sentence(error: pytest.ExceptionInfo[InputError]) -> str:

@@ -22,6 +22,15 @@ def lengths_and_steps() -> tuple[list[int], np.ndarray[Any, Any], np.ndarray[Any
 EXPECTED = [0, 1, 2, 100, 200, 201, 202, 203]
 
 
+def test_half_precision_is_read_everywhere() -> None:
+    arrays = {name: values.astype(np.float16) for name, values in good_arrays().items()}
+    read = read_demonstrations(npz_bytes(**arrays, rewards=np.ones(5, np.float16)), "demo.npz")
+    assert read.actions.tolist() == [0, 1, 0, 1, 1]
+    assert read.episodes.tolist() == [0, 0, 0, 1, 1]
+    assert read.rewards is not None
+    assert read.rewards.dtype == np.float64
+
+
 def test_layout_of_imitation() -> None:
     lengths, observations, actions = lengths_and_steps()
     demonstrations = read_demonstrations(

@@ -17,6 +17,7 @@ from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
+    as_numbers,
     coarse_columns,
     column_of_numbers,
     flags,
@@ -93,6 +94,7 @@ def to_demonstrations(
     Raises:
         InputError: In one sentence with the column, as the file calls it, and the first row.
     """
+    recording = replace(recording, actions=as_numbers(recording.actions, "actions"))
     metadata = recording.metadata
     described = description or _described(metadata)
     if recording.observations.size == 0 or recording.actions.size == 0:
