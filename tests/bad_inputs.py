@@ -227,6 +227,16 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         npz_bytes(**good_arrays(), rewards=np.array([1, 2, 1.7e308, 0, 0])),
         ("'rewards' is 1.7e+308 in row 3", "no reading"),
     ),
+    "infinite numbers that rise csv": (
+        "demo.csv",
+        csv_bytes(*(f"{i},1e400,0" for i in range(40)), header="x,y,action"),
+        ("'y' is infinite in row 1",),
+    ),
+    "a name that nobody can read csv": (
+        "demo.csv",
+        csv_bytes("1,0", "2,1", header=f"obs_{'1' * 5000},action"),
+        ("'obs_111", "name of 5,004 characters"),
+    ),
     "hexadecimal csv": ("demo.csv", changed(4, "1,0,0x10,1,0"), ("'obs_x'", "'0x10'", "row 4")),
     "hexadecimal action csv": ("demo.csv", changed(2, "0,1,1,1,0X1"), ("'action'", "'0X1'")),
     "underscore csv": ("demo.csv", changed(1, "0,0,1_000,1,0"), ("'obs_x'", "'1_000'", "row 1")),

@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import sys
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +15,7 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
-from sarl_core.documents import parse_json
+from sarl_core.documents import LARGEST_WHOLE, DocumentReader, is_number, parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
 from sarl_core.limits import limited_bytes
@@ -30,8 +28,6 @@ FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
 """Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
 version 1, which is what it was before there was another."""
-_LARGEST = sys.float_info.max
-_MOST = 2**53  # whole numbers up to here are exact in floating point too
 
 
 def rules_to_json(rule_set: RuleSet) -> str:
@@ -90,7 +86,7 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
             f"{name} has version {quoted(version)} of the rule format, and this program reads "
             f"versions {VERSIONS[0]} to {VERSIONS[-1]}; use a program of its version"
         )
-    return _rule_set(_Reader(document, name, ""))
+    return _rule_set(DocumentReader(document, name, ""))
 
 
 def save_rules(rule_set: RuleSet, path: Path) -> None:
@@ -214,96 +210,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
     return entry
 
 
-class _Reader:
-    """One object of the document: hands out what was asked for and refuses the rest."""
-
-    def __init__(self, value: Any, name: str, place: str) -> None:
-        if not isinstance(value, Mapping):
-            raise InputError(f"{name}: {place or 'it'} is not an object; write the file again")
-        self._value = dict(value)
-        self._name, self._place = name, place
-
-    def fail(self, what: str) -> InputError:
-        where = f" in {self._place}" if self._place else ""
-        return InputError(f"{self._name}: {what}{where}; mend it or mine the rules again")
-
-    def take(self, key: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
-        value = self._value.pop(key, default)
-        if value is ...:
-            raise self.fail(f"{key!r} is missing")
-        kinds = kind if isinstance(kind, tuple) else (kind,)
-        boolean = isinstance(value, bool) and bool not in kinds
-        if value is not default and (boolean or not isinstance(value, kinds)):
-            raise self.fail(f"{key!r} is {quoted(value)}, of the wrong kind")
-        return value
-
-    def has(self, key: str) -> bool:
-        return key in self._value
-
-    def number(
-        self, key: str, default: Any = ..., *, low: float = -_LARGEST, high: float = _LARGEST
-    ) -> float:
-        value = self.take(key, (int, float), default)
-        # Compared before it is converted: an integer may be too large for a float.
-        if not low <= value <= high:
-            raise self.fail(f"{key!r} is {quoted(value)}, not a number from {low:g} to {high:g}")
-        return float(value)
-
-    def count(self, key: str, default: Any = ..., *, low: int = 0, high: int = _MOST) -> int:
-        value: int = self.take(key, int, default)
-        if not low <= value <= high:
-            raise self.fail(f"{key!r} is {quoted(value)}, not a whole number from {low} to {high}")
-        return value
-
-    def limit(self, key: str) -> int | None:
-        if self._value.get(key) is not None:
-            return self.count(key)
-        self._value.pop(key, None)
-        return None
-
-    def share(self, key: str) -> float | None:
-        if self._value.get(key, ...) is not None:
-            return self.number(key, low=0, high=1)
-        self.take(key, type(None))
-        return None
-
-    def parts(self, key: str) -> list[_Reader]:
-        place = f"{self._place} {key}".strip()
-        return [
-            _Reader(value, self._name, f"{place} {number}")
-            for number, value in enumerate(self.take(key, list), start=1)
-        ]
-
-    def part(self, key: str) -> _Reader:
-        return _Reader(self.take(key, dict), self._name, f"{self._place} {key}".strip())
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        values = self.take(key, list)
-        if not all(isinstance(value, str) for value in values):
-            raise self.fail(f"{key!r} holds something that is no text")
-        return tuple(values)
-
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        values = self.take(key, list)
-        if not all(map(_is_number, values)) or len(values) != count:
-            raise self.fail(f"{key!r} must be {count} numbers")
-        return tuple(map(float, values))
-
-    def finish(self) -> None:
-        """Refuse what nobody asked for, by name."""
-        if self._value:
-            raise self.fail(f"{quoted(next(iter(self._value)))} is not known to this version")
-
-
-def _is_number(value: object, largest: float = _LARGEST) -> bool:
-    """Whether a value from a file is a number, and not too large."""
-    # Compared before it is converted: an integer may be too large for a float.
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return -largest <= value <= largest
-
-
-def _rule_set(document: _Reader) -> RuleSet:
+def _rule_set(document: DocumentReader) -> RuleSet:
     document.take("format", str)
     version: int = document.take("version", int)
     features = tuple(_read_feature(part) for part in document.parts("features"))
@@ -344,21 +251,21 @@ def _rule_set(document: _Reader) -> RuleSet:
     return rule_set
 
 
-def _read_cut(document: _Reader) -> Literal["thresholds", "leaves"]:
+def _read_cut(document: DocumentReader) -> Literal["thresholds", "leaves"]:
     cut: Literal["thresholds", "leaves"] = document.take("cut", str, "thresholds")
     if cut not in ("thresholds", "leaves"):
         raise document.fail(f"the cut {quoted(cut)} is neither 'thresholds' nor 'leaves'")
     return cut
 
 
-def _read_feature(part: _Reader) -> Feature:
+def _read_feature(part: DocumentReader) -> Feature:
     name, unit = part.take("name", str), part.take("unit", str, "")
     splits = _read_splits(part) if part.has("splits") else None
     part.finish()
     return Feature(name, unit, splits)
 
 
-def _read_splits(part: _Reader) -> Splits:
+def _read_splits(part: DocumentReader) -> Splits:
     rows = part.take("splits", list)
     found = np.empty((len(rows), 3))
     for place, row in enumerate(rows):
@@ -367,7 +274,7 @@ def _read_splits(part: _Reader) -> Splits:
         ends = (-math.inf, math.inf)
         sides = (end if one is None else one for one, end in zip(row[1:], ends, strict=True))
         filled = [row[0], *sides]
-        if not all(_is_number(one) or one in ends for one in filled):
+        if not all(is_number(one) or one in ends for one in filled):
             raise part.fail("'splits' holds something that is no number")
         found[place] = filled
     thresholds, below, above = found.T
@@ -377,17 +284,17 @@ def _read_splits(part: _Reader) -> Splits:
     return Splits(thresholds, below, above, part.take("binary", bool, False))
 
 
-def _read_action(part: _Reader) -> LabelledDimension:
+def _read_action(part: DocumentReader) -> LabelledDimension:
     name, kind = part.take("name", str), part.take("kind", str)
     if kind == "discrete":
         action = LabelledDimension(
-            name, part.texts("labels"), first=part.count("first", 0, low=-_MOST)
+            name, part.texts("labels"), first=part.count("first", 0, low=-LARGEST_WHOLE)
         )
         if not action.label_names:
             raise part.fail("'labels' is empty")
     elif kind == "interval":
         edges = part.take("edges", list)
-        numeric = all(_is_number(edge, LARGEST) for edge in edges)
+        numeric = all(is_number(edge, LARGEST) for edge in edges)
         single = numeric and len(edges) == 2 and edges[0] == edges[1]
         if not single and (not numeric or len(edges) < 3 or sorted(set(edges)) != edges):
             raise part.fail(
@@ -403,7 +310,7 @@ def _read_action(part: _Reader) -> LabelledDimension:
 
 
 def _read_rule(
-    part: _Reader,
+    part: DocumentReader,
     n_features: int,
     actions: tuple[LabelledDimension, ...],
     steps: int,
@@ -455,7 +362,7 @@ def _read_rule(
     return rule
 
 
-def _read_box(part: _Reader, n_features: int) -> DataBox:
+def _read_box(part: DocumentReader, n_features: int) -> DataBox:
     box = DataBox(*(part.numbers(name, n_features) for name in DataBox._fields))
     part.finish()
     for least, low, high, most in zip(*box, strict=True):
@@ -464,7 +371,7 @@ def _read_box(part: _Reader, n_features: int) -> DataBox:
     return box
 
 
-def _read_held_out(part: _Reader, version: int) -> HeldOut:
+def _read_held_out(part: DocumentReader, version: int) -> HeldOut:
     samples = part.count("samples")
     correct = part.count("correct", high=samples)
     if version == 1:  # in how many episodes, it did not say

@@ -118,7 +118,7 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "plain texts": ("parquet", plain_texts, "0.3 GiB, more than the 0.125 GiB"),
     "zeros": ("parquet", lambda: zstd(obs_a=np.zeros(N), action=labels(N)), READ_LIMIT),
     "nothing": ("parquet", lambda: zstd(obs_a=pa.nulls(N), action=labels(N)), READ_LIMIT),
-    "metadata": ("parquet", wide_metadata, "not JSON (it holds more than 0.125 GiB"),
+    "metadata": ("parquet", wide_metadata, "not JSON (it takes more than 0.125 GiB"),
     "bytes": (
         "npz",
         lambda: compressed(obs=np.zeros((N, 3), np.uint8), acts=labels(N)),

@@ -9,12 +9,14 @@ import argparse
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from sarl_core.limits import READ_LIMIT
 from tests.fuzz.readers import READERS
 
 FOLDER = Path(".fuzz")
+ROUND = 60  # seconds of a process: the fuzzer itself takes more and more memory
 LIMITS = ("-timeout=60", "-rss_limit_mb=2000", "-max_len=60000", "-print_final_stats=1")
 
 
@@ -37,9 +39,17 @@ def fuzz(name: str, minutes: float) -> bool:
         (kept / f"seed-{place}").write_bytes(seed)
     print(f"\n{name}, {minutes:g} minutes", flush=True)
     command = [sys.executable, "-m", "tests.fuzz.one", name, str(kept), *LIMITS]
-    command += [f"-max_total_time={round(60 * minutes)}", f"-artifact_prefix={found}/"]
-    done = subprocess.run(command, check=False, env=os.environ | {READ_LIMIT: "0.25"})
-    return done.returncode == 0
+    command += [f"-artifact_prefix={found}/"]
+    end = time.monotonic() + 60 * minutes
+    while (left := end - time.monotonic()) > 1:
+        done = subprocess.run(
+            [*command, f"-max_total_time={max(1, round(min(left, ROUND)))}"],
+            check=False,
+            env=os.environ | {READ_LIMIT: "0.25"},
+        )
+        if done.returncode:
+            return False
+    return True
 
 
 if __name__ == "__main__":

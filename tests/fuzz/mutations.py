@@ -184,13 +184,17 @@ def of_parquet(data: bytes, random: Random, mutate: Bytes) -> bytes:
     """Parquet: a column, the metadata or the way it is written; else bytes between the signs."""
     try:
         table = pq.read_table(io.BytesIO(data))
-    except Exception:
-        table = None
-    if table is None or table.num_rows == 0 or random.randrange(3) == 0:
-        return b"PAR1" + mutate(data[4:-4]) + b"PAR1"
+        if table.num_rows and table.num_columns and random.randrange(3):
+            return _rewritten(table, random, mutate)
+    except Exception:  # damaged by an earlier change
+        pass
+    return b"PAR1" + mutate(data[4:-4]) + b"PAR1"
+
+
+def _rewritten(table: Any, random: Random, mutate: Bytes) -> bytes:
     choice = random.randrange(5)
-    place = random.randrange(max(table.num_columns, 1))
-    if choice == 0 and table.num_columns:
+    place = random.randrange(table.num_columns)
+    if choice == 0:
         table = table.set_column(place, table.column_names[place], _column(table.num_rows, random))
     elif choice == 1:
         table = table.append_column(random.choice(TEXTS) + "_1", _column(table.num_rows, random))
@@ -201,20 +205,18 @@ def of_parquet(data: bytes, random: Random, mutate: Bytes) -> bytes:
         metadata[b"sarl"] = of_json(metadata.get(b"sarl", b"{}"), random, mutate)
         table = table.replace_schema_metadata(metadata)
     else:
-        rows = [random.randrange(table.num_rows) for _ in range(random.randrange(1, 9))]
-        table = table.take(rows)
-    out = io.BytesIO()
-    try:
-        pq.write_table(
-            table,
-            out,
-            compression=random.choice(("none", "snappy", "zstd", "gzip")),
-            use_dictionary=random.random() < 0.5,
-            row_group_size=random.choice((1, 2, 1000)),
-            data_page_version=random.choice(("1.0", "2.0")),
+        table = table.take(
+            [random.randrange(table.num_rows) for _ in range(random.randrange(1, 9))]
         )
-    except (pa.ArrowException, OSError, ValueError):
-        return mutate(data)
+    out = io.BytesIO()
+    pq.write_table(
+        table,
+        out,
+        compression=random.choice(("none", "snappy", "zstd", "gzip")),
+        use_dictionary=random.random() < 0.5,
+        row_group_size=random.choice((1, 2, 1000)),
+        data_page_version=random.choice(("1.0", "2.0")),
+    )
     return out.getvalue()
 
 

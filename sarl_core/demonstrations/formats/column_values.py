@@ -23,9 +23,11 @@ from sarl_core.errors import InputError
 Values = Mapping[str, NDArray[Any]]
 
 _LEAST_ROWS = 10  # fewer count up by chance
+_INFINITE = np.errstate(invalid="ignore", over="ignore")  # such values are refused afterwards
 _LEAST_CHANGES = 5  # of a column, before another one may be called its next value
 
 
+@_INFINITE
 def settle(guess: Guess, values: Values) -> Guess:
     """Correct a guess by what the columns hold.
 
@@ -53,6 +55,7 @@ def settle(guess: Guess, values: Values) -> Guess:
     return guess
 
 
+@_INFINITE
 def resolved(guess: Guess, values: Values, names: Sequence[str]) -> Guess:
     """A guess whose unclear columns turned out to number the rows.
 

@@ -28,9 +28,10 @@ from sarl_core.demonstrations.formats.columns import (
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 MAX_COLUMNS = 4096
+MAX_NAME = 300  # characters of a column's name; a person has to read it in every rule
 _OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
 
 
@@ -67,11 +68,17 @@ class Column:
 
 
 def check_names(names: Sequence[str]) -> None:
-    """Refuse a table with too many columns, or two of one name."""
+    """Refuse a table with too many columns, a name nobody can read, or two of one name."""
     if len(names) > MAX_COLUMNS:
         raise InputError(
             f"there are {len(names):,} columns, more than the {MAX_COLUMNS:,} that rules a person "
             "reads could use; keep fewer"
+        )
+    long = next((name for name in names if len(name) > MAX_NAME), None)
+    if long is not None:
+        raise InputError(
+            f"the column {quoted(long)} has a name of {len(long):,} characters; give it one of "
+            f"{MAX_NAME} at most"
         )
     refuse_doubled(names)
 
