@@ -66,6 +66,9 @@ def record(
 def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
     """Read and check demonstrations, and print what is in them.
 
+    A file and what is read from it may take 1 GiB of memory, here and in every other command; the
+    environment variable `SARL_READ_LIMIT_GIB` sets another limit.
+
     Example: `python -m sarl_core check data/demonstrations/lunar_lander.parquet`
     """
     _tell_demonstrations(read_demonstrations(file, env), file, as_json)

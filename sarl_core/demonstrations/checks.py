@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ from sarl_core.demonstrations.requirements import (
     require_within,
     whole_numbers,
 )
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
@@ -224,8 +225,8 @@ def _names(given: Iterable[Any] | None, count: int, what: str) -> tuple[str, ...
     if "" in names:
         raise InputError(f"{what} {names.index('')} has an empty name; give it one")
     if len(set(names)) < len(names):
-        doubled = next(name for index, name in enumerate(names) if name in names[:index])
-        raise InputError(f"the {what} name {doubled!r} stands twice; give each its own name")
+        doubled = next(name for name, times in Counter(names).items() if times > 1)
+        raise InputError(f"the {what} name {quoted(doubled)} stands twice; give each its own name")
     return names
 
 
@@ -250,18 +251,13 @@ def _labels(
         if raw.label_first is None:
             # What is always done is one action, and not one of as many as its number is high.
             first = tuple(low if low == high else 0 for low, high in zip(least, most, strict=True))
-        labels = sum(high - low + 1 for low, high in zip(first, most, strict=True))
-        if labels > MAX_ALL_LABELS:
-            raise InputError(
-                f"the {m:,} action dimensions have {labels:,} labels, more than the "
-                f"{MAX_ALL_LABELS:,} that rules a person reads could use; number those of each "
-                "from 0, or choose fewer"
-            )
+        _require_few_labels(m, sum(high - low + 1 for low, high in zip(first, most, strict=True)))
         names = tuple(
             tuple(str(label) for label in range(low, high + 1))
             for low, high in zip(first, most, strict=True)
         )
     else:
+        _require_few_labels(m, sum(map(len, raw.label_names)))
         names = tuple(tuple(map(str, labels)) for labels in raw.label_names)
         require_length(len(names), m, "lists of label names", "action dimensions")
         require_labels(columns, first, [len(labels) for labels in names], displays)
@@ -272,6 +268,15 @@ def _labels(
         "action_high": None,
         "bounds_from": None,
     }
+
+
+def _require_few_labels(m: int, labels: int) -> None:
+    if labels > MAX_ALL_LABELS:
+        raise InputError(
+            f"the {m:,} action dimension{'s have' if m > 1 else ' has'} {labels:,} labels, more "
+            f"than the {MAX_ALL_LABELS:,} that rules a person reads could use; number those of "
+            "each from 0, or choose fewer"
+        )
 
 
 def _bounds(

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.demonstrations.feature_order import Named, line_up
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 
 class Names(NamedTuple):
@@ -231,11 +231,13 @@ def renamed_description(
 
 
 def _check(what: str, names: tuple[str, ...]) -> None:
+    places: dict[str, int] = {}
     for place, name in enumerate(names):
         if not name.strip():
             raise InputError(f"{what} {place} has an empty name; give it one")
-        if name in names[:place]:
+        if name in places:
             raise InputError(
-                f"the name {name!r} stands twice, for {what} {names.index(name)} and {place}; "
+                f"the name {quoted(name)} stands twice, for {what} {places[name]} and {place}; "
                 "give each its own"
             )
+        places[name] = place

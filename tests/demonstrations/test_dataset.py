@@ -253,3 +253,10 @@ def test_repr_shows_shapes() -> None:
 def test_rebuilding_changes_nothing(space: str, data: st.DataObject) -> None:
     got = data.draw(demonstrations(space))
     assert replace(got).digest == got.digest
+
+
+def test_far_too_many_labels_are_refused_whoever_names_them() -> None:
+    for named in ({}, {"label_names": [[str(i) for i in range(200_000)]]}):
+        actions = np.zeros((2, 1), int) if named else np.repeat([[0], [9999]], 11, axis=1)
+        with pytest.raises(InputError, match=r"(200|110),000 labels"):
+            Demonstrations(np.zeros((2, 1)), actions, np.zeros(2, int), **named)

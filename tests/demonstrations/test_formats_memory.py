@@ -269,6 +269,20 @@ def test_pages_count_by_their_own_headers_and_not_by_the_footer() -> None:
             largest_chunk(data, lying(**said), [0])
 
 
+def test_headers_of_pages_that_go_ever_deeper_are_damage() -> None:
+    for content in (b"\x19" * 5000, b"\x1c" * 5000, b"\x19\xfc" + b"\xff" * 9 + b"\x01" * 99):
+        column = SimpleNamespace(
+            num_values=1,
+            data_page_offset=0,
+            has_dictionary_page=False,
+            total_compressed_size=len(content),
+        )
+        group = SimpleNamespace(num_rows=1, column=lambda _, column=column: column)
+        metadata = SimpleNamespace(num_row_groups=1, row_group=lambda _, group=group: group)
+        with pytest.raises(InputError, match="damaged"):
+            largest_chunk(memoryview(content), metadata, [0])
+
+
 def test_pages_of_every_kind_are_counted() -> None:
     rng = np.random.default_rng(0)
     table = pa.table(

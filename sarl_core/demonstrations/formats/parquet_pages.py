@@ -78,8 +78,6 @@ def _damaged() -> InputError:
 
 def _structure(data: memoryview, at: int, depth: int) -> tuple[dict[int, Any], int]:
     """Whole numbers and structures by the number of their field, and where the next thing is."""
-    if depth > _DEEPEST:
-        raise IndexError
     fields: dict[int, Any] = {}
     field = 0
     while (head := data[at]) != 0:
@@ -95,6 +93,8 @@ def _structure(data: memoryview, at: int, depth: int) -> tuple[dict[int, Any], i
 
 
 def _value(data: memoryview, at: int, kind: int, depth: int) -> tuple[Any, int]:
+    if depth > _DEEPEST:
+        raise IndexError
     if kind in _WHOLE:
         return _whole(data, at)
     if kind == _STRUCTURE:
