@@ -230,7 +230,7 @@ def above(
         values: One a recording, (R,).
         experts: The expert of each.
         agrees: It agrees above this.
-        partly: It does not agree unless some of the interval lies above this.
+        partly: It agrees in part above this.
         show: Writes a bound.
         interval: Of the mean; that of `over_recordings` where not given.
 
@@ -238,20 +238,18 @@ def above(
         What was found.
     """
     found = interval or over_recordings(values, experts)
-    verdict: Verdict = "partly"
+    verdict: Verdict = "does not agree"
     if found.low > agrees:
         verdict = "agrees"
-    elif found.high <= partly:
-        verdict = "does not agree"
-    elif found.low <= partly and found.high > agrees:
+    elif found.low > partly:
+        verdict = "partly"
+    elif not found.high <= agrees:
         verdict = "cannot be judged"
     return _finding(
         verdict,
         (values > agrees).tolist(),
         experts,
-        f"Agrees if the whole 95 % interval over recordings and experts lies above {show(agrees)}, "
-        f"does not agree if none of it lies above {show(partly)}, cannot be judged if it reaches "
-        "from one to the other; else partly.",
+        _rule("above", show(agrees), show(partly)),
         interval=found,
     )
 
@@ -271,7 +269,7 @@ def below(
         values: As in `above`.
         experts: Likewise.
         agrees: It agrees below this.
-        partly: It does not agree unless some of the interval lies below this.
+        partly: It agrees in part below this.
         show: As in `above`.
         interval: Likewise.
 
@@ -283,9 +281,7 @@ def below(
     other = above(-values, experts, agrees=-agrees, partly=-partly, interval=turned)
     return replace(
         other,
-        rule="Agrees if the whole 95 % interval over recordings and experts lies below "
-        f"{show(agrees)}, does not agree if none of it lies below {show(partly)}, cannot be judged "
-        "if it reaches from one to the other; else partly.",
+        rule=_rule("below", show(agrees), show(partly)),
         interval=found,
     )
 
@@ -304,28 +300,35 @@ def within(
         values: One a recording, (R,); 0 is the same.
         experts: The expert of each.
         agrees: It agrees up to this, either way.
-        partly: It does not agree beyond this.
+        partly: It agrees in part up to this.
         show: Writes a margin.
 
     Returns:
         What was found.
     """
     found = over_recordings(values, experts)
-    verdict: Verdict = "partly"
-    if max(-found.low, found.high) <= agrees:
+    farthest, nearest = max(-found.low, found.high), max(found.low, -found.high)
+    verdict: Verdict = "does not agree"
+    if farthest <= agrees:
         verdict = "agrees"
-    elif found.low > partly or found.high < -partly:
-        verdict = "does not agree"
-    elif max(-found.low, found.high) > partly and found.low <= agrees and found.high >= -agrees:
+    elif farthest <= partly:
+        verdict = "partly"
+    elif not nearest > agrees:
         verdict = "cannot be judged"
     return _finding(
         verdict,
         (np.abs(values) <= agrees).tolist(),
         experts,
-        "Agrees if the whole 95 % interval over recordings and experts lies within "
-        f"{show(agrees)} either way, does not agree if all of it lies beyond {show(partly)}, "
-        "cannot be judged if it reaches from one to the other; else partly.",
+        _rule("within", f"{show(agrees)} either way", show(partly)),
         interval=found,
+    )
+
+
+def _rule(where: str, agrees: str, partly: str) -> str:
+    part = "" if agrees == partly else f", partly if all of it lies {where} {partly}"
+    return (
+        f"Agrees if the whole 95 % interval over recordings and experts lies {where} {agrees}"
+        f"{part}; else it does not agree if none of it does, and cannot be judged if some does."
     )
 
 

@@ -28,7 +28,7 @@ SPREAD = np.array([-1.0, 0.0, 1.0, 1.0, 0.0, -1.0])  # the experts' means are th
         (0.79 + 0.01 * SPREAD, "partly"),
         (0.82 + 0.1 * SPREAD, "partly"),  # more than the bound, but that is not shown
         (0.3 + 0.01 * SPREAD, "does not agree"),
-        (0.52 + 0.1 * SPREAD, "partly"),
+        (0.52 + 0.1 * SPREAD, "does not agree"),  # not even in part, as far as is shown
         (0.65 + 0.5 * SPREAD, "cannot be judged"),
     ],
 )
@@ -58,6 +58,7 @@ def test_the_same_value_everywhere_is_not_more_than_itself() -> None:
         (0.6 + 0.02 * SPREAD, "does not agree"),
         (-0.6 + 0.02 * SPREAD, "does not agree"),
         (0.3 + 0.02 * SPREAD, "partly"),
+        (0.5 + 0.2 * SPREAD, "does not agree"),
         (0.1 + 0.8 * SPREAD, "cannot be judged"),
     ],
 )
