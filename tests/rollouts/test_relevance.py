@@ -11,6 +11,7 @@ from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.relevance import Relevance, relevance_from_frame, study_relevance
+from sarl_core.rollouts.seeds import MOST_LEARNERS
 
 CART = Path(__file__).parents[2] / "data" / "demonstrations" / "cartpole.parquet"
 SMALL = {"seeds": (0, 3), "phases": 2, "learning_steps": 60, "test_steps": 333}
@@ -102,7 +103,7 @@ def test_a_caller_who_wants_no_more_is_heard(rules: dict[str, RuleSet]) -> None:
         ({"learning_steps": 1}, "learning_steps is 1"),
         ({"seeds": ()}, "seeds is 0"),
         ({"seeds": (1, 1)}, "must differ"),
-        ({"seeds": (-1,)}, "from 0 to 59"),
+        ({"seeds": (-1,)}, f"from 0 to {MOST_LEARNERS - 1}"),
     ],
 )
 def test_numbers_out_of_range_are_refused(
