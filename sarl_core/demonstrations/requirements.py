@@ -107,7 +107,7 @@ def require_within(
     Raises:
         InputError: With the column and the first row.
     """
-    with np.errstate(over="ignore"):  # a bound beyond float32 bounds nothing
+    with np.errstate(over="ignore", invalid="ignore"):  # a bound beyond float32 bounds nothing
         # In float32, as the environment compares them.
         least, most = np.asarray(low, dtype=np.float32), np.asarray(high, dtype=np.float32)
     outside = (values < least) | (values > most)
@@ -278,7 +278,7 @@ def frozen(array: NDArray[Any], dtype: Any) -> NDArray[Any]:
     untouchable = array.base is None and not array.flags.writeable
     if untouchable and array.dtype == dtype and array.flags.c_contiguous:
         return array
-    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
         return np.array(array, dtype=dtype, order="C")
 
 

@@ -396,7 +396,7 @@ def _parts(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         return values
 
     def numbers(name: str) -> NDArray[np.float32]:
-        with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+        with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
             return plain(name).astype(np.float32)
 
     def optional(name: str) -> NDArray[np.float32] | None:

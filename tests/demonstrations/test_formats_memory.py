@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import struct
@@ -10,7 +11,6 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,7 @@ def long_header() -> bytes:
 
 
 def wide_metadata() -> bytes:
-    return parquet_bytes(metadata='{"notes": [' + "[]," * 2_000_000 + "[]]}")
+    return parquet_bytes(metadata='{"notes": [' + "{}," * 1_100_000 + "{}]}")
 
 
 N = 8_000_000
@@ -234,53 +234,63 @@ def test_a_file_that_just_fits_takes_less_than_twice_the_limit(
     assert peak < 2
 
 
+def varint(number: int) -> bytes:
+    """A whole number as Thrift writes it: zigzag, seven bits a byte."""
+    rest, found = 2 * number, []
+    while rest > 127:
+        found.append(rest & 127 | 128)
+        rest >>= 7
+    return bytes([*found, rest])
+
+
 def test_pages_count_by_their_own_headers_and_not_by_the_footer() -> None:
     content = zstd(obs_a=["x" * 10**6] * 3 + ["y" * 10**6] * 3, action=labels(6))
-    metadata = pq.ParquetFile(io.BytesIO(content)).metadata
-    honest = metadata.row_group(0).column(0).total_uncompressed_size
-    data = memoryview(content)
-    assert 2 * 10**6 < largest_chunk(data, metadata, [0, 1]) <= honest
-    assert largest_chunk(data, metadata, [1]) < 200
+    chunk = pq.ParquetFile(io.BytesIO(content)).metadata.row_group(0).column(0)
+    honest = chunk.total_uncompressed_size
+    assert 2 * 10**6 < largest_chunk(memoryview(content), 6, [0, 1]) <= honest
+    assert largest_chunk(memoryview(content), 6, [1]) < 200
+    said = varint(honest)
+    lying = content.replace(said, varint(2 ** (7 * (len(said) - 1) - 1)))
+    assert lying != content
+    assert pq.ParquetFile(io.BytesIO(lying)).metadata.row_group(0).column(0) != chunk
+    assert largest_chunk(memoryview(lying), 6, [0]) > 2 * 10**6
 
-    def lying(**said: int) -> Any:
-        chunk = metadata.row_group(0).column(0)
-        fields = {
-            name: getattr(chunk, name)
-            for name in (
-                "num_values",
-                "data_page_offset",
-                "dictionary_page_offset",
-                "has_dictionary_page",
-                "total_compressed_size",
-            )
-        }
-        column = SimpleNamespace(**{**fields, "total_uncompressed_size": 1, **said})
-        group = SimpleNamespace(num_rows=6, column=lambda _: column)
-        return SimpleNamespace(num_row_groups=1, row_group=lambda _: group)
 
-    assert largest_chunk(data, lying(), [0]) > 2 * 10**6
-    for said in (
-        {"num_values": 10**12},
-        {"data_page_offset": 10**12, "dictionary_page_offset": 0},
-        {"total_compressed_size": 7},
-        {"data_page_offset": len(content) - 1, "has_dictionary_page": False},
-    ):
-        with pytest.raises(InputError, match="damaged"):
-            largest_chunk(data, lying(**said), [0])
+@pytest.mark.parametrize("rows", [5, 7, 2**20, 2**40])
+def test_a_footer_that_does_not_fit_the_pages_is_damage(rows: int) -> None:
+    good = zstd(obs_a=np.arange(6.0), action=labels(6))
+    start = len(good) - 8 - int.from_bytes(good[-8:-4], "little")
+    with pytest.raises(InputError, match="damaged"):
+        largest_chunk(memoryview(good), 7, [0])
+    with pytest.raises(InputError, match="damaged"):
+        largest_chunk(memoryview(good), 6, [2])
+    before, after = (b"\x16" + varint(number) for number in (6, rows))
+    footer = good[start:-8].replace(before, after, 1)
+    assert footer != good[start:-8]
+    ends = len(footer).to_bytes(4, "little") + b"PAR1"
+    with pytest.raises(InputError, match=r"damaged|more than the"):
+        read_demonstrations(good[:start] + footer + ends, "demo.parquet")
+
+
+@pytest.mark.parametrize("place", range(4, 3000, 7))
+def test_no_damage_of_a_footer_ends_the_process(place: int) -> None:
+    content = bytearray(parquet_bytes())
+    place = len(content) - 8 - place % int.from_bytes(content[-8:-4], "little") - 1
+    for value in (0, 1, 0x19, 0x1C, 0x2C, 0x7F, 0xFF):
+        content[place] = value
+        with contextlib.suppress(InputError):
+            read_demonstrations(bytes(content), "demo.parquet")
 
 
 def test_headers_of_pages_that_go_ever_deeper_are_damage() -> None:
-    for content in (b"\x19" * 5000, b"\x1c" * 5000, b"\x19\xfc" + b"\xff" * 9 + b"\x01" * 99):
-        column = SimpleNamespace(
-            num_values=1,
-            data_page_offset=0,
-            has_dictionary_page=False,
-            total_compressed_size=len(content),
-        )
-        group = SimpleNamespace(num_rows=1, column=lambda _, column=column: column)
-        metadata = SimpleNamespace(num_row_groups=1, row_group=lambda _, group=group: group)
+    good = zstd(obs_a=np.arange(6.0), action=labels(6))
+    for header in (b"\x19" * 5000, b"\x1c" * 5000, b"\x19\xfc" + b"\xff" * 9 + b"\x01" * 99):
+        content = header + len(header).to_bytes(4, "little") + b"PAR1"
         with pytest.raises(InputError, match="damaged"):
-            largest_chunk(memoryview(content), metadata, [0])
+            largest_chunk(memoryview(content), 1, [0])
+        content = good[:4] + header[:40] + good[44:]
+        with pytest.raises(InputError, match="damaged"):
+            largest_chunk(memoryview(content), 6, [0])
 
 
 def test_pages_of_every_kind_are_counted() -> None:
@@ -303,6 +313,7 @@ def test_pages_of_every_kind_are_counted() -> None:
                 data_page_size=2000,
                 row_group_size=2500,
                 write_page_checksum=True,
+                write_page_index=True,
             )
             metadata = pq.ParquetFile(out).metadata
             said = max(
@@ -310,7 +321,7 @@ def test_pages_of_every_kind_are_counted() -> None:
                 for i in range(2)
                 for j in range(3)
             )
-            found = largest_chunk(memoryview(out.getvalue()), metadata, [0, 1, 2])
+            found = largest_chunk(memoryview(out.getvalue()), 5000, [0, 1, 2])
             # The footer counts the pages' headers too.
             assert 0.8 * said < found <= said
 

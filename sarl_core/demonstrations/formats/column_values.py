@@ -77,6 +77,7 @@ def resolved(guess: Guess, values: Values, names: Sequence[str]) -> Guess:
     return replace(guess, unclear=(), unused={**guess.unused, **counted})
 
 
+@_INFINITE
 def counters(values: Values) -> dict[str, str]:
     """Columns that number the rows.
 

@@ -198,7 +198,7 @@ class CsvTable:
 
 
 def _as_float32(column: Column) -> Column:
-    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
         return Column(column.values.astype(np.float32, copy=False), column.missing)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -17,14 +18,17 @@ from sarl_core.demonstrations.formats.metadata import (
     decode_metadata,
     encode_metadata,
 )
-from sarl_core.demonstrations.formats.parquet_pages import largest_chunk
+from sarl_core.demonstrations.formats.parquet_pages import (
+    MOST_FOOTER,
+    footer_size,
+    largest_chunk,
+)
 from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
 
 MAGIC = b"PAR1"
 _BATCH = 2**17  # rows that are brought into their final form at once
-_FOOTER = 2**24  # bytes; it takes some forty times as much in memory
 
 
 @dataclass(frozen=True)
@@ -60,19 +64,16 @@ class ParquetTable:
         Raises:
             InputError: If a column holds lists or text, or the file is damaged.
         """
-        import pyarrow as pa
-
-        schema, metadata = self.file.schema_arrow, self.file.metadata
-        for name in columns.used:
-            _require_flat(name, schema.field(name).type)
-        rows = metadata.num_rows
-        d = len(columns.observations)
-        needed = len(self.data) + table_memory(rows, d, len(columns.used) - d)
-        # Before a page is unpacked: a few bytes can stand for any number of rows, or of bytes.
-        require_memory(needed)
-        places = _places(self.file, columns.used)
-        require_memory(needed + largest_chunk(self.data, metadata, places))
-        try:
+        with _damage_told():
+            schema, rows = self.file.schema_arrow, self.file.metadata.num_rows
+            for name in columns.used:
+                _require_flat(name, schema.field(name).type)
+            d = len(columns.observations)
+            needed = len(self.data) + table_memory(rows, d, len(columns.used) - d)
+            # Before a page is unpacked: a few bytes can stand for any number of rows, or of bytes.
+            require_memory(needed)
+            places = _places(self.file, columns.used)
+            require_memory(needed + largest_chunk(self.data, rows, places))
             # Texts by their dictionary: each stands there once, however often it occurs.
             texts = [name for name in columns.used if _is_text(schema.field(name).type)]
             file = _opened(self.data, texts)
@@ -80,8 +81,6 @@ class ParquetTable:
                 name: _column(file, name, np.float32 if name in columns.observations else None)
                 for name in columns.used
             }
-        except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
-            raise _damaged() from error
 
 
 def open_parquet(data: memoryview) -> ParquetTable:
@@ -96,20 +95,16 @@ def open_parquet(data: memoryview) -> ParquetTable:
     Raises:
         InputError: If it is cut off or damaged, has too many columns or would not fit in memory.
     """
-    import pyarrow as pa
-
     # The list of columns and row groups stands at the end, and its length behind it.
-    if _FOOTER < int.from_bytes(data[-8:-4], "little") < len(data) and data[-4:] == MAGIC:
+    if MOST_FOOTER < footer_size(data) < len(data) and data[-4:] == MAGIC:
         raise InputError(
             "its list of columns and row groups is far too long; save it in fewer row groups"
         )
-    try:
+    with _damage_told():
         file = _opened(data)
         names = tuple(file.schema_arrow.names)
         rows = file.metadata.num_rows
         described = (file.schema_arrow.metadata or {}).get(KEY.encode())
-    except (pa.ArrowException, OSError, ValueError, OverflowError) as error:
-        raise _damaged() from error
     check_names(names)
     if rows == 0:
         raise InputError(
@@ -117,6 +112,18 @@ def open_parquet(data: memoryview) -> ParquetTable:
         )
     metadata = Metadata() if described is None else decode_metadata(described)
     return ParquetTable(names, metadata, file, data)
+
+
+@contextmanager
+def _damage_told() -> Iterator[None]:
+    """Turn what Arrow raises on a damaged file into one sentence."""
+    import pyarrow as pa
+
+    try:
+        yield
+    # RuntimeError is what becomes of exceptions of Parquet's own code.
+    except (pa.ArrowException, OSError, ValueError, OverflowError, RuntimeError) as error:
+        raise _damaged() from error
 
 
 def _opened(data: memoryview, texts: Sequence[str] = ()) -> Any:
@@ -140,7 +147,8 @@ def _column(file: Any, name: str, dtype: Any) -> Column:
             raise _damaged()
         if values is None:
             values = np.empty(rows, dtype=dtype or part.values.dtype)
-        with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+        # What overflows float32 is found as infinite.
+        with np.errstate(over="ignore", invalid="ignore"):
             values[at:end] = part.values
         if part.missing is not None:
             missing = np.zeros(rows, dtype=np.bool_) if missing is None else missing

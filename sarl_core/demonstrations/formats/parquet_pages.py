@@ -1,7 +1,9 @@
 """What the pages of a Parquet file unpack to, by their own headers and before any is unpacked.
 
 The sizes in the file's footer are only what its writer said; the reader of Arrow goes by the
-headers of the pages, so these are what counts. They are in Thrift's compact protocol.
+headers of the pages, so these are what counts. Footer and headers are in Thrift's compact
+protocol. The footer is read here too: what Arrow shows of it to Python ends the whole process
+where it is damaged.
 """
 
 from __future__ import annotations
@@ -10,19 +12,30 @@ from typing import Any
 
 from sarl_core.errors import InputError
 
+MOST_FOOTER = 2**23  # bytes; it takes a hundred times as much in memory
 _MOST_PAGES = 500_000
-_DEEPEST = 8  # structures within structures; a page's header has three levels
-# Fields of a page's header, and of the headers of data pages within it.
+_DEEPEST = 16  # structures and lists within one another; a footer has nine levels
+# Fields of the footer, of a row group, of a chunk (one column in one row group), of what is said
+# of it, of a page's header, and of the headers of data pages within it.
+_GROUPS = 4
+_CHUNKS, _ROWS = 1, 3
+_SAID = 3
+_CHUNK_VALUES, _CHUNK_SIZE, _FIRST_PAGE, _DICTIONARY = 5, 7, 9, 11
 _UNPACKED, _PACKED, _DATA, _DATA_2, _VALUES = 2, 3, 5, 8, 1
 _BOOLEAN, _BYTE, _WHOLE, _DOUBLE, _TEXT, _LIST, _STRUCTURE = (1, 2), 3, (4, 5, 6), 7, 8, (9, 10), 12
 
 
-def largest_chunk(data: memoryview, metadata: Any, columns: list[int]) -> int:
+def footer_size(data: memoryview) -> int:
+    """Bytes of the footer, as the file ends by saying."""
+    return int.from_bytes(data[-8:-4], "little")
+
+
+def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
     """Bytes that the pages of one column in one row group unpack to, of the largest.
 
     Args:
         data: The whole file.
-        metadata: Its ``pyarrow.parquet.FileMetaData``.
+        rows: How many it has.
         columns: Which of its columns, from 0.
 
     Returns:
@@ -31,39 +44,42 @@ def largest_chunk(data: memoryview, metadata: Any, columns: list[int]) -> int:
     Raises:
         InputError: If the footer and the pages do not fit, or there are far too many pages.
     """
-    largest = pages = 0
-    for index in range(metadata.num_row_groups):
-        group = metadata.row_group(index)
-        for column in columns:
-            size, count = _chunk(data, group.column(column), group.num_rows)
-            largest, pages = max(largest, size), pages + count
-            if pages > _MOST_PAGES:
-                raise InputError(
-                    "it is cut into far too many pages; save it again with larger ones"
-                )
+    largest = pages = found = 0
+    try:
+        footer, _ = _structure(data, len(data) - 8 - footer_size(data), 0)
+        for group in footer.get(_GROUPS) or ():
+            found += group[_ROWS]
+            for column in columns:
+                size, count = _chunk(data, group[_CHUNKS][column][_SAID], group[_ROWS])
+                largest, pages = max(largest, size), pages + count
+                if pages > _MOST_PAGES:
+                    raise InputError(
+                        "it is cut into far too many pages; save it again with larger ones"
+                    )
+    except (IndexError, KeyError, TypeError, AttributeError) as error:
+        raise _damaged() from error
+    if found != rows:
+        raise _damaged()
     return largest
 
 
-def _chunk(data: memoryview, chunk: Any, rows: int) -> tuple[int, int]:
+def _chunk(data: memoryview, said: dict[int, Any], rows: int) -> tuple[int, int]:
     """Bytes and number of the pages of a chunk."""
-    if chunk.num_values != rows:
+    if said[_CHUNK_VALUES] != rows:
         raise _damaged()
-    start = chunk.data_page_offset
-    if chunk.has_dictionary_page and 0 < (chunk.dictionary_page_offset or 0) < start:
-        start = chunk.dictionary_page_offset
-    end = min(start + chunk.total_compressed_size, len(data))
+    start = said[_FIRST_PAGE]
+    if 0 < said.get(_DICTIONARY, 0) < start:
+        start = said[_DICTIONARY]
+    end = min(start + said[_CHUNK_SIZE], len(data))
     size = pages = values = 0
     while values < rows:
         if not 0 <= start < end:
             raise _damaged()
-        try:
-            header, start = _structure(data, start, 0)
-            packed, unpacked = int(header[_PACKED]), int(header[_UNPACKED])
-            for field in (_DATA, _DATA_2):
-                if field in header:
-                    values += int(header[field][_VALUES])
-        except (IndexError, KeyError, TypeError) as error:
-            raise _damaged() from error
+        header, start = _structure(data, start, 0)
+        packed, unpacked = header[_PACKED], header[_UNPACKED]
+        for field in (_DATA, _DATA_2):
+            if field in header:
+                values += header[field][_VALUES]
         if packed < 0 or unpacked < 0:
             raise _damaged()
         start, size, pages = start + packed, size + unpacked, pages + 1
@@ -77,7 +93,7 @@ def _damaged() -> InputError:
 
 
 def _structure(data: memoryview, at: int, depth: int) -> tuple[dict[int, Any], int]:
-    """Whole numbers and structures by the number of their field, and where the next thing is."""
+    """What it holds by the number of its field, texts as None; and where the next thing is."""
     fields: dict[int, Any] = {}
     field = 0
     while (head := data[at]) != 0:
@@ -103,7 +119,7 @@ def _value(data: memoryview, at: int, kind: int, depth: int) -> tuple[Any, int]:
         size, at = _varint(data, at)
         return None, at + size
     if kind in _LIST:
-        return None, _after_list(data, at, depth)
+        return _list(data, at, depth)
     if kind == _DOUBLE:
         return None, at + 8
     if kind in (*_BOOLEAN, _BYTE):
@@ -111,16 +127,20 @@ def _value(data: memoryview, at: int, kind: int, depth: int) -> tuple[Any, int]:
     raise IndexError  # maps do not occur
 
 
-def _after_list(data: memoryview, at: int, depth: int) -> int:
+def _list(data: memoryview, at: int, depth: int) -> tuple[list[Any], int]:
+    """The structures of a list; nothing of a list of anything else."""
     head, at = data[at], at + 1
     size = head >> 4
     if size == 15:
         size, at = _varint(data, at)
+    found = []
     for _ in range(size):
-        _, at = _value(data, at, head & 15, depth + 1)
+        value, at = _value(data, at, head & 15, depth + 1)
         if at > len(data):
             raise IndexError
-    return at
+        if isinstance(value, dict):
+            found.append(value)
+    return found, at
 
 
 def _whole(data: memoryview, at: int) -> tuple[int, int]:

@@ -423,7 +423,7 @@ def _values(
 
 def _owned(array: NDArray[Any], dtype: Any) -> NDArray[Any]:
     """An array that nobody else can change, so that it need not be copied once more."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         owned = np.array(array, dtype=dtype, order="C", copy=None)
     if owned.base is not None:
         owned = owned.copy()

@@ -252,7 +252,7 @@ def require_filled(read: Mapping[str, Column], rows: NDArray[np.int64] | None = 
 def observation_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[np.float32]:
     """Columns side by side, shape (N, d)."""
     observations = np.empty((len(read[names[0]].values), len(names)), dtype=np.float32)
-    with np.errstate(over="ignore"):  # what overflows float32 is found as infinite
+    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
         for index, name in enumerate(names):
             observations[:, index] = read[name].values
     return observations
