@@ -46,16 +46,17 @@ class EpisodeCounts:
             One entry a thing.
         """
         shares = self.correct / self.samples
+        samples, correct = (
+            np.bincount(self.thing, weights, minlength=self.size).astype(np.int64)
+            for weights in (self.samples, self.correct)
+        )
         sums = EpisodeSums(
             np.bincount(self.thing, minlength=self.size),
+            samples,
             np.bincount(self.thing, shares, minlength=self.size).astype(np.float64),
             np.bincount(self.thing, np.square(shares), minlength=self.size).astype(np.float64),
         )
-        samples, correct = (
-            np.bincount(self.thing, weights, minlength=self.size).astype(np.int64).tolist()
-            for weights in (self.samples, self.correct)
-        )
-        return held_outs(samples, correct, sums)
+        return held_outs(correct.tolist(), sums)
 
     def together(self, chosen: NDArray[np.bool_]) -> tuple[Integers, Integers]:
         """Some things that do not overlap, taken as one.

@@ -81,11 +81,13 @@ class EpisodeSums(NamedTuple):
 
     Attributes:
         episodes: Number of episodes that count.
-        total: Sum of their shares.
+        samples: Pairs that count in them.
+        total: Sum of the episodes' shares.
         squares: Sum of the squares of these.
     """
 
     episodes: NDArray[np.int64]
+    samples: NDArray[np.int64]
     total: Floats
     squares: Floats
 
@@ -100,8 +102,8 @@ class EpisodeSums(NamedTuple):
 
         A single rule may be right in ten episodes and wrong in the eleventh, of a kind not met so
         far; the pseudo-episode stands for that one. A whole set meets every kind in nearly every
-        episode, and one pseudo-episode would say less than the E episodes there are: for it, it
-        counts 1 / E of one.
+        episode, and a pseudo-episode would outweigh what they say: there it counts as much as one
+        state of them does.
 
         Args:
             whole_set: Whether it is a rule set and no single rule.
@@ -110,7 +112,9 @@ class EpisodeSums(NamedTuple):
         Returns:
             Lower and upper ends within 0 and 1; NaN with fewer than `FEWEST_EPISODES`.
         """
-        weight = 1.0 / np.maximum(self.episodes, 1) if whole_set else np.ones(self.total.shape)
+        weight = np.ones(self.total.shape)
+        if whole_set:
+            weight = np.maximum(self.episodes, 1) / np.maximum(self.samples, 1)
         n: Floats = self.episodes + weight
         mean: Floats = (self.total + weight * _PSEUDO) / n
         spread: Floats = np.maximum(self.squares + weight * _PSEUDO**2 - n * mean**2, 0.0)
@@ -155,32 +159,30 @@ def held_out_of(
     pairs, right = np.asarray(samples, dtype=np.int64), np.asarray(correct, dtype=np.int64)
     shares = right[pairs > 0] / pairs[pairs > 0]
     sums = EpisodeSums(
-        np.array([len(shares)]), np.array([shares.sum()]), np.array([np.square(shares).sum()])
+        np.array([len(shares)]),
+        np.array([pairs.sum()]),
+        np.array([shares.sum()]),
+        np.array([np.square(shares).sum()]),
     )
-    return _held_outs(
-        [int(pairs.sum())],
-        [int(right.sum())],
-        sums,
-        sums.bounds(whole_set=whole_set, widened=widened),
-    )[0]
+    bounds = sums.bounds(whole_set=whole_set, widened=widened)
+    return _held_outs([int(right.sum())], sums, bounds)[0]
 
 
-def held_outs(samples: list[int], correct: list[int], sums: EpisodeSums) -> list[HeldOut]:
+def held_outs(correct: list[int], sums: EpisodeSums) -> list[HeldOut]:
     """Count many rules by episodes.
 
     Args:
-        samples: Pairs that count for each, R numbers.
-        correct: Those of them that are right.
+        correct: Pairs that each is right about, R numbers.
         sums: Over the episodes of each, (R,).
 
     Returns:
         One entry each.
     """
-    return _held_outs(samples, correct, sums, sums.bounds())
+    return _held_outs(correct, sums, sums.bounds())
 
 
 def _held_outs(
-    samples: list[int], correct: list[int], sums: EpisodeSums, bounds: tuple[Floats, Floats]
+    correct: list[int], sums: EpisodeSums, bounds: tuple[Floats, Floats]
 ) -> list[HeldOut]:
     low, high = bounds
     return [
@@ -192,7 +194,7 @@ def _held_outs(
             *((None, None) if episodes < FEWEST_EPISODES else ends),
         )
         for all_pairs, right, episodes, total, ends in zip(
-            samples,
+            sums.samples.tolist(),
             correct,
             sums.episodes.tolist(),
             sums.total.tolist(),

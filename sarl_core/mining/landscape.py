@@ -235,7 +235,7 @@ def _tried(
 ) -> list[EpisodeSums]:
     """What other episodes say of every cell: of all dimensions together, and of each."""
     layers = [
-        EpisodeSums(np.zeros(shape, dtype=np.int64), np.zeros(shape), np.zeros(shape))
+        EpisodeSums(*np.zeros((2, *shape), dtype=np.int64), *np.zeros((2, *shape)))
         for _ in range(len(trees) + 1)
     ]
     entries = []
@@ -285,6 +285,7 @@ def _add(layer: EpisodeSums, planes: NDArray[np.int64]) -> None:
     samples, correct = planes
     shares = correct / np.maximum(samples, 1)
     layer.episodes[...] += (samples > 0).sum(axis=0)
+    layer.samples[...] += samples.sum(axis=0)
     layer.total[...] += shares.sum(axis=0)
     layer.squares[...] += np.square(shares).sum(axis=0)
 

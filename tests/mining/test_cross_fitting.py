@@ -83,11 +83,12 @@ def test_all_dimensions_count_and_processes_give_the_same():
 
 def test_the_interval_is_students_widened_because_the_folds_share_their_episodes(lander_like):
     found = cross_fit(lander_like, folds=5).at(Thresholds(0.01, 0.8))
-    for told, shares in (
-        (found.fidelity, found.correct / found.covered),
-        (found.coverage, found.covered / found.decisions),
+    for told, part, whole in (
+        (found.fidelity, found.correct, found.covered),
+        (found.coverage, found.covered, found.decisions),
     ):
-        values, weights = np.append(shares, 0.5), np.append(np.ones(20), 1 / 20)
+        shares = part / whole
+        values, weights = np.append(shares, 0.5), np.append(np.ones(20), 20 / whole.sum())
         mean = np.average(values, weights=weights)
         n = weights.sum()
         variance = (weights * (values - mean) ** 2).sum() / (n - 1)

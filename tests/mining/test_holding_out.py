@@ -341,7 +341,8 @@ def test_the_landscapes_layer_is_what_mining_every_cell_counts(demonstrations, l
             assert found == pytest.approx(np.mean(shares)) if shares else np.isnan(found)
             ends = landscape.held_out_low[i, j], landscape.held_out_high[i, j]
             few = len(shares) < 5
-            expected = (np.nan, np.nan) if few else t_interval(shares, 1 / len(shares))
+            pairs = sum(samples for samples, _ in sums.values())
+            expected = (np.nan, np.nan) if few else t_interval(shares, len(shares) / pairs)
             assert ends == pytest.approx(expected, nan_ok=True, abs=1e-9)
 
 
