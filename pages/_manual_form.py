@@ -163,7 +163,8 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             width=110,
         )
         values = of.basis.ground.states[:, feature]
-        low, high = number_text(float(values.min())), number_text(float(values.max()))
+        least, most = float(values.min()), float(values.max())
+        low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
         threshold = st.number_input(
             "Number",
             value=None,

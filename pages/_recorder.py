@@ -14,6 +14,7 @@ import streamlit as st
 from _replays import Order, Replay, compared, kept_comparisons
 from numpy.typing import NDArray
 
+from sarl_core.decimals import digits_telling
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.prose import heading
@@ -298,9 +299,13 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
         found[title[:1].upper() + title[1:]] = column.TextColumn(
             width=76, help="The rule in force; empty where none applies"
         )
-    for feature in replay.features:
+    lived = recorded.steps.observation
+    for index, feature in enumerate(replay.features):
         title = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
-        found.setdefault(title, column.NumberColumn(format="%.4g"))
+        values = lived[np.isfinite(lived[:, index]), index].astype(np.float64)
+        width, largest = np.ptp(values) if len(values) else 0.0, np.abs(values).max(initial=0.0)
+        digits = digits_telling(float(width) / 1000, float(largest))
+        found.setdefault(title, column.NumberColumn(format=f"%.{digits}g"))
     return found
 
 

@@ -15,6 +15,7 @@ from _cache import cached
 from _upload import upload_section
 from _words import escaped, in_full
 
+from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.checks import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
 from sarl_core.demonstrations.formats import (
@@ -286,14 +287,14 @@ def features_section(demonstrations: Demonstrations, found: Contents, divider: i
         {
             "Feature": names,
             "Unit": [row.unit or "–" for row in found.rows],
-            "Least": [row.low for row in found.rows],
-            "Median": [row.median for row in found.rows],
-            "Largest": [row.high for row in found.rows],
+            "Least": [decimal_on_scale(row.low, row.low, row.high) for row in found.rows],
+            "Median": [decimal_on_scale(row.median, row.low, row.high) for row in found.rows],
+            "Largest": [decimal_on_scale(row.high, row.low, row.high) for row in found.rows],
         },
         hide_index=True,
         height="content" if len(names) <= 24 else 480,
         column_config={
-            column: st.column_config.NumberColumn(format="%.3g")
+            column: st.column_config.NumberColumn(format="%.12g")
             for column in ("Least", "Median", "Largest")
         },
     )

@@ -11,6 +11,7 @@ import _state as state
 import streamlit as st
 from _words import escaped, file_name, in_full
 
+from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import save_demonstrations
 from sarl_core.demonstrations.names import Names, names_of
@@ -31,8 +32,8 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
             "Name": list(names.features),
             "Unit": list(names.units),
             "Came as": list(own.features),
-            "Least": low.tolist(),
-            "Largest": high.tolist(),
+            "Least": list(map(decimal_on_scale, low.tolist(), low.tolist(), high.tolist())),
+            "Largest": list(map(decimal_on_scale, high.tolist(), low.tolist(), high.tolist())),
         }
     if table == ACTIONS:
         return {"Name": list(names.actions), "Came as": list(own.actions)}
@@ -123,8 +124,8 @@ def editor(table: str, raw: Demonstrations) -> None:
             "Name": column.TextColumn(width=170, max_chars=200, help="Click to change it"),
             "Unit": column.TextColumn(width=72, max_chars=40, help="As rad or m/s; may be empty"),
             "Came as": column.TextColumn(help="The name in the data as they were read"),
-            "Least": column.NumberColumn(format="%.4g", width=78),
-            "Largest": column.NumberColumn(format="%.4g", width=82),
+            "Least": column.NumberColumn(format="%.12g", width=78),
+            "Largest": column.NumberColumn(format="%.12g", width=82),
             "Action": column.NumberColumn(format="%d", width="small"),
         },
     )

@@ -17,6 +17,7 @@ from _what_if_view import show
 from _words import escaped
 from numpy.typing import NDArray
 
+from sarl_core.decimals import digits_telling
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.language import label_text
 from sarl_core.explaining.lit_path import PathFinder
@@ -176,16 +177,18 @@ def settings() -> None:
 def slider(index: int) -> float:
     """One feature's slider."""
     feature, span = demonstrations.features[index], spans[index]
+    step = (span.high - span.low) / STEPS
+    digits = digits_telling(step, max(abs(span.low), abs(span.high)))
     return float(
         st.slider(
             escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name),
             span.low,
             span.high,
             span.middle,
-            step=(span.high - span.low) / STEPS,
+            step=step,
             key=f"x{index}",
             bind="query-params",
-            format="%.4g",
+            format=f"%.{digits}g",
         )
     )
 

@@ -8,6 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
+_UNSEEN = 0.005  # of a scale: nobody sees a number that is off by less
+
 MOST_DIGITS = 17
 """Tell every double from every other."""
 
@@ -38,6 +40,53 @@ def short_decimal(exact: float, least: float, most: float, *, fewest: int = 1) -
         if fitting:
             return min(fitting, key=lambda value: (abs(value - exact), value))
     return None
+
+
+def decimal_within(value: float, error: float, *, fewest: int = 3) -> float:
+    """A decimal number near a value.
+
+    Args:
+        value: Any finite number.
+        error: How far it may be away; 0 for not at all.
+        fewest: Number of significant digits to begin with.
+
+    Returns:
+        Of the numbers with as few digits, the nearest.
+    """
+    most = float(np.nextafter(value + error, math.inf))
+    found = short_decimal(value, value - error, most, fewest=fewest)
+    return value if found is None else found
+
+
+def decimal_on_scale(value: float, low: float, high: float) -> float:
+    """A decimal number near a value on a scale.
+
+    Args:
+        value: Any finite number.
+        low: Where the scale begins.
+        high: Where it ends; not below `low`.
+
+    Returns:
+        With three significant digits, or with more where the scale is narrow for those.
+    """
+    width = high - low
+    return decimal_within(value, _UNSEEN * width if width > 0 else _UNSEEN * abs(value))
+
+
+def digits_telling(step: float, largest: float, *, fewest: int = 4) -> int:
+    """How many significant digits numbers need for a step between them to be seen.
+
+    Args:
+        step: Above 0.
+        largest: Of the numbers, by size.
+        fewest: No fewer than these.
+
+    Returns:
+        At most `MOST_DIGITS`.
+    """
+    if not 0.0 < step < largest < math.inf:
+        return fewest
+    return min(max(math.floor(math.log10(largest)) - math.floor(math.log10(step)) + 1, fewest), 17)
 
 
 def decimal_text(value: float) -> str:

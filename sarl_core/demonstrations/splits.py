@@ -18,6 +18,7 @@ from sarl_core.decimals import float32_around, short_decimal
 FEWEST_DIGITS = 3
 """Of a threshold that is read: a threshold stands between two values, but not just anywhere."""
 
+_NEARER = 0.1  # of the way from a value to a threshold, that what is written of each may be off
 _NOTHING = 0.001  # of the gap that a threshold lies in: nearer to zero than so, it is zero
 
 Floats = NDArray[np.float64]
@@ -121,7 +122,8 @@ def written_threshold(
         threshold: At full precision.
         splits: Of its feature, where they are known. Where they are not, or not of this
             threshold, it has to part all 32-bit numbers as the threshold does.
-        beside: Values that are shown with it and have to stay on their side, too.
+        beside: Values that are shown with it: they have to stay on their side, too, and about as
+            far from it as they are.
 
     Returns:
         A decimal number of three significant digits, or of more where the demonstrated states
@@ -132,8 +134,12 @@ def written_threshold(
         near, next_above = float32_around(threshold)
         below = near if math.isinf(below) else below
         above = next_above if math.isinf(above) else above
-    below = max([below, *(value for value in beside if value <= threshold)])
-    above = min([above, *(value for value in beside if value > threshold)])
+    beside = [value for value in beside if math.isfinite(value)]
+    room = _NEARER * min(
+        (abs(value - threshold) for value in beside if value != threshold), default=math.inf
+    )
+    below = max([below, threshold - room, *(value for value in beside if value <= threshold)])
+    above = min([above, threshold + room, *(value for value in beside if value > threshold)])
     if below <= 0.0 < above and abs(threshold) < _NOTHING * (above - below):
         return 0.0
     found = short_decimal(threshold, below, above, fewest=FEWEST_DIGITS)
@@ -152,9 +158,11 @@ def written_value(
 
     Returns:
         A decimal number of so many digits, or of more where it takes them to stay on its side of
-        each threshold.
+        each threshold, and as far from it as it is.
     """
-    least = max([-math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one < value)])
-    most = min([math.inf, *(np.nextafter(one, math.inf) for one in thresholds if one >= value)])
-    found = short_decimal(value, float(least), float(most), fewest=fewest)
+    ways = [abs(value - one) for one in thresholds if one != value]
+    room = _NEARER * min(ways, default=math.inf)
+    # What lies on a threshold is at most the threshold, and so is what is written of it.
+    most = value if value in thresholds else value + room
+    found = short_decimal(value, value - room, float(np.nextafter(most, math.inf)), fewest=fewest)
     return value if found is None else found

@@ -14,22 +14,24 @@ from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
 from sarl_core.mining.written import limit_texts
 
 _DIGITS = 3
+_OFF = 0.1  # of the difference of two numbers, that each may be off
 _FLAG_WORDS = ("contact",)
 
 
 def number_text(value: float, *, apart_from: float | None = None) -> str:
-    """A number for people: three significant digits, more where two would look the same.
+    """A number for people: three significant digits, more where two lie near each other.
 
     Args:
         value: Any finite number.
-        apart_from: Another number shown beside it.
+        apart_from: Another number shown beside it; the difference of the two is not lost.
 
     Returns:
         As "0.0213" or "-12".
     """
+    apart = math.inf if apart_from is None else abs(value - apart_from)
     for digits in range(_DIGITS, 18):
         text = _rounded(value, digits)
-        if apart_from is None or value == apart_from or text != _rounded(apart_from, digits):
+        if not apart or abs(float(text) - value) <= _OFF * apart:
             return text
     return repr(value)
 

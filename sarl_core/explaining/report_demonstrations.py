@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sarl_core.decimals import decimal_text, short_decimal
+from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.distributions import FeatureRow, episode_series, feature_rows
@@ -16,7 +16,6 @@ from sarl_core.explaining.report_svg import MUTED, NEUTRAL, columns, share_bar
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
 
-_WITHIN = 0.005  # of a range: a value in it is written with no larger an error
 _FEW_LABELS = 9  # as rows with their names; more are columns side by side
 
 
@@ -136,9 +135,7 @@ def within(value: float, row: FeatureRow) -> str:
     width = row.high - row.low
     if abs(value) <= 1e-4 * width:
         return "0"
-    room = _WITHIN * width
-    found = short_decimal(value, value - room, value + room, fewest=3)
-    return number_text(value) if found is None else decimal_text(found)
+    return decimal_text(decimal_on_scale(value, row.low, row.high))
 
 
 def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionShares:

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 
+from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.language import label_text, number_text
@@ -126,10 +127,14 @@ def _row(
         _part(part, ends, feature, labels)
         for part in sorted(parts, key=lambda part: part[0] - part[1])
     )
-    now = escape(f"{feature.name} is {with_unit(number_text(value), feature)}")
+    near = decimal_text(decimal_on_scale(value, low, high))
+    now = escape(f"{feature.name} is {with_unit(near, feature)}")
     told = f"{now}: {_told(parts, value, feature, labels)}"
     place = 100 * (value - low) / (high - low)
-    under = "".join(f"<span>{escape(with_unit(number_text(end), feature))}</span>" for end in ends)
+    under = "".join(
+        f"<span>{escape(with_unit(number_text(end, apart_from=other), feature))}</span>"
+        for end, other in ((low, high), (high, low))
+    )
     return (
         f'<div class="row" role="img" aria-label="{told}">'
         f'<div class="name">{escape(feature.name)}</div><div class="track"><div class="bar">{bar}'

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.decimals import decimal_text, short_decimal
+from sarl_core.decimals import decimal_text, decimal_within
 from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
 from sarl_core.errors import InputError
 
@@ -126,8 +126,7 @@ def _edge_texts(edges: Sequence[float]) -> list[str]:
             texts.append("0")
             continue
         room = _EDGE_ERROR * width if width > 0 else abs(edge)  # nothing to tell a single one from
-        found = short_decimal(edge, edge - room, edge + room, fewest=3)
-        texts.append(decimal_text(edge if found is None else found))
+        texts.append(decimal_text(decimal_within(edge, room)))
     return texts
 
 

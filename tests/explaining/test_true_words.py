@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Rule, RuleSet, grow_policy_trees, mine_rules
+from sarl_core.decimals import digits_telling
 from sarl_core.explaining.evidence import example_columns
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import conditions_text, sentence
+from sarl_core.explaining.language import conditions_text, number_text, sentence
 from sarl_core.explaining.lit_path import PathFinder, lit_path_table
 from sarl_core.explaining.markdown import rules_to_markdown
 from sarl_core.explaining.rule_figures import path_queries
@@ -332,3 +333,41 @@ def test_splits_that_are_none_are_refused(splits: str, says: str) -> None:
     with pytest.raises(InputError, match=says) as refused:
         rules_from_json(broken)
     assert len(str(refused.value)) < 300
+
+
+def test_a_value_is_written_as_far_from_its_threshold_as_it_is() -> None:
+    rule_set = mine_rules(kelvin(), supp_min=0.0, conf_min=0.95)
+    rule = next(one for one in rule_set.rules if one.conditions[0].op == ">")
+    threshold = rule.conditions[0].threshold
+    for way in (1e-4, 0.01, 0.1, 0.5):
+        (view,) = condition_views(rule, (float(np.float32(threshold + way)),), rule_set)
+        limit, value, room = map(float, (view.condition.split()[-1], view.value, view.room))
+        assert value - limit == pytest.approx(room, rel=0.25)
+
+
+@given(st.floats(-1e9, 1e9, width=32), st.floats(1e-6, 1e3))
+def test_the_ends_of_a_range_keep_how_wide_it_is(low: float, width: float) -> None:
+    high = float(np.float32(low + width))
+    if high > low:
+        ends = [
+            float(number_text(one, apart_from=other)) for one, other in ((low, high), (high, low))
+        ]
+        assert ends[1] - ends[0] == pytest.approx(high - low, rel=0.21)
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1.1, 1e6))
+def test_digits_tell_a_step(step: float, times: float) -> None:
+    largest = step * times
+    digits = digits_telling(step, largest)
+    texts = {f"{largest - place * 1.01 * step:.{digits}g}" for place in range(2)}
+    assert len(texts) == 2
+    assert digits_telling(0.0, largest) == digits_telling(step, np.inf) == 4
+
+
+def test_a_state_that_is_none_leaves_the_sentence_as_it_is() -> None:
+    rule_set = mine_rules(kelvin(), supp_min=0.0, conf_min=0.95)
+    rule = rule_set.rules[0]
+    for value in (np.nan, np.inf, -np.inf):
+        assert sentence(rule, rule_set, state=[value]) == sentence(rule, rule_set)
+    table = lit_path_table(PathFinder(rule_set).path(0, np.array([np.nan]), -1), rule_set, 0)
+    assert ">not a number<" in table
