@@ -8,12 +8,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from sarl_core import InputError, RuleSet, Shield, ShieldedEnv, ShieldedVecEnv, mine_rules
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.code_python import rules_to_python
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import Source
@@ -150,6 +151,42 @@ def test_what_is_executed_carries_the_rules_labels(shield, data):
             changed = True
     assert decision.intervened == changed
     assert not math.isnan(decision.margin)
+
+
+@settings(max_examples=100, deadline=None)
+@given(shields().filter(lambda shield: shield.outside == "act"), st.data())
+def test_exported_python_gives_the_same_answer(shield, data):
+    rule_set = shield.rule_set
+    assume(any(rule.enabled for rule in rule_set.rules))
+    names = {}
+    source = rules_to_python(rule_set, shield.projection, shield.on_invalid)
+    exec(compile(source, "shield.py", "exec"), names)
+    single = len(rule_set.actions) == 1 and not rule_set.actions[0].is_interval
+    d, m = len(rule_set.source.features), len(rule_set.actions)
+    odd = st.sampled_from([math.nan, math.inf, -math.inf, 1e300, 0.5])
+    first, count = rule_set.actions[0].first, rule_set.actions[0].n_labels
+    known = st.integers(first, first + count - 1)
+    wanted = st.floats(-3, 3) if rule_set.actions[0].is_interval else known
+    for _ in range(8):
+        broken = data.draw(st.sampled_from(["", "", "state", "length", "action"]))
+        numbers = st.floats(-2, 2) | odd if broken == "state" else st.floats(-2, 2)
+        size = data.draw(st.integers(0, d + 1)) if broken == "length" else d
+        state = data.draw(st.lists(numbers, min_size=size, max_size=size))
+        actions = wanted | odd | st.integers(-6, 260) if broken == "action" else wanted
+        action = data.draw(st.lists(actions, min_size=m, max_size=m))
+        if single:
+            (action,) = action
+        decision = answer(shield.decide, state, action)
+        if isinstance(decision, str):
+            with pytest.raises(ValueError, match="none that the rules can be asked about"):
+                names["shield"](state, action)
+            continue
+        executed, rules = names["shield"](state, action)
+        assert [None if rule < 0 else rule for rule in rules] == list(decision.rules)
+        if decision.invalid is not None:
+            assert executed is action
+        else:
+            assert np.array_equal(np.ravel(executed), np.ravel(decision.executed))
 
 
 BOXES = [
