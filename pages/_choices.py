@@ -20,6 +20,7 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError, SarlError
+from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rule_order import fits
@@ -145,9 +146,10 @@ def compact_file() -> Path:
 
 
 @cached()
-def _rule_file(path: Path, stamp: int) -> tuple[RuleSet, str]:
+def _rule_file(path: Path, stamp: int, dataset: str) -> tuple[RuleSet, str]:
     content = path.read_bytes()
-    return rules_from_json(content, name=path.name), digest_of(content)
+    shipped = rules_from_json(content, name=path.name)
+    return with_splits(shipped, state.shipped_demonstrations(dataset)), digest_of(content)
 
 
 def compact_rules() -> tuple[RuleSet, str]:
@@ -158,7 +160,7 @@ def compact_rules() -> tuple[RuleSet, str]:
     """
     path = compact_file()
     try:
-        rule_set, digest = _rule_file(path, path.stat().st_mtime_ns)
+        rule_set, digest = _rule_file(path, path.stat().st_mtime_ns, state.chosen_dataset())
     except OSError as error:
         raise InputError(
             f"there are no compact rules for {state.dataset_label(state.chosen_dataset())}; "

@@ -26,6 +26,7 @@ from sarl_core.explaining.report_gaps import gaps
 from sarl_core.explaining.report_rules import in_order, rules_part
 from sarl_core.explaining.report_thresholds import kept
 from sarl_core.mining.cross_fitting import cross_fit
+from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.rule_names import renamed_rules
 from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
@@ -143,6 +144,7 @@ def make_report(
     if same_environment(rule_set, demonstrations):
         # A rule file keeps the names of its day; a report speaks as the demonstrations do.
         rule_set = renamed_rules(rule_set, names_of(demonstrations))
+    rule_set = with_splits(rule_set, demonstrations)
     counts = tally(rule_set, demonstrations)
     if trees is None and rule_set.cut == "thresholds":
         trees = grow_policy_trees(demonstrations, divider=rule_set.divider)

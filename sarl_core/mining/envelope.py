@@ -1,4 +1,4 @@
-"""Where the pairs of each rule lay: its half-spaces reach further than the data did."""
+"""Where the pairs of each rule lay, within its half-spaces and around its thresholds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sarl_core.mining.applying import Applications, applications
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.tree import splits_of
 
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
 
@@ -38,6 +39,35 @@ def with_boxes(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
         rule_set,
         rules=tuple(
             replace(rule, box=box) for rule, box in zip(rule_set.rules, boxes, strict=True)
+        ),
+    )
+
+
+def with_splits(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
+    """Let rules that came without them know the demonstrated values around their thresholds.
+
+    Args:
+        rule_set: Its rules.
+        demonstrations: What they were mined from, or others that they are shown beside.
+
+    Returns:
+        The same rules; features that know of thresholds keep what they know.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    rule_set = rules_for(rule_set, demonstrations).rule_set
+    asked = [condition for rule in rule_set.rules for condition in rule.conditions]
+    found = splits_of(
+        np.array([feature for feature, _, _ in asked], dtype=np.int64),
+        np.array([threshold for _, _, threshold in asked], dtype=np.float64),
+        demonstrations,
+    )
+    known = [feature.splits for feature in rule_set.source.features]
+    return replace(
+        rule_set,
+        source=rule_set.source.with_splits(
+            [new if old is None else old for old, new in zip(known, found, strict=True)]
         ),
     )
 

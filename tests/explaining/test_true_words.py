@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,9 +21,11 @@ from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import conditions_text, number_text, sentence
 from sarl_core.explaining.lit_path import PathFinder, lit_path_table
 from sarl_core.explaining.markdown import rules_to_markdown
+from sarl_core.explaining.report import Wishes, make_report
 from sarl_core.explaining.rule_figures import path_queries
 from sarl_core.explaining.what_if import condition_views
 from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.rule_files import rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import node_of
 from sarl_core.rollouts.rendering import plain_descriptions
@@ -371,3 +374,27 @@ def test_a_state_that_is_none_leaves_the_sentence_as_it_is() -> None:
         assert sentence(rule, rule_set, state=[value]) == sentence(rule, rule_set)
     table = lit_path_table(PathFinder(rule_set).path(0, np.array([np.nan]), -1), rule_set, 0)
     assert ">not a number<" in table
+
+
+def test_rules_that_came_without_it_learn_what_was_demonstrated() -> None:
+    demonstrations = kelvin()
+    rule_set = mine_rules(demonstrations, supp_min=0.0, conf_min=0.95)
+    source = rule_set.source.with_splits([None])
+    bare = replace(rule_set, source=source)
+    said = [conditions_text(rule, rule_set) for rule in rule_set.rules]
+    taught = with_splits(bare, demonstrations)
+    assert [conditions_text(rule, bare) for rule in bare.rules] != said
+    assert [conditions_text(rule, taught) for rule in taught.rules] == said
+    # What is known stays, whatever the rules are shown beside.
+    half = Demonstrations(
+        demonstrations.observations[::2],
+        demonstrations.actions[::2],
+        demonstrations.episodes[::2],
+        feature_names=("temp",),
+    )
+    shown = with_splits(taught, half)
+    assert [conditions_text(rule, shown) for rule in shown.rules] == said
+    report = make_report(bare, demonstrations, Wishes(frames=0)).html
+    assert all(text.split()[-1] in report for text in said)
+    assert bare.rules[0].conditions[0].threshold != float(said[0].split()[-1])
+    assert conditions_text(bare.rules[0], bare).split()[-1] not in report
