@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sarl_core.explaining.evidence_words import influence_text, range_text
+from sarl_core.explaining.evidence_words import influence_text, range_text, what_tells
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.mining.cross_fitting import Judged, parts
 from sarl_core.mining.evidence import HeldOut
@@ -51,11 +51,7 @@ def judged_sentence(judged: Judged) -> str:
         return f"{where} apply in no state."
     told = share_text(fidelity.share)
     if fidelity.interval is not None:
-        low, high = (share_text(end) for end in fidelity.interval)
-        told += (
-            f" of their states on average (between {low.removesuffix(' %')} and {high} is what "
-            "that can tell)"
-        )
+        told += f" of their states on average ({what_tells(fidelity.interval)})"
     else:
         told += " of their states on average"
         if judged.whole_episodes:

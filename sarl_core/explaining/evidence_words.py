@@ -42,7 +42,27 @@ def range_text(interval: Interval) -> str:
     Returns:
         As "78 to 99 %".
     """
-    return f"{share_text(interval.low).removesuffix(' %')} to {share_text(interval.high)}"
+    return " to ".join(_ends(interval))
+
+
+def what_tells(interval: Interval) -> str:
+    """The same for whoever has never heard of an interval.
+
+    Args:
+        interval: Its ends.
+
+    Returns:
+        As "between 78 and 99 % is what that can tell".
+    """
+    return f"between {' and '.join(_ends(interval))} is what that can tell"
+
+
+def _ends(interval: Interval) -> tuple[str, str]:
+    """Both, with as many digits as part them."""
+    low, high = map(share_text, interval)
+    if low == high and interval.low < interval.high:
+        low, high = (share_text(end, decimals=2) for end in interval)
+    return low.removesuffix(" %"), high
 
 
 def mined_text(rule: Rule) -> str:
@@ -122,8 +142,7 @@ def told_by_episodes(held_out: HeldOut, *, what: str, its: str = "its states") -
     )
     if held_out.interval is None:
         return f"{text}; {'that is' if held_out.episodes > 1 else 'one is'} too few to say more."
-    low, high = (share_text(end) for end in held_out.interval)
-    return f"{text}, and between {low.removesuffix(' %')} and {high} is what that can tell."
+    return f"{text}, and {what_tells(held_out.interval)}."
 
 
 def influence_text(found: Influence | None) -> str:

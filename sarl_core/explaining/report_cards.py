@@ -12,7 +12,7 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.distributions import FeatureRow
-from sarl_core.explaining.evidence_words import range_text
+from sarl_core.explaining.evidence_words import what_tells
 from sarl_core.explaining.language import (
     action_text,
     counted,
@@ -251,11 +251,7 @@ def _tried(source: str, found: HeldOut, threshold: float | None) -> Evidence:
         share = found.share
         told = f"{share_text(share)} of its states in an episode, on average over "
         told += f"{counted(found.episodes, 'episode')}; "
-        told += (
-            "these are too few to say more"
-            if interval is None
-            else f"between {range_text(interval).replace(' to ', ' and ')} is what that can tell"
-        )
+        told += "these are too few to say more" if interval is None else what_tells(interval)
     return Evidence(
         source=source,
         text=_states(Share(found.correct, found.samples)),

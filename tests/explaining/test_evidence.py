@@ -72,6 +72,8 @@ def test_an_interval_is_said_or_why_there_is_none():
     assert interval_text(None) == ""
     assert range_text(Interval(0.0, 1.0)) == "0 to 100 %"
     assert range_text(Interval(0.5, 0.99996)) == "50 to > 99.99 %"
+    assert range_text(Interval(0.496, 0.502)) == "49.60 to 50.20 %"
+    assert range_text(Interval(0.5, 0.5)) == "50 to 50 %"
 
 
 @pytest.mark.parametrize(
