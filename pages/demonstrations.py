@@ -201,7 +201,7 @@ def columns_section(demonstrations: Demonstrations) -> None:
             hide_index=True,
             height="content" if len(demonstrations.columns) <= 24 else 480,
         )
-        st.caption("If one is wrong, open “Use your own demonstrations” above and map the columns.")
+        st.caption("If one is wrong, map the columns yourself, where the file was chosen.")
 
 
 def actions_section(demonstrations: Demonstrations, divider: int) -> None:

@@ -34,9 +34,14 @@ def share_text(share: str) -> str:
 def hold_out_choice(whole: Demonstrations) -> None:
     """How many episodes are held out, and which."""
     choice, parts = _hold_out.chosen(), _hold_out.parted(whole)
-    # The widgets follow the URL, so a link and the browser's "back" both reach them.
-    st.session_state["_holdout_choice"] = f"{choice.share:g}"
-    st.session_state["_holdout_seed_choice"] = choice.seed
+    # The widgets follow the URL, so a link and the browser's "back" both reach them. Only where
+    # they differ: a value that is set takes back what a hand is moving just then.
+    for key, value in (
+        ("_holdout_choice", f"{choice.share:g}"),
+        ("_holdout_seed_choice", choice.seed),
+    ):
+        if st.session_state.get(key) != value:
+            st.session_state[key] = value
     with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
         st.select_slider(
             "Share of the episodes held out",

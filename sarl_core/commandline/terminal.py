@@ -43,15 +43,18 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
         The exit code: 0; 2 if the input was wrong; 1 if the work failed; 130 after Ctrl-C.
     """
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output
-    with lasting_streams() as output, interruptible(), temporary_folder():
-        code = _run(app, arguments)
+    with lasting_streams() as output:
+        try:
+            with interruptible(), temporary_folder():
+                code = _run(app, arguments)
+        except KeyboardInterrupt:  # before the command began, or after its end
+            code = _failed(KeyboardInterrupt())
         output.flush()
         if output.failure is None or code:
             return code
-        print(  # noqa: T201
-            f"error: the answer could not be written to standard output ({output.failure}); "
-            "free some space, or send it elsewhere",
-            file=sys.stderr,
+        _complain(
+            f"the answer could not be written to standard output ({output.failure}); "
+            "free some space, or send it elsewhere"
         )
         return 1
 
@@ -71,16 +74,25 @@ def _run(app: typer.Typer, arguments: Sequence[str]) -> int:
     except (Exception, KeyboardInterrupt) as error:
         if debug:
             traceback.print_exc()
-        sentence, code = _told(error)
-        print(f"error: {' '.join(sentence.split())}", file=sys.stderr)  # noqa: T201
-        return code
+        return _failed(error)
 
 
 def _code(result: object) -> int:
     # Typer turns Ctrl-C into a code, without a word.
     if result == _INTERRUPTED:
-        print("error: stopped; nothing was written", file=sys.stderr)  # noqa: T201
+        return _failed(KeyboardInterrupt())
     return result if isinstance(result, int) else 0
+
+
+def _failed(error: BaseException) -> int:
+    """Say in one line what went wrong, and give the exit code."""
+    sentence, code = _told(error)
+    _complain(sentence)
+    return code
+
+
+def _complain(sentence: str) -> None:
+    print(f"error: {' '.join(sentence.split())}", file=sys.stderr)  # noqa: T201
 
 
 def _told(error: BaseException) -> tuple[str, int]:

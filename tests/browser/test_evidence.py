@@ -10,6 +10,7 @@ from tests.browser.walking import metric, no_trace, parameters, settle, visit
 def test_held_out_episodes_are_chosen_and_every_page_follows(screen: Page) -> None:
     visit(screen, "/evidence?data=cartpole", "Evidence")
     expect(screen.get_by_text("Nothing is held out")).to_be_visible()
+    settle(screen)
     slider = screen.get_by_role("slider", name="Share of the episodes held out")
     slider.focus()
     for _ in range(4):
@@ -21,7 +22,7 @@ def test_held_out_episodes_are_chosen_and_every_page_follows(screen: Page) -> No
     screen.get_by_role("link", name="Rules", exact=True).click()
     expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
     settle(screen)
-    expect(screen.get_by_text(", held out 0.").first).to_be_visible()
+    expect(screen.get_by_text("not mined from, it was right in").first).to_be_visible()
     assert parameters(screen)["holdout"] == "0.2"
     visit(screen, "/thresholds?data=cartpole&holdout=0.2", "Thresholds")
     assert metric(screen, "Held-out fidelity") == certain

@@ -6,6 +6,7 @@ import json
 import os
 import resource
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -115,6 +116,8 @@ def test_a_request_to_end_clears_up(tmp_path: Path) -> None:
         time.sleep(0.02)
     process.terminate()
     printed, complaints = process.communicate(timeout=60)
-    assert (process.returncode, printed) == (130, "")
+    # To a shell both are 130. Python ends itself by the signal where a library saw the interrupt.
+    assert process.returncode in (130, -signal.SIGINT)
+    assert printed == ""
     assert complaints.splitlines() == ["error: stopped; nothing was written"]
     assert list(tmp_path.iterdir()) == []
