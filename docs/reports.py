@@ -1,0 +1,62 @@
+"""Makes the reports in this folder and what they compare: `python docs/reports.py`."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from sarl_core import RuleSet  # noqa: E402  # found by the line above
+from sarl_core.cli import main  # noqa: E402
+from sarl_core.files import whole_file  # noqa: E402
+from sarl_core.rollouts.comparison import Arm, compare  # noqa: E402
+from sarl_core.rollouts.seeds import FRESH  # noqa: E402
+
+EPISODES = 100
+
+
+def sarl(line: str) -> None:
+    """Run a command of the product."""
+    if main(shlex.split(line)):
+        raise SystemExit(f"failed: {line}")
+
+
+def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
+    """Novice and expert, each alone and under the rules, on the same seeds."""
+    shields = (("no shield", None), (called, RuleSet.load(rules)))
+    arms = [
+        Arm(f"{agent}, {name}", agent, rule_set)
+        for agent in ("novice", "expert")
+        for name, rule_set in shields
+    ]
+    found = compare(env_id, arms, episodes=EPISODES, seed=FRESH, jobs=os.cpu_count() or 1)
+    frame = found.to_frame()
+    frame.insert(0, "projection", [arm.projection if arm.rules else "" for arm in arms])
+    frame.insert(0, "seed", FRESH)
+    frame.insert(0, "environment", env_id)
+    with whole_file(out) as unfinished:
+        frame.to_csv(unfinished, index=False)
+
+
+def report(task: str, rules: str, env_id: str, called: str) -> None:
+    """One report and its comparison."""
+    csv, out = (f"docs/report_{task}.{suffix}" for suffix in ("csv", "html"))
+    comparison(env_id, Path(rules), called, Path(csv))
+    data = f"data/demonstrations/{task}.parquet"
+    sarl(f"report {rules} --demonstrations {data} --comparison {csv} --out {out}")
+
+
+if __name__ == "__main__":
+    os.chdir(ROOT)  # so that the commands in the reports are those of a checkout
+    report("lunar_lander", "data/rules/lunar_lander_compact.json", "LunarLander-v3", "compact")
+    filtered = "cartpole_filtered.json"
+    try:
+        mined = f"mine data/demonstrations/cartpole.parquet --setting filtered --out {filtered}"
+        sarl(mined)
+        report("cartpole", filtered, "CartPole-v1", "filtered")
+    finally:
+        Path(filtered).unlink(missing_ok=True)
