@@ -402,7 +402,9 @@ def freedom_text(summary: dict[str, float]) -> str:
 
 
 def _cost(summary: dict[str, float]) -> list[tuple[str, str]]:
-    return [("cost", f"{summary['cost']:.2f} an episode")] if "cost" in summary else []
+    if "cost" not in summary or summary["cost"] == summary.get("failure_rate"):
+        return []  # not known, or the failures themselves
+    return [("cost", f"{summary['cost']:.2f} an episode")]
 
 
 def print_notes(notes: Sequence[str]) -> None:

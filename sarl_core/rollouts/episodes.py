@@ -153,6 +153,16 @@ class Episodes:
         return failed(self.env_id, self.terminated, self.last_rewards)
 
     @property
+    def cost(self) -> NDArray[np.float64]:
+        """What each episode cost, (E,): what the environment said; else 1 for a failure.
+
+        NaN where neither is known.
+        """
+        if not np.isnan(self.costs).any() or self.failures is None:
+            return self.costs
+        return self.failed.astype(np.float64)
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know of how they came about, as clauses."""
         count = int(self.cut.sum())
@@ -204,8 +214,8 @@ class Episodes:
             found["cut"] = int(self.cut.sum())
         if not np.isnan(self.freedom).any():
             found["freedom"] = float((self.freedom * self.lengths).sum() / self.lengths.sum())
-        if not np.isnan(self.costs).any():
-            found["cost"] = float(self.costs.mean())
+        if not np.isnan(self.cost).any():
+            found["cost"] = float(self.cost.mean())
         if self.failures is not None:
             found |= {
                 "failures": self.failures.count,
@@ -228,7 +238,7 @@ class Episodes:
         names = ("seed", "return", "length", "interventions", "covered")
         episodes: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in rows]
         for episode, fell, cost, cut in zip(
-            episodes, self.failed.tolist(), self.costs.tolist(), self.cut.tolist(), strict=True
+            episodes, self.failed.tolist(), self.cost.tolist(), self.cut.tolist(), strict=True
         ):
             if self.failures is not None:
                 episode["failed"] = fell
@@ -259,7 +269,7 @@ class Episodes:
                 "outside": self.outside,
                 "withheld": self.withheld,
                 "freedom": self.freedom,
-                "cost": self.costs,
+                "cost": self.cost,
             }
         )
 

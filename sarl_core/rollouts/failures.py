@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
 _EVERY_END, _NO_END = "every end", "no end"
-# What an end that is no time limit means. Some end for good reasons too; there only a failure
-# brings exactly this reward.
+# What an end that is no time limit means, of Gymnasium's own environments by their full names: of
+# others nothing is guessed. Some end for good reasons too; there only a failure brings exactly
+# this reward.
 _FAILURES: dict[str, str | float] = {
     "LunarLander": -100.0,
+    "LunarLanderContinuous": -100.0,
     "BipedalWalker": -100.0,
+    "BipedalWalkerHardcore": -100.0,
     "CarRacing": -100.0,
     "CartPole": _EVERY_END,
     "InvertedPendulum": _EVERY_END,
@@ -21,6 +26,7 @@ _FAILURES: dict[str, str | float] = {
     "Humanoid": _EVERY_END,
     "Pendulum": _NO_END,
     "MountainCar": _NO_END,  # it ends at the flag
+    "MountainCarContinuous": _NO_END,
     "Acrobot": _NO_END,  # it ends when it has swung up
 }
 
@@ -61,5 +67,4 @@ def failure_known(env_id: str) -> bool:
 
 
 def _failure(env_id: str) -> str | float | None:
-    family = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1].rsplit("-v", 1)[0]
-    return next((meaning for name, meaning in _FAILURES.items() if family.startswith(name)), None)
+    return _FAILURES.get(re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1]))

@@ -40,6 +40,7 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
             "interventions",
             "covered",
             "failed",
+            "cost",
         }
         assert 0 <= episode["interventions"] <= episode["covered"] <= episode["length"]
     summary = document["summary"]
@@ -53,6 +54,7 @@ def test_evaluate_as_json_is_the_contract(run, cart_rules):
         "coverage",
         "outside_rate",
         "freedom",
+        "cost",
         "failures",
         "failure_rate",
         "failure_low",

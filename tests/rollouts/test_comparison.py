@@ -123,6 +123,23 @@ def test_where_failures_are_not_known_none_is_claimed() -> None:
 
 
 @pytest.mark.parametrize(
+    "env_id", ["AntennaX-v0", "CartPoleGoal-v1", "my/CartPole-v1", "LunarLanderEasy-v3", "Ant-vx"]
+)
+def test_nothing_is_guessed_from_the_beginning_of_a_name(env_id: str) -> None:
+    assert not failure_known(env_id)
+    episodes = replace(ended([True], [-100.0]), env_id=env_id, lengths=np.ones(1, dtype=np.int64))
+    assert "failures" not in episodes.summary()
+
+
+def test_where_failures_are_known_each_costs_one() -> None:
+    episodes = ended([True, True, False, True], [100.0, -100.0, 0.3, -100.0])
+    lengths = np.ones(4, dtype=np.int64)
+    document = replace(episodes, env_id="LunarLander-v3", lengths=lengths).to_dict()
+    assert [episode["cost"] for episode in document["episodes"]] == [0.0, 1.0, 0.0, 1.0]
+    assert document["summary"]["cost"] == document["summary"]["failure_rate"] == 0.5
+
+
+@pytest.mark.parametrize(
     "env_id",
     ["LunarLander-v3", "LunarLanderContinuous-v3", "BipedalWalker-v3", "module:LunarLander-v3"],
 )

@@ -164,6 +164,7 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
         "interventions",
         "covered",
         "failed",
+        "cost",
     }
     summary = document["summary"]
     assert list(summary) == [
@@ -176,6 +177,7 @@ def test_summary_and_json(shields: dict[str, Shield]) -> None:
         "coverage",
         "outside_rate",
         "freedom",
+        "cost",
         "failures",
         "failure_rate",
         "failure_low",
