@@ -46,10 +46,11 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
     for name, values in zip(names, demonstrations.observations.T, strict=True):
         if values.min() == values.max():
             continue
-        if _is_clock(values, together):
+        moves = _clockwork(values, together)
+        if moves is not None:
             found.append(
-                f"feature {name!r} rises by the same amount at every step, as a counter or a clock "
-                "does; if it is one, leave it out, since a rule about it holds in no other episode"
+                f"feature {name!r} {moves}, as a counter or a clock does; if it is one, leave it "
+                "out, since a rule about it holds in no other episode"
             )
             continue
         for index, dimension in enumerate(demonstrations.action_dimensions):
@@ -105,10 +106,32 @@ def _ranks(values: NDArray[Any]) -> NDArray[np.float64]:
     return (below + np.searchsorted(ordered, values, side="right")) / 2
 
 
-def _is_clock(values: NDArray[np.float32], together: NDArray[np.bool_]) -> bool:
-    if len(values) > _LOOKED_AT and not _is_clock(values[:_LOOKED_AT], together[: _LOOKED_AT - 1]):
-        return False
-    return rises_steadily(values, together, least=_LEAST_ROWS // 2)
+def _clockwork(values: NDArray[np.float32], together: NDArray[np.bool_]) -> str | None:
+    """How a feature moves if it does so as a counter or a clock, None if it does not."""
+    if len(values) > _LOOKED_AT:
+        few = _clockwork(values[:_LOOKED_AT], together[: _LOOKED_AT - 1])
+        if few is None:
+            return None
+    if rises_steadily(values, together, least=_LEAST_ROWS // 2):
+        return "rises by the same amount at every step"
+    if rises_steadily(-values, together, least=_LEAST_ROWS // 2):
+        return "falls by the same amount at every step"
+    if together.all() and _begins_again(values):
+        return f"counts by one and keeps beginning again at {values[0]:g}"
+    return None
+
+
+def _begins_again(values: NDArray[np.float32]) -> bool:
+    """Whether a feature counts steps of episodes that nothing else tells apart."""
+    changes = np.diff(values.astype(np.float64))
+    again = values[1:] == values[0]
+    counted = changes[~again]
+    return bool(
+        values[0] == np.floor(values[0])
+        and len(counted) >= _LEAST_CHANGES * (1 + np.count_nonzero(again))
+        and abs(counted[0]) == 1
+        and np.all(counted == counted[0])
+    )
 
 
 def _next_states(

@@ -14,6 +14,7 @@ FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of
 
 _FEW_STEPS = 2**12  # of float32 between the least and the largest value of a feature
 _STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
+_SEVERAL = 3  # episodes that run alike; two may do so by chance
 _MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
 _EXACT = 2**53  # up to here every whole number is a float64
 # Nothing is measured beyond it, and the sum of as many numbers as fit in memory is a float32 yet.
@@ -182,6 +183,27 @@ def rises_steadily(
     if len(rises) < least or not rises.min() > 0:
         return False
     return bool(rises.max() - rises.min() <= _STEADY * rises.mean())
+
+
+def counts_steps(values: NDArray[Any], together: NDArray[np.bool_], *, least: int) -> bool:
+    """Whether a column numbers the steps of an episode, up or down, from the same number in each.
+
+    Args:
+        values: Shape (N,).
+        together: Shape (N - 1,), whether a row and the next one belong to one episode.
+        least: How many pairs of such rows there must be.
+
+    Returns:
+        False also where there are too few episodes to tell a position from a number.
+    """
+    if values.dtype.kind == "b":
+        return False
+    starts = values[np.append(True, ~together)]
+    changes = np.diff(values.astype(np.float64))[together]
+    if len(starts) < _SEVERAL or len(changes) < least or abs(changes[0]) != 1:
+        return False
+    alike = np.all(starts == starts[0]) and np.all(changes == changes[0])
+    return bool(alike and starts[0] == np.floor(starts[0]))
 
 
 def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -176,12 +176,50 @@ def test_r_is_the_reward_only_where_the_other_names_speak_so() -> None:
         ("elapsed_s", noise(5)),
         ("unix", 1.7e9 + np.arange(N)),
         ("anything", np.arange(N) * 20),
+        ("anything", np.arange(N) % EPISODE),
+        ("anything", np.arange(N) % EPISODE + 1.0),
+        ("anything", EPISODE - np.arange(N) % EPISODE),
+        ("anything", -(np.arange(N) % EPISODE)),
+        ("anything", N - np.arange(N)),
     ],
 )
 def test_a_counter_is_no_feature(name: str, values: np.ndarray) -> None:
     demonstrations = read(**{name: values}, x=noise(0), v=noise(1), action=LABELS, episode=EPISODES)
     assert demonstrations.feature_names == ("x", "v")
     assert any(f"'{name}' was not used" in note for note in demonstrations.notes)
+
+
+def test_a_counter_is_known_by_any_mark_of_episodes_of_any_lengths() -> None:
+    lengths = [20, 9, 17, 14]
+    counted = np.concatenate([np.arange(length) for length in lengths])
+    numbers = np.repeat(np.arange(4), lengths)
+    for marks in ({"done": np.diff(counted, append=0) < 0}, {"is_first": counted == 0}):
+        flags = {name: np.asarray(flag, dtype=int) for name, flag in marks.items()}
+        assert read(foo=counted, x=noise(0), action=LABELS, **flags).feature_names == ("x",)
+    falling = read(foo=50 - counted, x=noise(0), action=LABELS, episode=numbers)
+    assert falling.feature_names == ("x",)
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        np.arange(N) % EPISODE + EPISODES,  # from another place in each episode
+        EPISODE - 1 - np.arange(N) % EPISODE + EPISODES % 2,
+        np.minimum(np.arange(N) % EPISODE, 12),  # until there is a wall
+        np.where(EPISODES % 2, -1, 1) * (np.arange(N) % EPISODE),  # to the one side or the other
+        (np.arange(N) % EPISODE) * 0.5,
+        np.arange(N) % 5,  # comes round within an episode
+    ],
+)
+def test_a_position_on_a_grid_is_a_feature(place: np.ndarray) -> None:
+    demonstrations = read(place=place, x=noise(0), action=LABELS, episode=EPISODES)
+    assert demonstrations.feature_names == ("place", "x")
+
+
+def test_one_or_two_walks_along_a_grid_are_no_counter() -> None:
+    walk = np.arange(N) % (N // 2)
+    twice = read(place=walk, x=noise(0), action=LABELS, episode=np.arange(N) // (N // 2))
+    assert twice.feature_names == ("place", "x")
 
 
 def test_a_time_written_as_text_is_left_alone() -> None:

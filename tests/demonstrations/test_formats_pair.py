@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.formats import (
     ColumnMap,
@@ -184,7 +186,7 @@ def test_without_a_header_the_environment_tells_a_complete_table(tmp_path: Path)
     assert any("'actions.csv' was not read" in note for note in demonstrations.notes)
 
 
-@pytest.mark.parametrize("name", ["a", "operator_action"])
+@pytest.mark.parametrize("name", ["a", "operator_action", "command", "Cmd"])
 def test_what_may_be_the_action_beside_a_file_of_actions_is_unclear(
     name: str, tmp_path: Path
 ) -> None:
@@ -208,6 +210,84 @@ def test_columns_of_a_pair_are_what_their_names_say(tmp_path: Path) -> None:
     other = csv_bytes("2,0.5", "3,0.25", "3,0.5", header="episode,steer")
     with pytest.raises(InputError, match="'episode' of the one and 'episode' of the other differ"):
         load_demonstrations(write(tmp_path, seen, other))
+
+
+@pytest.mark.parametrize("names", [("obs.csv", "actions.csv"), ("states_b.csv", "actions_b.csv")])
+@pytest.mark.parametrize(
+    ("header", "expected"),
+    [
+        ("action", [0, 1, 1]),
+        ("actions", [0, 1, 1]),
+        ("action_0,action_1", [[0, 2], [1, 3], [1, 4]]),
+        ("act_x,act_y", [[0, 2], [1, 3], [1, 4]]),
+        ("episode,action", [0, 1, 1]),
+    ],
+)
+def test_a_file_with_nothing_but_columns_named_as_actions(
+    header: str, expected: list[object], names: tuple[str, str], tmp_path: Path
+) -> None:
+    rows = {"episode,action": ("7,0", "7,1", "8,1")}.get(header, ("0,2", "1,3", "1,4"))
+    done = csv_bytes(*(row if "," in header else row[0] for row in rows), header=header)
+    seen = csv_bytes("0.5,1", "0.25,2", "0.125,3", header="x,y")
+    write(tmp_path, seen, done, names)
+    for source in (tmp_path, tmp_path / names[0], tmp_path / names[1]):
+        demonstrations = load_demonstrations(source)
+        assert demonstrations.actions.tolist() == expected
+        assert demonstrations.feature_names == ("x", "y")
+    uploaded = read_demonstrations(seen, names[0], companion=(done, names[1]))
+    assert uploaded.actions.tolist() == expected
+    with pytest.raises(InputError, match="3 actions for 6 observations"):
+        load_demonstrations(write(tmp_path, seen + b"0,4\n0,5\n0,6\n", done, names) / names[0])
+
+
+N = 60
+STATES = np.random.default_rng(3).uniform(0, 9, (N, 2)).round(3)
+CHOICES = np.random.default_rng(4).integers(0, 2, (N, 2))
+EPISODES = np.arange(N) // 15
+
+
+def rows(*columns: NDArray[Any]) -> bytes:
+    """A file without a header."""
+    table = np.column_stack(columns).tolist()
+    return csv_bytes(*(",".join(f"{value:g}" for value in row) for row in table), header=None)
+
+
+@pytest.mark.parametrize(
+    ("seen", "done", "told"),
+    [
+        ((STATES, CHOICES[:, 0]), (CHOICES[:, 0],), "obs.csv: .*'column 3' holds what 'act"),
+        ((STATES, CHOICES), (CHOICES,), "obs.csv: .*'column 3', 'column 4' hold what 'act"),
+        ((STATES, EPISODES, CHOICES[:, 1]), (CHOICES[:, 0],), "'column 3' numbers the episodes"),
+        ((EPISODES + 1, STATES), (CHOICES[:, 0],), "obs.csv: .*'column 1' numbers the episodes"),
+        ((STATES,), (STATES, CHOICES[:, 0]), "actions.csv: .*'column 2' hold what 'obs.csv'"),
+        ((STATES,), (CHOICES[:, 0], EPISODES), "actions.csv: .*'column 2' numbers the episodes"),
+    ],
+)
+def test_without_a_header_what_is_no_half_is_told_by_its_values(
+    seen: tuple[Any, ...], done: tuple[Any, ...], told: str, tmp_path: Path
+) -> None:
+    write(tmp_path, rows(*seen), rows(*done))
+    with pytest.raises(InputError, match=told) as error:
+        load_demonstrations(tmp_path)
+    assert "it has no header" in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+@pytest.mark.parametrize(
+    "feature",
+    [
+        CHOICES[:, 1],  # a contact
+        np.minimum.accumulate(np.arange(N)[::-1] // 20),  # what is left of three lives
+        EPISODES == 3,  # a switch that is thrown once
+        np.cumsum(CHOICES[:, 0] * 2 - 1),  # a position on a grid
+        np.arange(N) // 20 * 0.5,
+    ],
+)
+def test_without_a_header_a_feature_of_whole_numbers_is_one(feature: Any, tmp_path: Path) -> None:
+    write(tmp_path, rows(STATES, feature), rows(CHOICES[:, 0]))
+    assert load_demonstrations(tmp_path).observations.shape == (N, 3)
+    write(tmp_path, rows(STATES), rows(np.sort(CHOICES[:, 0]) + (np.arange(N) > 50)))
+    assert load_demonstrations(tmp_path).observations.shape == (N, 2)
 
 
 def test_the_last_observation_of_each_episode_needs_no_action(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import tempfile
 from pathlib import Path
 
@@ -15,6 +16,11 @@ from sarl_core.demonstrations.formats import (
     read_demonstrations,
     save_demonstrations,
 )
+from sarl_core.demonstrations.formats.columns import ColumnMap
+from sarl_core.demonstrations.formats.csv_file import open_csv
+from sarl_core.demonstrations.formats.parquet_file import open_parquet
+from sarl_core.demonstrations.formats.tables import Table
+from tests.bad_inputs import ROWS, csv_bytes, parquet_bytes
 from tests.demonstrations.strategies import SPACES, demonstrations
 
 ARRAYS = ("observations", "actions", "episodes", "steps", "rewards", "terminated", "truncated")
@@ -133,3 +139,17 @@ def test_parquet_layout_is_the_documented_one(tmp_path: Path) -> None:
     assert (metadata["agent"], metadata["seed"]) == ("expert", 3)
     column = pq.ParquetFile(tmp_path / "demo.parquet").metadata.row_group(0).column(0)
     assert column.compression == "ZSTD"
+
+
+@pytest.mark.parametrize(
+    "table",
+    [open_csv(memoryview(csv_bytes(*ROWS))), open_parquet(memoryview(parquet_bytes()))],
+    ids=["csv", "parquet"],
+)
+def test_a_table_gives_the_columns_that_it_is_asked_for_and_no_others(table: Table) -> None:
+    for count in range(len(table.names) + 1):
+        for names in itertools.permutations(table.names, count):
+            for columns in (ColumnMap(names, ()), ColumnMap((), names)):
+                read = table.read(columns)
+                assert tuple(read) == names
+                assert all(len(column.values) == len(ROWS) for column in read.values())

@@ -95,6 +95,37 @@ def test_counters_and_clocks_are_named(clock: Any) -> None:
     assert "feature 'clock' rises by the same amount at every step" in found
 
 
+@pytest.mark.parametrize("clock", [N - np.arange(N), 40 - np.arange(N) % 40, -0.5 * np.arange(N)])
+def test_what_counts_down_is_named(clock: Any) -> None:
+    (found,) = warnings_of(LABELS, speed=SPEED, clock=clock)
+    assert "feature 'clock' falls by the same amount at every step" in found
+
+
+CYCLES = np.concatenate([np.arange(length) for length in (50, 20, 100, 30, 150, 50)])
+
+
+@pytest.mark.parametrize("clock", [np.arange(N) % 20, CYCLES, 9 + CYCLES, 200 - CYCLES])
+def test_a_counter_that_restarts_where_no_episode_is_told_is_named(clock: Any) -> None:
+    demonstrations = Demonstrations(np.stack([clock, SPEED], axis=1), LABELS, EPISODES * 0)
+    (found,) = [told for told in find_warnings(demonstrations) if "feature 0" in told]
+    assert f"counts by one and keeps beginning again at {clock[0]}" in found
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        np.arange(N) % 2,  # a foot that steps
+        np.abs(np.arange(N) % 40 - 20),  # there and back
+        np.cumsum(RNG.integers(0, 2, N) * 2 - 1),
+        np.minimum(np.arange(N) % 40, 30),
+        np.arange(N) % 20 * 0.3,
+    ],
+)
+def test_a_position_is_no_counter(place: Any) -> None:
+    demonstrations = Demonstrations(np.stack([place, SPEED], axis=1), LABELS, EPISODES * 0)
+    assert not any("counts by one" in told for told in find_warnings(demonstrations))
+
+
 def test_the_next_state_is_named_and_the_one_before_is_not() -> None:
     (found,) = warnings_of(LABELS, speed=SPEED, outcome=np.append(SPEED[1:], 0.0))
     assert "feature 'outcome' holds in each step what feature 'speed' holds in the next" in found

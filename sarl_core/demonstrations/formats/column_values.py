@@ -14,6 +14,7 @@ from sarl_core.demonstrations.formats.columns import Guess, listed, unclear_colu
 from sarl_core.demonstrations.formats.vocabulary import plain
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
+    counts_steps,
     counts_up,
     is_whole,
     rises_steadily,
@@ -91,7 +92,34 @@ def counters(values: Values) -> dict[str, str]:
         name: "it rises by the same amount in every row, as a counter or a clock does"
         for name, held in values.items()
         if len(held) >= _LEAST_ROWS and rises_steadily(held)
-    } | {name: "it counts the rows" for name, held in values.items() if _counts(held, None)}
+    } | {
+        name: "it counts the rows"
+        for name, held in values.items()
+        if _counts(held, None) or _counts(held[::-1], None)
+    }
+
+
+def numbers_episodes(values: NDArray[Any]) -> bool:
+    """Whether a column holds what a number of the episode does: it stays, and goes on by one.
+
+    Args:
+        values: Shape (N,).
+
+    Returns:
+        False also where there are too few rows to tell.
+    """
+    if len(values) < _LEAST_ROWS or values.dtype.kind == "b" or not is_whole(values):
+        return False
+    rises = np.diff(values.astype(np.float64))
+    begun = np.count_nonzero(rises)
+    return bool(np.all((rises == 0) | (rises == 1)) and 2 <= begun <= len(values) // 3)
+
+
+@_INFINITE
+def same_column(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two columns hold the same, and change too often for that to be chance."""
+    enough = len(one) >= _LEAST_ROWS and np.count_nonzero(np.diff(one)) >= _LEAST_CHANGES
+    return bool(enough and np.array_equal(one.astype(np.float32), other.astype(np.float32)))
 
 
 def same_episode(guess: Guess, values: Values) -> NDArray[np.bool_]:
@@ -174,7 +202,8 @@ def _counters(guess: Guess, values: Values, together: NDArray[np.bool_]) -> dict
     steps = {
         name: "it counts the steps"
         for name in features
-        if plain(name) in _COUNTER_WORDS and _counts(values[name], together)
+        if counts_steps(values[name], together, least=_LEAST_ROWS)
+        or (plain(name) in _COUNTER_WORDS and _counts(values[name], together))
     }
     return steps | counters({name: values[name] for name in features})
 

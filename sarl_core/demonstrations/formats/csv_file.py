@@ -80,6 +80,8 @@ class CsvTable:
         """
         import pyarrow as pa
 
+        if not columns.used:  # Arrow would take no column for all of them
+            return {}
         # Numbers take up to 8 bytes each on the way, whatever they take as text.
         rows = _count_lines(self.body)
         require_memory(len(self.body) + table_memory(rows, 0, len(columns.used)))

@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import EnvironmentDescription
-from sarl_core.demonstrations.formats.column_values import counters, resolved, settle
+from sarl_core.demonstrations.formats.column_values import (
+    counters,
+    numbers_episodes,
+    resolved,
+    same_column,
+    settle,
+)
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
     Guess,
@@ -171,6 +177,10 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
     with naming(names[1]):
         taken = _actions_of(others)
         done = action_block(taken.read, taken.guess.columns.actions)
+    with naming(names[0]):
+        _require_half(table, seen, taken, short[1], "observations")
+    with naming(names[1]):
+        _require_half(others, taken, seen, short[0], "actions")
     observed, fields, notes = _together(observed, done, (seen, taken), names)
     dimensions = taken.guess.columns.actions
     return Recording(
@@ -254,7 +264,7 @@ def _actions_of(table: CsvTable) -> _Half:
     guess = guess_roles(table.names)
     others = (*guess.columns.observations, *guess.unclear)
     held = {name: column.values for name, column in table.read(ColumnMap((), others)).items()}
-    guess = guess.as_actions(counters(held)) if others else guess
+    guess = guess.as_actions(counters(held))
     if not guess.columns.actions:
         require_clear(guess, table.names)
     read = table.read(guess.columns)
@@ -328,6 +338,27 @@ def _own_observations(table: CsvTable) -> tuple[str, ...]:
     read = table.read(ColumnMap((), guess.columns.observations))
     counted = counters({name: column.values for name, column in read.items()})
     return tuple(name for name in guess.columns.observations if name not in counted)
+
+
+def _require_half(table: CsvTable, half: _Half, other: _Half, partner: str, what: str) -> None:
+    """Refuse a file without names that holds more than its half of a pair, where that shows."""
+    if table.named or len(table.names) == 1:
+        return
+    copies = [
+        next((name for name, held in half.read.items() if same_column(held.values, column)), None)
+        for column in (column.values for column in other.read.values())
+    ]
+    held = [name for name in copies if name is not None]
+    told = f"{listed(held)} {'holds' if len(held) == 1 else 'hold'} what {partner!r} holds"
+    if len(held) < len(copies):
+        held = [name for name, column in half.read.items() if numbers_episodes(column.values)]
+        told = f"{listed(held)} {'numbers' if len(held) == 1 else 'number'} the episodes"
+    if held:
+        raise InputError(
+            f"it has no header, and its {told}, so it holds more than {what}; write a header that "
+            "says what its columns are (as obs_0, ..., action, episode), or keep the "
+            f"{what} alone"
+        )
 
 
 def _word(name: str, words: tuple[str, ...]) -> re.Match[str] | None:

@@ -45,6 +45,8 @@ CONTROLS = re.compile(
     r"|decision|choice|(.*_)?(cmd|command|control|action)"
 )
 
+_PERHAPS_ACTION = re.compile(r"a|.+_(actions?|acts?)|cmd|commands?|controls?|decision|choice")
+
 _NEXT = ("next", "nxt", "new", "succ", "successor", "future", "prime")
 _ONLY_NEXT = frozenset({"next", "nxt", "succ", "successor", "prime"})
 _BEFORE = frozenset({"prev", "previous", "last", "lag", "lagged", "old", "past", "before"})
@@ -125,8 +127,8 @@ def is_state_word(name: str) -> bool:
 
 
 def is_perhaps_action(name: str) -> bool:
-    """Whether a column may be the action under a longer name, or is called "a"."""
-    return re.fullmatch("a|.+_(actions?|acts?)", plain(name)) is not None and not (
+    """Whether a column may be the action under a longer name or another word, or is called "a"."""
+    return _PERHAPS_ACTION.fullmatch(plain(name)) is not None and not (
         says_before(name) or only_next(name)
     )
 
