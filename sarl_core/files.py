@@ -14,7 +14,7 @@ from pathlib import Path
 
 from sarl_core.errors import InputError, WorkError
 
-_TEMPORARY = "sarl-temporary-"
+_TEMPORARY = ".sarl"
 _LONGEST_STEM = 60  # of a file's name, so that what is put around it fits
 
 
@@ -22,7 +22,7 @@ _LONGEST_STEM = 60  # of a file's name, so that what is put around it fits
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a path beside `path` to write to; it takes the place of `path` when all went well.
 
-    What a killed process left unfinished beside it is removed.
+    What killed processes left unfinished in its folder is removed.
 
     Args:
         path: The file that is to appear; its suffix is kept, because writers look at it.
@@ -36,9 +36,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     """
     if not path.parent.is_dir():
         raise InputError(f"the folder {path.parent} does not exist; make it or choose another")
-    stem = f".{path.stem[:_LONGEST_STEM]}."
-    remove_abandoned(path.parent, stem, path.suffix)
-    unfinished = path.with_name(f"{stem}{mark_of_process()}{path.suffix}")
+    _remove_abandoned(path.parent)
+    unfinished = path.with_name(f".{path.stem[:_LONGEST_STEM]}.{_mark()}{path.suffix}")
     try:
         yield unfinished
         unfinished.replace(path)
@@ -58,8 +57,8 @@ def temporary_folder() -> Iterator[None]:
     a folder a learner). What a killed process left is removed by the next one that begins.
     """
     shared = shared_temporary_folder()
-    remove_abandoned(shared, _TEMPORARY)
-    folder = shared / f"{_TEMPORARY}{mark_of_process()}"
+    _remove_abandoned(shared)
+    folder = shared / f"{_TEMPORARY}.{_mark()}"
     kept = tempfile.tempdir, os.environ.get("TMPDIR")
     try:
         folder.mkdir(mode=0o700)
@@ -81,29 +80,17 @@ def temporary_folder() -> Iterator[None]:
 def shared_temporary_folder() -> Path:
     """Where things are put aside that outlive this process."""
     folder = Path(tempfile.gettempdir())
-    return folder.parent if folder.name.startswith(_TEMPORARY) else folder
+    return folder.parent if folder.name.startswith(f"{_TEMPORARY}.unfinished-") else folder
 
 
-def mark_of_process() -> str:
-    """A name that nobody else gives, and that tells who gave it.
-
-    Returns:
-        The machine's name as a number, the process and a random number.
-    """
-    return f"{_machine()}-{os.getpid()}-{os.urandom(4).hex()}"
+def _mark() -> str:
+    """What nobody else puts into a name, and what tells who did: the machine and the process."""
+    return f"unfinished-{_machine()}-{os.getpid()}-{os.urandom(4).hex()}"
 
 
-def remove_abandoned(folder: Path, prefix: str, suffix: str = "") -> None:
-    """Remove what processes of this machine that are no longer there left in a folder.
-
-    Args:
-        folder: To look in.
-        prefix: Before the `mark_of_process` in a file's or folder's name.
-        suffix: After it.
-    """
-    pattern = re.compile(
-        re.escape(prefix) + _machine() + r"-(\d{1,10})-[0-9a-f]{8}" + re.escape(suffix)
-    )
+def _remove_abandoned(folder: Path) -> None:
+    """Remove what processes of this machine that are no longer there left in a folder."""
+    pattern = re.compile(rf"\..*\.unfinished-{_machine()}-(\d{{1,10}})-[0-9a-f]{{8}}(\..*)?")
     try:
         names = [entry.name for entry in os.scandir(folder)]
     except OSError:

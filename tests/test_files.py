@@ -49,10 +49,11 @@ def test_what_a_killed_process_left_is_removed_by_the_next(folder: Path) -> None
     file = folder / "rules.json"
     begin(file, "die").communicate()
     assert len(list(folder.iterdir())) == 2
-    with temporary_folder(), whole_file(file) as unfinished:
+    other = folder / "another.csv"
+    with temporary_folder(), whole_file(other) as unfinished:
         unfinished.write_text("whole")
-    assert list(folder.iterdir()) == [file]
-    assert file.read_text() == "whole"
+    assert list(folder.iterdir()) == [other]
+    assert other.read_text() == "whole"
 
 
 def test_what_a_living_process_writes_stays(folder: Path) -> None:
@@ -73,7 +74,7 @@ def test_files_of_others_with_like_names_stay(folder: Path) -> None:
     others = [
         folder / ".rules.json",
         folder / ".rules.1.deadbeef.json",
-        folder / "sarl-temporary-x",
+        folder / ".sarl.unfinished-x",
     ]
     for other in others:
         other.write_text("mine")

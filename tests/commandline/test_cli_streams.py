@@ -112,7 +112,7 @@ def test_a_request_to_end_clears_up(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     )  # fmt: skip
-    while not list(tmp_path.glob("sarl-temporary-*")) and process.poll() is None:
+    while not list(tmp_path.glob(".sarl.unfinished-*")) and process.poll() is None:
         time.sleep(0.02)
     process.terminate()
     printed, complaints = process.communicate(timeout=60)
