@@ -273,6 +273,7 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
             ]
             summary = episodes.summary()
             del summary["outside_rate"]  # the table does not hold what it is made of
+            summary.pop("cost", None)  # the failures, which stand there over recordings
             typical = runs.over(arm.name)
             failures = share_over_recordings(runs.failed[arm.name], runs.experts)
             one = {

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
-FULL_MINUTES = 90
+FULL_MINUTES = 60
 """What all studies together take on two cores with nothing else to do."""
 
 
