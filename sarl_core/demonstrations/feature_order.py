@@ -75,10 +75,9 @@ def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
         InputError: If there are not as many, or their names are of different things.
     """
     if len(first.names) != len(second.names):
-        asks = "ask about" if what == "features" else "are for"
         raise InputError(
-            f"{first.whose} {asks} {len(first.names)} {what} and {second.whose} have "
-            f"{len(second.names)}; give two of the same environment"
+            f"there are {len(first.names)} {what} in {first.whose} and {len(second.names)} in "
+            f"{second.whose}; give two of the same environment"
         )
     as_they_are = tuple(range(len(first.names)))
     one, other = _plain(first.names), _plain(second.names)

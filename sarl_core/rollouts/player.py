@@ -364,9 +364,13 @@ def check_environment(env_id: str, shield: Shield | None) -> Ready:
     describe_environment(env_id)
     env = make_environment(env_id)
     adapter = adapt(env)
-    env.close()
-    if shield is None:
-        return Ready(adapter, None, ())
-    from sarl_core.shielding.wrappers import fitted
+    try:
+        if shield is None:
+            return Ready(adapter, None, ())
+        from sarl_core.shielding.observed import observed
+        from sarl_core.shielding.wrappers import fitted
 
-    return Ready(adapter, *fitted(shield, adapter.observation_space, adapter.action_space, env_id))
+        spaces = adapter.observation_space, adapter.action_space
+        return Ready(adapter, *fitted(shield, *spaces, observed(env)))
+    finally:
+        env.close()

@@ -6,12 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from sarl_core.shielding.observed import (
+    Layer,
+    Observed,
+    behind,
+    hands_on,
+    normalised,
+    read_layers,
+)
 from sarl_core.shielding.reading import state_vector
 from sarl_core.shielding.shield import BatchDecision, Shield
-from sarl_core.shielding.wrappers import StepRecord, fitted, is_flat, spec_id
+from sarl_core.shielding.wrappers import StepRecord, fitted, is_flat
 
 
 class ShieldedVecEnv(VecEnvWrapper):
@@ -29,17 +37,17 @@ class ShieldedVecEnv(VecEnvWrapper):
         """Wrap a vectorised environment.
 
         Args:
-            venv: To wrap; its observations must be those the rules speak of, not normalised.
+            venv: To wrap.
             shield: The rules in force.
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment, or its features
-                have other names than theirs.
+            InputError: If the rules are not for the spaces of this environment, its features
+                have other names than theirs, or its observations are normalised.
         """
         super().__init__(venv)
         self.shield, self.notes = fitted(
-            shield, venv.observation_space, venv.action_space, _id_of(venv)
+            shield, venv.observation_space, venv.action_space, _observed(venv)
         )
         self.penalty = penalty
         self._states: Any = []
@@ -112,12 +120,27 @@ class ShieldedVecEnv(VecEnvWrapper):
         self._states = np.array(rows) if len(shapes) == 1 and None not in shapes else rows
 
 
-def _id_of(venv: VecEnv) -> str:
-    """The id of the environments; "" where it cannot be asked for."""
+def _observed(venv: VecEnv) -> Observed:
+    """Whose observations they are: wrappers may be around all environments, or around each."""
+    layers = []
+    while isinstance(venv, VecEnvWrapper):
+        name = type(venv).__name__
+        if isinstance(venv, VecNormalize):
+            if venv.norm_obs:
+                raise normalised(name)
+        elif not hands_on(type(venv), "step_wait", "reset"):
+            layers.append(Layer(name, ()))
+        venv = venv.venv
     try:
-        return spec_id(venv.get_attr("spec", indices=0)[0])
-    except (AttributeError, NotImplementedError, IndexError):
-        return ""
+        texts = dict.fromkeys(venv.env_method("__str__"))
+    except (AttributeError, NotImplementedError):
+        texts = {"": None}
+    found = []
+    for text in texts:
+        inner, env_id = read_layers(text)
+        found.append(behind([*layers, *inner], env_id))
+    # One of them without names is enough: the shield has one order for all.
+    return min(found, key=lambda one: one.env_id)
 
 
 def _row(observations: Any, i: int) -> Any:

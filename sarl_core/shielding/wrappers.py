@@ -11,6 +11,7 @@ from sarl_core.demonstrations.environments import catalogued
 from sarl_core.demonstrations.feature_order import Named
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import fitted_rules
+from sarl_core.shielding.observed import Observed, observed
 from sarl_core.shielding.reading import state_vector
 from sarl_core.shielding.shield import Shield
 
@@ -68,15 +69,15 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment, or its features
-                have other names than theirs. So does `step`, at an observation or an action that
-                is none, unless the shield lets them pass.
+            InputError: If the rules are not for the spaces of this environment, its features
+                have other names than theirs, or its observations are normalised. So does `step`,
+                at an observation or an action that is none, unless the shield lets them pass.
         """
         gymnasium.utils.RecordConstructorArgs.__init__(self, shield=shield, penalty=penalty)
         super().__init__(env)
-        # A wrapper that changes observations may have changed what their entries are.
-        env_id = "" if _observes_otherwise(env) else spec_id(env.spec)
-        self.shield, self.notes = fitted(shield, env.observation_space, env.action_space, env_id)
+        self.shield, self.notes = fitted(
+            shield, env.observation_space, env.action_space, observed(env)
+        )
         self.penalty = penalty
         space = env.observation_space
         self._space = None if is_flat(space) else space
@@ -155,7 +156,7 @@ def fitted(
     shield: Shield,
     observation_space: gymnasium.Space[Any],
     action_space: gymnasium.Space[Any],
-    env_id: str = "",
+    seen: Observed,
 ) -> FittedShield:
     """Put a shield's rules into the order of an environment's features, by their names.
 
@@ -163,7 +164,7 @@ def fitted(
         shield: The rules.
         observation_space: Of the environment.
         action_space: Of the environment.
-        env_id: Which tells the names of its features, where they are known; "" if unknown.
+        seen: Whose observations it shows, which tells the names of its features.
 
     Returns:
         The same shield where the order is the same.
@@ -176,43 +177,16 @@ def fitted(
     rule_set = shield.rule_set
     discrete = not rule_set.actions[0].is_interval
     names = catalogued(
-        env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
+        seen.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
     )
     found = fitted_rules(
         rule_set,
-        Named(
-            env_id.rsplit(":", 1)[-1] or "the environment",
-            tuple(name for name, _ in names.features),
-            env_id,
-        ),
+        Named(seen.whose, tuple(name for name, _ in names.features), seen.env_id),
         names.actions,
     )
     if found.rule_set is not rule_set:
         shield = shield.with_rules(found.rule_set)
     return FittedShield(shield.for_space(action_space), found.notes)
-
-
-def spec_id(spec: Any) -> str:
-    """The id of a made environment, as ``gymnasium.make`` took it.
-
-    Args:
-        spec: Its ``spec``, or None.
-
-    Returns:
-        "" where it has none.
-    """
-    return str(getattr(spec, "id", "") or "")
-
-
-def _observes_otherwise(env: Any) -> bool:
-    """Whether a wrapper changes the observations, other than by laying them flat."""
-    while isinstance(env, gymnasium.Wrapper):
-        if isinstance(env, gymnasium.ObservationWrapper) and not isinstance(
-            env, gymnasium.wrappers.FlattenObservation
-        ):
-            return True
-        env = env.env
-    return False
 
 
 def check_fit(
