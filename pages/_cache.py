@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import gc
 import inspect
 import os
+import sys
 from collections import defaultdict
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -56,13 +58,25 @@ def cached(*, show_spinner: str = "") -> Callable[[Callable[P, R]], Callable[P, 
                     if found is None:
                         with _telling(show_spinner):
                             found = (function(*args, **kwargs),)
-                        RESULTS.put(key, found, owner=owner())
+                        keep(key, found, owner())
                 _making.pop(key, None)
             return cast(tuple[R], found)[0]
 
         return call
 
     return decorate
+
+
+def keep(key: object, result: object, owner: str) -> None:
+    """Keep a result, if whoever brought what it was made from is still there.
+
+    Args:
+        key: What it is found by.
+        result: Anything.
+        owner: Digest of the upload that it was made from, "" where there is none.
+    """
+    RESULTS.put(key, result, owner=owner)
+    _give_back(owner)
 
 
 def _telling(text: str) -> AbstractContextManager[object]:
@@ -113,6 +127,16 @@ def _collect() -> None:
     gc.unfreeze()
     gc.collect()
     gc.freeze()
+    _release()
+
+
+def _release() -> None:
+    """Give what is free to the system: what allocators keep looks like use to whoever watches."""
+    import pyarrow
+
+    pyarrow.default_memory_pool().release_unused()
+    if sys.platform == "linux":  # and there GNU's C library has it
+        getattr(ctypes.CDLL(None), "malloc_trim", int)(0)
 
 
 @st.cache_resource(scope="session", on_release=_end, show_spinner=False)

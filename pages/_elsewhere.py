@@ -13,7 +13,7 @@ from concurrent.futures import Executor
 import _compact
 import _state as state
 import streamlit as st
-from _cache import RESULTS, cached, owner
+from _cache import RESULTS, cached, keep, owner
 from _evidence_work import Mining
 from _words import in_full
 
@@ -73,10 +73,7 @@ def _begin(demonstrations: Demonstrations, divider: int) -> None:
     def work(executor: Executor, progress: Progress) -> CrossFit:
         return cross_fit(demonstrations, divider=divider, executor=executor, progress=progress)
 
-    def keep(found: object) -> None:
-        RESULTS.put(key, found, owner=whose)
-
-    st.session_state[_JOB] = Mining(key, work, keep)
+    st.session_state[_JOB] = Mining(key, work, lambda found: keep(key, found, whose))
 
 
 def make_ready() -> None:

@@ -136,6 +136,7 @@ def test_what_a_visitor_uploaded_goes_when_the_last_who_holds_it_has_gone() -> N
     cache._end(mine)
     assert digest not in owners()
     assert "" in owners() or not owners()
+    cache._VISITS.update(visits)  # the test's session goes on
 
 
 def test_a_second_upload_takes_the_place_of_the_first() -> None:
@@ -145,3 +146,15 @@ def test_a_second_upload_takes_the_place_of_the_first() -> None:
     second = app.session_state["_upload"].digest
     assert second != first
     assert first not in owners()
+
+
+def test_what_is_made_after_the_last_has_gone_is_not_kept() -> None:
+    cache = sys.modules["_cache"]
+    visit = cache.Visit()
+    cache._VISITS.add(visit)
+    visit.bring("a digest")
+    cache.keep("early", megabytes(0.1), "a digest")
+    assert "a digest" in owners()
+    cache._end(visit)
+    cache.keep("late", megabytes(0.1), "a digest")
+    assert "a digest" not in owners()
