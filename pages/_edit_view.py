@@ -266,7 +266,7 @@ def _with_numbers(written: Any, order: list[int], found: Verdicts) -> Any:
     if found.right is not None:
         right = found.right[order].astype(float)
         right[decided == 0] = float("nan")
-        share = pa.array(right / decided.clip(min=1), from_pandas=True)
+        share = pa.array(100 * right / decided.clip(min=1), from_pandas=True)
         table = table.append_column("Expert agrees", share)
     return table
 
@@ -292,8 +292,8 @@ def _columns(rule_set: RuleSet) -> dict[str, Any]:
         "Expert agrees": column.ProgressColumn(
             width=112,
             min_value=0.0,
-            max_value=1.0,
-            format="%.3f",
+            max_value=100.0,
+            format="%.2f %%",
             color="gray",
             help="Share of those in which the expert did as it says",
         ),

@@ -22,14 +22,20 @@ from sarl_core.explaining.evidence_tables import (
     enough_columns,
     stability_columns,
 )
-from sarl_core.explaining.evidence_words import VERDICT_COLOURS, VERDICTS, verdict_counts
+from sarl_core.explaining.evidence_words import (
+    VERDICT_COLOURS,
+    VERDICTS,
+    never_text,
+    remedy_text,
+    verdict_counts,
+)
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.explaining.number_cards import Number, number_cards
 from sarl_core.explaining.prose import note
 from sarl_core.mining.cross_fitting import Judged, judge
 from sarl_core.mining.episode_counts import Influence, count_rules, most_influential
 from sarl_core.mining.evidence import FEWEST_EPISODES
-from sarl_core.mining.holding_out import Verdict, more_episodes
+from sarl_core.mining.holding_out import Verdict, more_episodes, shortfall
 from sarl_core.mining.learning_curve import LearningCurve, learning_curve
 from sarl_core.mining.progress import Progress
 from sarl_core.mining.rules import Rule, RuleSet
@@ -132,6 +138,11 @@ def show_overview(evidence: Evidence) -> None:
             for name, meaning in MEANINGS
         ]
         told = [judged_sentence(judged), *influence_sentences(judged)]
+        held, there = evidence.parts.held_out, evidence.parts.remaining.n_episodes
+        short = shortfall(found.rules, found.threshold, 0 if held is None else held.n_episodes)
+        remedy = remedy_text(short, there)
+        if remedy:
+            told.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
     ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
     words = f"dotted: minimum confidence {share_text(found.threshold)}"
     if judged is not None:
@@ -170,33 +181,38 @@ def show_enough(evidence: Evidence) -> None:
             "does not lie above the minimum, no number is enough."
         )
     )
-    left, right = st.columns([2, 3], gap="medium")
-    with left, st.container(key="enough"):
-        st.html(enough_plot(found.missing))
-    with right:
+    none = never_text(found.missing)
+    if none:
+        st.html(note(none))
+        table = st.container()
+    else:
+        left, table = st.columns([1, 2], gap="medium")
+        with left, st.container(key="enough"):
+            st.html(enough_plot(found.missing))
+    with table:
         column = st.column_config
         st.dataframe(
             _enough(evidence.key, found, evidence.rule_set),
             hide_index=True,
             height=table_height(len(found.rules), 6),
             key="enough_table",
-            column_order=(
-                "Action",
-                "Still missing",
-                "Evidence",
-                "Interval",
-                "Moved most by",
-                "When",
-            ),
             column_config={
-                "Action": column.TextColumn(width=130),
-                "Still missing": column.TextColumn(width=150),
-                "Evidence": column.TextColumn(width=350),
+                "Rule": column.TextColumn(width=60),
+                "Action": column.TextColumn(width=135),
+                "Still missing": column.TextColumn(width=155),
+                "Held out": column.TextColumn(
+                    width=170,
+                    help="How often it was right in an episode held out, on average over those",
+                ),
                 "Interval": column.TextColumn(
-                    width=125, help="What so few or so many episodes can tell (95 %)"
+                    width=130, help="What so few or so many episodes can tell (95 %)"
+                ),
+                "Verdict": None,
+                "Mined from": column.TextColumn(
+                    width=160, help="How often it was right in the states it was mined from"
                 ),
                 "Moved most by": column.TextColumn(
-                    width=380, help="The one episode without which the share would differ most"
+                    width=195, help="The one episode without which the share would differ most"
                 ),
                 "When": column.TextColumn(width=420),
             },
@@ -318,7 +334,7 @@ def _show_stability(rule_set: RuleSet, stability: Stability) -> None:
         f"**{often:,} of {counted(len(stability.rules), 'rule')}** came back in at least half of "
         f"{counted(stability.rounds, 'round')}."
     )
-    share = {"min_value": 0.0, "max_value": 1.0, "format": "%.2f", "color": "gray"}
+    share = {"min_value": 0.0, "max_value": 100.0, "format": "%.1f %%", "color": "gray"}
     column = st.column_config
     st.dataframe(
         table,

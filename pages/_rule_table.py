@@ -38,8 +38,8 @@ def action_column(actions: Sequence[LabelledDimension], meaning: str) -> tuple[A
 def column_config(rule_set: RuleSet) -> dict[str, Any]:
     """What the columns look like; all have help that says what they mean.
 
-    The widths sum to what is left of a window 1440 pixels wide; on a phone the action and the
-    beginning of the conditions are seen.
+    The widths sum to what is left of a window 1440 pixels wide; on a phone the name, the action
+    and the beginning of the conditions are seen.
     """
     column = st.column_config
     action, action_width = action_column(rule_set.actions, "What the expert does there")
@@ -52,13 +52,13 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             width=472 - _NAME - action_width, help="The conditions under which the rule applies"
         ),
         "Support": column.NumberColumn(
-            width=80, format="%.4f", help="Share of all states to which the rule applies"
+            width=80, format="%.2f %%", help="Share of all states to which the rule applies"
         ),
         "Confidence": column.ProgressColumn(
             width=112,
             min_value=0.0,
-            max_value=1.0,
-            format="%.3f",
+            max_value=100.0,
+            format="%.2f %%",
             color="gray",
             help="Share of those in which the expert did what the rule says",
         ),
@@ -67,7 +67,7 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         ),
         "Joint support": column.NumberColumn(
             width=100,
-            format="%.4f",
+            format="%.2f %%",
             help="Share of all states to which the rule applies and in which it is right",
         ),
         "States": column.NumberColumn(
@@ -87,28 +87,29 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         ),
         "Lower bound": column.NumberColumn(
             width=95,
-            format="%.3f",
+            format="%.1f %%",
             help="Lower end of the 95 % interval of the held-out confidence",
         ),
     }
 
 
-def frame(rules: Sequence[Rule], rule_set: RuleSet) -> Any:
-    """Rules as a data frame, in the order given."""
+def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any:
+    """Rules as a data frame, in the order given, with what each is called."""
     import pandas as pd
 
     columns = rule_columns(rules, rule_set)
     # A list of one, which the table shows in the action's colour.
     columns["Action"] = [[action] for action in columns["Action"]]
+    columns["Rule"] = list(names)
+    order: tuple[str, ...] = ("Rule", "Action", "When")
     tried = held_out_columns(rules, rule_set.thresholds.confidence)
     if tried:
         tried["Verdict"] = [[word] for word in tried["Verdict"]]
         # Next to what they compare with; the rarer measures go to the end.
-        order = ("Action", "When", "Support", "Confidence", "Held out", "Verdict", "States")
+        order = (*order, "Support", "Confidence", "Held out", "Verdict", "States")
         columns |= tried
-        others = [name for name in columns if name not in order]
-        columns = {name: columns[name] for name in (*order, *others)}
-    return pd.DataFrame(columns)
+    others = [name for name in columns if name not in order]
+    return pd.DataFrame({name: columns[name] for name in (*order, *others)})
 
 
 def table_height(rows: int, most: int) -> int | Literal["content"]:

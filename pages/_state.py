@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import digest_of_pairs
 from sarl_core.errors import SarlError
-from sarl_core.explaining.tables import top_rules
+from sarl_core.explaining.tables import TopRules, top_rules
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.episode_counts import EpisodeCounts
@@ -388,11 +388,11 @@ def pareto(
 @cached()
 def _top_rules(
     key: tuple[str, int], thresholds: Thresholds, most: int, _trees: tuple[PolicyTree, ...]
-) -> RuleSet:
+) -> TopRules:
     return top_rules(_trees, thresholds, most)
 
 
-def largest_rules(grown: tuple[PolicyTree, ...], thresholds: Thresholds, most: int) -> RuleSet:
+def largest_rules(grown: tuple[PolicyTree, ...], thresholds: Thresholds, most: int) -> TopRules:
     """The rules with the most support, without making the rest of a large set."""
     return _top_rules(_key(grown), thresholds, most, grown)
 

@@ -207,12 +207,16 @@ def show_largest(
             icon=":material/filter_alt_off:",
         )
         return
-    some = state.largest_rules(grown, thresholds, TABLE_ROWS)
-    shown = [rule for rule in some.rules if dimension in (None, rule.dimension)][:TABLE_ROWS]
+    part, names = state.largest_rules(grown, thresholds, TABLE_ROWS)
+    shown = [
+        (rule, name)
+        for rule, name in zip(part.rules, names, strict=True)
+        if dimension in (None, rule.dimension)
+    ][:TABLE_ROWS]
     st.dataframe(
-        frame(shown, some),
+        frame([rule for rule, _ in shown], part, [name for _, name in shown]),
         hide_index=True,
-        column_config=column_config(some),
+        column_config=column_config(part),
         height=table_height(len(shown), 10),
         key="largest_table",
         alt="The rules with the most support",
@@ -227,7 +231,7 @@ def show_compact(compact: Compact, dimension: int | None) -> None:
     rules.sort(key=lambda rule: -rule.samples)
     shown = rules[:TABLE_ROWS]
     st.dataframe(
-        frame(shown, compact.counted),
+        frame(shown, compact.counted, list(map(compact.counted.name_of, shown))),
         hide_index=True,
         column_config=column_config(compact.counted),
         height=table_height(len(shown), 10),

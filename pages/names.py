@@ -151,7 +151,7 @@ def as_parquet(demonstrations: Demonstrations) -> bytes:
 def show_sentence(demonstrations: Demonstrations) -> None:
     """How a rule reads under these names."""
     grown = state.trees(demonstrations, state.chosen_divider())
-    rules = state.largest_rules(grown, state.chosen_thresholds(), 5)
+    rules = state.largest_rules(grown, state.chosen_thresholds(), 5).part
     if not rules.rules:
         return
     longest = max(rules.rules, key=lambda rule: rule.merged_length)

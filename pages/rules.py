@@ -14,10 +14,12 @@ import streamlit as st
 from _cache import cached
 from _rule_table import column_config, frame, table_height
 from _rule_view import Behind, make_ready, show_rule
+from _words import in_full
 
+from sarl_core.explaining.evidence_words import remedy_text, shortfall_text
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import action_text, conditions_text
-from sarl_core.mining.holding_out import lower_bound, with_lower_bound
+from sarl_core.mining.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet
 
@@ -55,8 +57,7 @@ def listed_of(key: tuple[object, ...], _rule_set: RuleSet) -> Listed:
     import pyarrow as pa
 
     rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
-    table = frame(rules, _rule_set)
-    table.insert(2, "Rule", list(map(_rule_set.name_of, rules)))
+    table = frame(rules, _rule_set, list(map(_rule_set.name_of, rules)))
     return Listed(
         rules,
         pa.Table.from_pandas(table, preserve_index=False),
@@ -165,6 +166,8 @@ def matching(listed: Listed, rule_set: RuleSet) -> list[int]:
             downloads(len(compact.shipped), lambda: compact.shipped)
         else:
             downloads(len(sure), lambda: with_lower_bound(rule_set, least) if least else rule_set)
+    if len(sure) < len(listed.rules):
+        why_left_out(listed, least)
     wanted = (words or "").lower().split()
     places = sure if action == EVERY else [at for at in sure if listed.does[at] == action]
     return [at for at in places if has(listed, at, rule_set, wanted)] if wanted else places
@@ -192,6 +195,17 @@ def lower_bound_choice() -> float:
         "above this. The downloads hold these rules. 0: all.",
     )
     return float(least or 0.0)
+
+
+def why_left_out(listed: Listed, least: float) -> None:
+    """Why rules do not reach the lower bound, and where none does, what to do."""
+    parts = state.parts()
+    assert parts is not None
+    assert parts.held_out is not None
+    found = shortfall(listed.rules, least, parts.held_out.n_episodes)
+    told = f"{shortfall_text(found)}."
+    remedy = remedy_text(found, parts.remaining.n_episodes)
+    st.caption(f"{told} {in_full(remedy)}" if remedy else told)
 
 
 @st.fragment

@@ -272,8 +272,6 @@ def print_rules(
     path: Path,
     tried: Tried | None = None,
     judged: Judged | None = None,
-    *,
-    lower_bound: float | None = None,
 ) -> None:
     """Print what was mined, and the rules that apply most often, in words.
 
@@ -282,9 +280,13 @@ def print_rules(
         path: Their file.
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
-        lower_bound: That rules had to reach, if they had to.
     """
-    from sarl_core.commandline.evidence_answers import judged_facts, rule_line, tried_facts
+    from sarl_core.commandline.evidence_answers import (
+        judged_facts,
+        none_left,
+        rule_line,
+        tried_facts,
+    )
     from sarl_core.explaining.cross_fit_words import parting_text
     from sarl_core.explaining.language import share_text
 
@@ -314,8 +316,7 @@ def print_rules(
             ]
         )
     if not len(rule_set):
-        what = "these thresholds" if lower_bound is None else "these thresholds and lower bound"
-        terminal.print_lines([f"No rule reaches {what}; lower one of them."])
+        terminal.print_lines([none_left(tried)])
         return
     often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
     terminal.print_lines(["", "The rules that apply most often:"])

@@ -9,13 +9,15 @@ from sarl_core.explaining.evidence_words import (
     evidence_text,
     influence_text,
     interval_text,
+    remedy_text,
+    shortfall_text,
     verdict_counts,
 )
 from sarl_core.explaining.language import counted, sentence, share_text
 from sarl_core.mining.cross_fitting import Judged
 from sarl_core.mining.episode_counts import Influence
 from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.holding_out import Split
+from sarl_core.mining.holding_out import Shortfall, Split, most_shown
 from sarl_core.mining.rules import Rule, RuleSet
 
 
@@ -27,12 +29,20 @@ class Tried(NamedTuple):
         seed: That drew them.
         split: Both parts.
         judged: The rule set on those held out.
+        short: Of all rules there were, before those below a lower bound were dropped; None where
+            there is no such bound.
     """
 
     share: float
     seed: int
     split: Split
     judged: Judged
+    short: Shortfall | None = None
+
+    @property
+    def there(self) -> int:
+        """Episodes in all."""
+        return self.split.mined.n_episodes + self.split.held_out.n_episodes
 
 
 def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
@@ -62,6 +72,23 @@ def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
         "rules_open": counts["open"],
         "rules_reached": counts["reached"],
         "rules_unknown": counts["unknown"],
+        **({"lower_bound": _described_short(tried)} if tried.short is not None else {}),
+    }
+
+
+def _described_short(tried: Tried) -> dict[str, Any]:
+    short = tried.short
+    assert short is not None
+    remedy = remedy_text(short, tried.there, in_command=True)
+    return {
+        "least": short.least,
+        "most_possible": most_shown(short.episodes),
+        "rules": short.rules,
+        "kept": short.reached,
+        "too_few_episodes": short.too_few,
+        "too_often_wrong": short.wrong,
+        "highest": short.best,
+        "warnings": [remedy] if remedy else [],
     }
 
 
@@ -112,12 +139,15 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
     facts = [
         (
             "held out",
-            f"{counted(held.n_episodes, 'episode')} of "
-            f"{held.n_episodes + tried.split.mined.n_episodes:,}, "
+            f"{counted(held.n_episodes, 'episode')} of {tried.there:,}, "
             f"{counted(len(held), 'state')} (seed {tried.seed})",
         )
     ]
     facts += _facts(tried.judged, "these")
+    if tried.short is not None:
+        facts.append(("lower bound", shortfall_text(tried.short)))
+    if not len(rule_set):
+        return facts
     counts = verdict_counts(rule_set.rules, rule_set.thresholds.confidence)
     facts.append(
         (
@@ -128,6 +158,23 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
         )
     )
     return facts
+
+
+def none_left(tried: Tried | None) -> str:
+    """What to do where no rule is left.
+
+    Args:
+        tried: Which episodes were held out, if any were.
+
+    Returns:
+        A sentence.
+    """
+    remedy = ""
+    if tried is not None and tried.short is not None:
+        remedy = remedy_text(tried.short, tried.there, in_command=True)
+    if remedy:
+        return f"No rule reaches the lower bound: {remedy}."
+    return "No rule reaches these thresholds; lower one of them."
 
 
 def judged_facts(judged: Judged) -> list[tuple[str, str]]:

@@ -156,17 +156,20 @@ def mine(
             judged = fit.at(rule_set.thresholds)
         if split is not None:
             rule_set = holding_out.with_held_out(rule_set, split.held_out)
-        if lower_bound is not None:
+        short = None
+        if lower_bound and split is not None:
+            episodes = split.held_out.n_episodes
+            short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
             rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
         if hold_out is not None and split is not None:
             counts = count_rules(rule_set, split.held_out)
-            tried = Tried(hold_out, seed, split, cross_fitting.judge(rule_set, counts))
+            tried = Tried(hold_out, seed, split, cross_fitting.judge(rule_set, counts), short)
         rule_set.save(out)
     if as_json:
         terminal.print_json(describe_rules(rule_set, out, tried, judged) | oddities)
     else:
         print_oddities(oddities)
-        print_rules(rule_set, out, tried, judged, lower_bound=lower_bound)
+        print_rules(rule_set, out, tried, judged)
 
 
 def landscape(

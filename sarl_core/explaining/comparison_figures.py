@@ -205,7 +205,7 @@ def typical_figure(
 def _crashing(episodes: Episodes) -> str:
     """How many episodes crash, beside a number that leaves out the worst ones."""
     found = episodes.failures
-    return "" if found is None or not found.count else f" ({share_text(found.rate)} crash)"
+    return "" if found is None else f" ({share_text(found.rate)} crash)"
 
 
 def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any]:

@@ -30,7 +30,8 @@ from sarl_core.mining.rules import Rule, RuleSet
 
 _ASIDE = 0.17  # of a rule's place: what it was mined from to the left, held out to the right
 _FEW = 60  # rules up to which whiskers are drawn wide
-_NUMBERED = 30  # rules up to which each has its number
+_NAMED = 30  # rules up to which each has its name written
+_CLOSE = 10  # names that stand side by side in a narrow window
 _TIPS = 60
 _MINED = faded(MUTED_COLOUR, 0.7)
 _STYLE = (
@@ -39,6 +40,7 @@ _STYLE = (
 .sarl-sure b::after { content: ''; position: absolute; left: 50%; bottom: var(--at);
   width: 4px; height: 4px; margin: 0 0 -2px -2px; border-radius: 50%; background: inherit; }
 .sarl-few b { margin-left: -1.5px; width: 3px; }
+@media (max-width: 640px) { .sarl-close .x:not(:nth-child(3n)) { display: none; } }
 .sarl-few b::after { width: 9px; height: 9px; margin: 0 0 -4.5px -4.5px; }
 </style>"""
     + PLOT_STYLE
@@ -84,25 +86,31 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
     )
     counts = verdict_counts(rules, threshold)
     told = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
-    numbers = (
+    named = (
         [float(place) for place in range(1, len(rules) + 1)]
-        if len(rules) <= _NUMBERED
+        if len(rules) <= _NAMED
         else [tick for tick in round_ticks(1, len(rules), 8, whole=True) if tick >= 1]
     )
-    heights = round_ticks(floor, 1.0, 5)
+    heights = round_ticks(100 * floor, 100.0, 5)
+    close = " sarl-close" * (len(named) > _CLOSE)
     return (
-        f'{_STYLE}<div class="sarl-sure{" sarl-few" * few}">'
+        f'{_STYLE}<div class="sarl-sure{" sarl-few" * few}{close}">'
         + plot(
             whiskers + line,
             Axis(
                 across,
-                numbers,
-                [f"{tick:,.0f}" for tick in numbers],
+                named,
+                [rule_set.name_of(rules[round(place) - 1]) for place in named],
                 "Rules, the most support first",
             ),
-            Axis(upwards, heights, list(map(tick_text, heights)), "Confidence"),
+            Axis(
+                upwards,
+                [height / 100 for height in heights],
+                [f"{tick_text(height)} %" for height in heights],
+                "Confidence",
+            ),
             label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
-            f"of {threshold:g}, with the 95 % intervals of what was held out: {told}",
+            f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {told}",
             height=262,
             tips=[_tip(rule, rule_set) for rule in rules],
         )

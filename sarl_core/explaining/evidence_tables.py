@@ -10,11 +10,11 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.evidence_words import (
     VERDICTS,
     band_text,
-    evidence_text,
     held_out_text,
-    influence_text,
     interval_text,
+    mined_text,
     more_text,
+    moved_text,
 )
 from sarl_core.explaining.language import action_text, conditions_text, label_text
 from sarl_core.mining.contradictions import Contradictions, EpisodeContradictions
@@ -35,14 +35,17 @@ def held_out_columns(rules: Sequence[Rule], threshold: float) -> Columns:
         threshold: The minimum confidence.
 
     Returns:
-        Column name to one value a rule; {} where nothing was held out.
+        Column name to one value a rule, the bound in percent; {} where nothing was held out.
     """
     if not any(rule.held_out is not None for rule in rules):
         return {}
     return {
         "Held out": [held_out_text(rule.held_out) for rule in rules],
         "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
-        "Lower bound": [None if rule.held_out is None else rule.held_out.low for rule in rules],
+        "Lower bound": [
+            None if held is None or held.low is None else 100 * held.low
+            for held in (rule.held_out for rule in rules)
+        ],
     }
 
 
@@ -66,13 +69,15 @@ def enough_columns(
         Column name to one value a rule.
     """
     return {
+        "Rule": [rule_set.name_of(rule) for rule in rules],
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
-        "When": [conditions_text(rule, rule_set) for rule in rules],
-        "Evidence": [evidence_text(rule) for rule in rules],
+        "Still missing": [more_text(more) for more in missing],
+        "Held out": [held_out_text(rule.held_out) for rule in rules],
         "Interval": [interval_text(rule.held_out) for rule in rules],
         "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
-        "Still missing": [more_text(more) for more in missing],
-        "Moved most by": [influence_text(one) for one in influences],
+        "Mined from": [mined_text(rule) for rule in rules],
+        "Moved most by": [moved_text(one) for one in influences],
+        "When": [conditions_text(rule, rule_set) for rule in rules],
     }
 
 
@@ -85,20 +90,20 @@ def stability_columns(rules: Sequence[Rule], rule_set: RuleSet, stability: Stabi
         stability: What was found of them.
 
     Returns:
-        Column name to one value a rule.
+        Column name to one value a rule; shares in percent.
     """
     features = rule_set.source.features
     return {
+        "Rule": [rule_set.name_of(rule) for rule in rules],
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
-        "Comes back": [one.returns for one in stability.rules],
-        "Overlap": [one.overlap for one in stability.rules],
+        "Comes back": [100 * one.returns for one in stability.rules],
+        "Overlap": [100 * one.overlap for one in stability.rules],
         "States": [rule.samples for rule in rules],
         "Thresholds and their bands": [
             "; ".join(band_text(band, features[band.feature]) for band in one.bands)
             or "no conditions"
             for one in stability.rules
         ],
-        "Rule": [rule_set.name_of(rule) for rule in rules],
     }
 
 

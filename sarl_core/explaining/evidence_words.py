@@ -6,12 +6,20 @@ import math
 from collections.abc import Sequence
 from html import escape
 
+import numpy as np
+
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MARKER_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.language import counted, number_text, share_text
 from sarl_core.mining.episode_counts import Influence
 from sarl_core.mining.evidence import HeldOut, Interval
-from sarl_core.mining.holding_out import Verdict, verdict
+from sarl_core.mining.holding_out import (
+    Shortfall,
+    Verdict,
+    episodes_needed,
+    most_shown,
+    verdict,
+)
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.stability import Band, RuleStability
 from sarl_core.mining.written import limit_text
@@ -163,6 +171,13 @@ def influence_text(found: Influence | None) -> str:
     )
 
 
+def moved_text(found: Influence | None) -> str:
+    """The same for a table, as "episode 41: 71 % without it"."""
+    if found is None or found.moves < MOVES:
+        return ""
+    return f"episode {found.episode}: {share_text(found.without)} without it"
+
+
 def more_text(more: float) -> str:
     """How many episodes are still missing.
 
@@ -179,6 +194,93 @@ def more_text(more: float) -> str:
     if math.isinf(more):
         return "never at this rate"
     return f"{int(more):,} more {'episode' if more == 1 else 'episodes'}"
+
+
+def shortfall_text(found: Shortfall) -> str:
+    """How many rules reach a lower bound, and why the others do not.
+
+    Args:
+        found: Of some rules.
+
+    Returns:
+        As "2 of 9 rules reach 80 %; 4 were met in too few held-out episodes to show that even if
+        never wrong, and 3 were not right often enough".
+    """
+    reach = "reaches" if found.reached == 1 else "reach"
+    told = f"{found.reached:,} of {counted(found.rules, 'rule')} {reach} {share_text(found.least)}"
+    if found.reached == found.rules:
+        return told
+    were = "was" if found.too_few == 1 else "were"
+    few = f"{found.too_few:,} {were} met in too few held-out episodes to show that even if never"
+    were = "was" if found.wrong == 1 else "were"
+    return f"{told}; {few} wrong, and {found.wrong:,} {were} not right often enough"
+
+
+def remedy_text(found: Shortfall, there: int, *, in_command: bool = False) -> str:
+    """Why no rule reaches a lower bound, and what to do.
+
+    Args:
+        found: Of some rules.
+        there: Episodes in all, the held-out ones among them.
+        in_command: Whether what to do is written as options of `mine`.
+
+    Returns:
+        As "12 held-out episodes can show at most 87.8 %, even of a rule that is never wrong; hold
+        out at least 16 of the 62 (26 %), or ask for less: the best of these rules shows 78.1 %";
+        "" where some rule reaches it, or there is no rule.
+    """
+    if found.reached or not found.rules:
+        return ""
+    least = f" (--lower-bound {math.floor(100 * found.best) / 100:g})" if in_command else ""
+    shows = f"the best of these rules shows {share_text(found.best, decimals=1)}"
+    most = most_shown(found.episodes)
+    if most >= found.least:
+        more = "hold out" if 2 * found.episodes < there else "demonstrate"
+        more = f"{more} more episodes, so that each rule is met in more of those held out"
+        return f"{shows}; ask for less{least}, or {more}" if found.best else more
+    best = f"ask for less: {shows}{least}" if found.best else ""
+    wanted = share_text(found.least)
+    told = (
+        f"{counted(found.episodes, 'held-out episode')} can show at most "
+        f"{share_text(most, decimals=1)}, even of a rule that is never wrong"
+        if most
+        else f"{counted(found.episodes, 'held-out episode')} can show nothing of a rule"
+    )
+    or_best = f", or {best}" if best else ""
+    (needed,) = episodes_needed(np.ones(1), np.zeros(1), found.least).tolist()
+    if math.isinf(needed):
+        return f"{told}, and no number of them can show {wanted}" + (best and f"; {best}")
+    if 2 * needed > there:  # the other half has to be mined from
+        return (
+            f"{told}, and {wanted} takes at least {needed:,.0f}: too many of the {there:,} there "
+            f"are; demonstrate more{or_best}"
+        )
+    percent = math.ceil(100 * needed / there)
+    share = f"--hold-out {percent / 100:g}" if in_command else f"{percent} %"
+    return f"{told}; hold out at least {needed:,.0f} of the {there:,} ({share}){or_best}"
+
+
+def never_text(missing: Sequence[float]) -> str:
+    """Why no further episodes would make any rule certain.
+
+    Args:
+        missing: What `more_episodes` gives of each rule.
+
+    Returns:
+        As "No rule would reach it: 3 never do at this rate, and 5 were met in too few held-out
+        episodes to say."; "" where one would.
+    """
+    if any(map(math.isfinite, missing)):
+        return ""
+    unknown = sum(map(math.isnan, missing))
+    never = len(missing) - unknown
+    parts = []
+    if never:
+        parts.append(f"{never:,} never {'does' if never == 1 else 'do'} at this rate")
+    if unknown:
+        were = "was" if unknown == 1 else "were"
+        parts.append(f"{unknown:,} {were} met in too few held-out episodes to say")
+    return f"No rule would reach it: {', and '.join(parts)}."
 
 
 def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int]:

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from sarl_core.explaining.language import action_text, conditions_text
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds
+from sarl_core.mining.rules import Rule, RuleSet, Thresholds, name_at
 from sarl_core.mining.tree import PolicyTree, source_of
 
 
-def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) -> RuleSet:
+class TopRules(NamedTuple):
+    """Some rules of a set that was not made as a whole.
+
+    Attributes:
+        part: With these rules alone.
+        names: What each is called in the whole set.
+    """
+
+    part: RuleSet
+    names: tuple[str, ...]
+
+
+def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) -> TopRules:
     """The rules with the most support, without making the rest.
 
     Args:
@@ -24,7 +37,8 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
     Returns:
         A part of what `mine_rules` gives, the most support first.
     """
-    rules: list[Rule] = []
+    found: list[tuple[Rule, str]] = []
+    before = 0
     for tree in trees:
         nodes = cut_nodes(
             tree,
@@ -34,15 +48,18 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
             max_depth=thresholds.max_depth,
         )
         first = np.argsort(-tree.samples[nodes], kind="stable")[:most]
-        rules += rules_at(tree, nodes[first])
-    rules.sort(key=lambda rule: -rule.samples)
-    return RuleSet(
-        rules=tuple(rules),
+        names = [name_at(before + place) for place in first.tolist()]
+        found += zip(rules_at(tree, nodes[first]), names, strict=True)
+        before += len(nodes)
+    found.sort(key=lambda one: -one[0].samples)
+    part = RuleSet(
+        rules=tuple(rule for rule, _ in found),
         actions=tuple(tree.dimension for tree in trees),
         source=source_of(trees),
         thresholds=thresholds,
         divider=trees[0].divider,
     )
+    return TopRules(part, tuple(name for _, name in found))
 
 
 def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[object]]:
@@ -53,8 +70,8 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
         rule_set: Knows the names.
 
     Returns:
-        Column name to one value a rule. Shares are from 0 to 1; what follows from the states of
-        a rule that has none is NaN.
+        Column name to one value a rule. Shares are in percent; what follows from the states of a
+        rule that has none is NaN.
     """
 
     def told(rule: Rule, value: float) -> float:
@@ -63,10 +80,10 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
     return {
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
-        "Support": [rule.support for rule in rules],
-        "Confidence": [told(rule, rule.confidence) for rule in rules],
+        "Support": [100 * rule.support for rule in rules],
+        "Confidence": [told(rule, 100 * rule.confidence) for rule in rules],
         "Lift": [told(rule, rule.lift) for rule in rules],
-        "Joint support": [rule.joint_support for rule in rules],
+        "Joint support": [100 * rule.joint_support for rule in rules],
         "States": [rule.samples for rule in rules],
         "Length": [rule.length for rule in rules],
     }

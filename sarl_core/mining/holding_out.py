@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.episode_counts import EpisodeCounts, count_nodes, count_rules
-from sarl_core.mining.evidence import FEWEST_EPISODES, HeldOut, t_reach
+from sarl_core.mining.evidence import FEWEST_EPISODES, HeldOut, held_out_of, t_reach
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Rule, RuleSet
 from sarl_core.mining.tree import PolicyTree
@@ -144,6 +144,19 @@ def lower_bound(rule: Rule) -> float:
     return 0.0 if rule.held_out is None else rule.held_out.low or 0.0
 
 
+def most_shown(episodes: int) -> float:
+    """The largest `lower_bound` there is with so many held-out episodes.
+
+    Args:
+        episodes: Held out, 0 or more.
+
+    Returns:
+        That of a rule that applies in each of them and is never wrong; 0 where they are too few
+        for any interval.
+    """
+    return held_out_of([1] * episodes, [1] * episodes).low or 0.0
+
+
 def verdict(rule: Rule, threshold: float) -> Verdict:
     """What the held-out episodes say of a rule's confidence.
 
@@ -161,6 +174,55 @@ def verdict(rule: Rule, threshold: float) -> Verdict:
     if interval.high < threshold:
         return "below"
     return "reached" if interval.low >= threshold else "open"
+
+
+class Shortfall(NamedTuple):
+    """How many rules reach a lower bound, and why the others do not.
+
+    Attributes:
+        least: That `lower_bound` has to be.
+        episodes: Held out.
+        reached: Rules that reach it.
+        too_few: Rules met in so few of these episodes that they could not, were they never wrong.
+        wrong: The others: met in enough, and not right often enough.
+        best: The largest `lower_bound` of any; 0 where nothing is known of one.
+    """
+
+    least: float
+    episodes: int
+    reached: int
+    too_few: int
+    wrong: int
+    best: float
+
+    @property
+    def rules(self) -> int:
+        """How many there are."""
+        return self.reached + self.too_few + self.wrong
+
+
+def shortfall(rules: Sequence[Rule], least: float, episodes: int) -> Shortfall:
+    """Tell rules that were met too rarely for a lower bound from those that are too often wrong.
+
+    Args:
+        rules: With what was held out.
+        least: Of the `lower_bound`, 0 to 1.
+        episodes: Held out.
+
+    Returns:
+        Their numbers.
+    """
+    bounds = [lower_bound(rule) for rule in rules]
+    met = [
+        0 if rule.held_out is None else rule.held_out.episodes
+        for rule, bound in zip(rules, bounds, strict=True)
+        if bound < least
+    ]
+    enough = {count: most_shown(count) >= least for count in set(met)}
+    wrong = sum(enough[count] for count in met)
+    return Shortfall(
+        least, episodes, len(bounds) - len(met), len(met) - wrong, wrong, max(bounds, default=0.0)
+    )
 
 
 def with_lower_bound(rule_set: RuleSet, least: float) -> RuleSet:

@@ -151,6 +151,18 @@ def node_of(rule: Rule) -> int:
     return int(rule.id.rsplit(".", 1)[1])
 
 
+def name_at(place: int) -> str:
+    """What people call a rule.
+
+    Args:
+        place: Its place in the set, from 0.
+
+    Returns:
+        As "R1" for the first.
+    """
+    return f"R{place + 1}"
+
+
 @dataclass(frozen=True)
 class Thresholds:
     """The thresholds of a rule set.
@@ -249,7 +261,7 @@ class RuleSet:
     @cached_property
     def names(self) -> Mapping[str, str]:
         """What people call the rules, by id: R1 to Rn, by their place in the set."""
-        return {rule.id: f"R{place}" for place, rule in enumerate(self.rules, start=1)}
+        return {rule.id: name_at(place) for place, rule in enumerate(self.rules)}
 
     def name_of(self, rule: Rule) -> str:
         """What people call a rule; its id is for files and links.

@@ -11,7 +11,6 @@ from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.cross_fit_words import judged_sentence
 from sarl_core.explaining.evidence_words import (
     VERDICT_COLOURS,
-    evidence_text,
     held_out_text,
     mined_text,
     more_text,
@@ -76,7 +75,9 @@ def test_the_page_says_what_the_library_counts() -> None:
     }
     table = app.dataframe[0].value
     rules = sorted(tried().rules, key=lambda rule: -rule.samples)
-    assert table["Evidence"].tolist() == [evidence_text(rule) for rule in rules]
+    assert table["Rule"].tolist() == [tried().name_of(rule) for rule in rules]
+    assert table["Held out"].tolist() == [held_out_text(rule.held_out) for rule in rules]
+    assert table["Mined from"].tolist() == [mined_text(rule) for rule in rules]
     missing = list(map(more_text, more_episodes(rules, 30, 0.95)))
     assert table["Still missing"].tolist() == missing
     judged = judge(tried(), count_rules(tried(), parted().held_out))
@@ -117,6 +118,31 @@ def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() 
     app.number_input(key="lower").set_value(middle).run()
     kept = [rule for rule in rules if lower_bound(rule) >= middle]
     assert 0 < len(app.dataframe[0].value) == len(kept) < len(rules)
+
+
+def test_a_lower_bound_that_nothing_reaches_is_explained_where_it_is_set() -> None:
+    app = open_page("rules", **HELD, lower="0.9")
+    told = texts(app)
+    count = len(tried())
+    assert f"0 of {count} rules reach 90 %; {count} were met in too few held-out episodes" in told
+    assert "6 held-out episodes can show at most 75.4 %" in told
+    app.number_input(key="lower").set_value(0.0).run()
+    assert "can show at most" not in texts(app)
+
+
+def test_a_minimum_confidence_that_nothing_can_reach_is_explained() -> None:
+    few = html(open_page("evidence", **HELD))
+    assert "No rule reaches the minimum confidence: 6 held-out episodes can show at most" in few
+    app = open_page("evidence", **HELD, confidence="0.6")
+    assert int(metrics(app)["Reached"]) > 0
+    assert "can show at most" not in html(app)
+
+
+def test_where_no_episodes_would_help_there_is_no_empty_plot() -> None:
+    told = html(open_page("evidence", data="lunar_lander", holdout="0.2"))
+    assert "No rule would reach it: 3 never do at this rate, and 5 were met in too few" in told
+    assert "Rules that reach it" not in told
+    assert "Rules that reach it" in html(open_page("evidence", data="pendulum", holdout="0.3"))
 
 
 def test_the_rules_page_says_in_red_what_other_episodes_refute() -> None:
@@ -178,7 +204,7 @@ def test_rules_are_looked_for_in_other_draws() -> None:
     assert f"of {len(rules)} rules**" in words
     table = app.dataframe[0].value
     assert set(table["Rule"]) == set(rules.names.values())
-    assert table["Comes back"].between(0, 1).all()
+    assert set(table["Comes back"]) <= {0.0, 20.0, 40.0, 60.0, 80.0, 100.0}
 
 
 def test_where_there_is_no_rule_the_page_says_what_to_do() -> None:

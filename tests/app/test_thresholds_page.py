@@ -50,7 +50,13 @@ def test_sliders_change_the_numbers_and_the_table() -> None:
     app = set_support(open_page("thresholds", data="cartpole"), 0.02)
     app.select_slider(key="confidence").set_value(0.9).run()
     assert metrics(app) == expected("cartpole", 0.02, 0.9)
-    assert len(app.dataframe[0].value) == int(metrics(app)["Rules"])
+    table = app.dataframe[0].value
+    assert len(table) == int(metrics(app)["Rules"])
+    whole = mine_rules(load_demonstrations(DATA / "cartpole.parquet"), supp_min=0.02, conf_min=0.9)
+    largest = sorted(whole.rules, key=lambda rule: -rule.samples)
+    assert table["Rule"].tolist() == [whole.name_of(rule) for rule in largest]
+    assert table["Support"].tolist() == [100 * rule.support for rule in largest]
+    assert table["Confidence"].tolist() == [100 * rule.confidence for rule in largest]
 
 
 def test_a_link_opens_what_it_says() -> None:

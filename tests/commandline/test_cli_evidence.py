@@ -7,12 +7,20 @@ import json
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations, RuleSet, load_demonstrations, save_demonstrations
+from sarl_core import (
+    Demonstrations,
+    RuleSet,
+    load_demonstrations,
+    mine_rules,
+    save_demonstrations,
+)
 from sarl_core.cli import main
 from sarl_core.explaining.language import share_text
 from sarl_core.mining.cross_fitting import cross_fit
-from sarl_core.mining.holding_out import hold_out
+from sarl_core.mining.holding_out import hold_out, with_held_out
 from tests.commandline.conftest import CART
+
+LANDER = CART.replace("cartpole", "lunar_lander")
 
 MINE = ("mine", CART, "--support", "0.005", "--confidence", "0.95", "--hold-out", "0.2")
 
@@ -68,7 +76,45 @@ def test_the_lower_bound_keeps_the_rules_that_are_certain(run, tmp_path):
     assert some["rules"] == len(RuleSet.load(path))
     assert {rule.held_out.low for rule in RuleSet.load(path).rules} == {bounds[-1]}
     none = run(*MINE, "--lower-bound", "1", "--out", path)
-    assert "No rule reaches these thresholds and lower bound" in none
+    assert "No rule reaches the lower bound: 6 held-out episodes can show at most 75.4 %" in none
+    assert len(RuleSet.load(path)) == 0
+
+
+def test_where_the_lower_bound_leaves_nothing_the_reason_is_told(run, tmp_path):
+    path = tmp_path / "rules.json"
+    split = hold_out(load_demonstrations(LANDER), 0.2)
+    tried = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
+    best = max(rule.held_out.low or 0.0 for rule in tried.rules)
+    mine = ("mine", LANDER, "--setting", "filtered", "--hold-out", "0.2", "--out", path)
+    told = " ".join(run(*mine, "--lower-bound", "0.9").split())
+    assert f"0 of {len(tried)} rules reach 90 %; {len(tried)} were met in too few" in told
+    assert "12 held-out episodes can show at most 87.8 %" in told
+    assert "hold out at least 15 of the 62 (--hold-out 0.25)" in told
+    document = json.loads(run(*mine, "--lower-bound", "0.9", "--json"))["held_out"]["lower_bound"]
+    assert document.pop("most_possible") == pytest.approx(0.8777, abs=1e-4)
+    (warning,) = document.pop("warnings")
+    assert warning in told
+    assert document == {
+        "least": 0.9,
+        "rules": len(tried),
+        "kept": 0,
+        "too_few_episodes": len(tried),
+        "too_often_wrong": 0,
+        "highest": best,
+    }
+    least = told.rsplit("--lower-bound ", 1)[1].split(")")[0]
+    kept = run(*mine, "--lower-bound", least)
+    assert len(RuleSet.load(path)) >= 1
+    assert "No rule reaches" not in kept
+    run(*mine[:5], "0.25", *mine[6:], "--lower-bound", "0.9")
+    assert len(set(hold_out(load_demonstrations(LANDER), 0.25).held_out.episodes.tolist())) >= 15
+
+
+def test_where_thresholds_leave_nothing_the_lower_bound_is_not_blamed(run, tmp_path):
+    path = tmp_path / "rules.json"
+    mine = ("mine", CART, "--support", "0.9", "--confidence", "1", "--hold-out", "0.2")
+    told = run(*mine, "--lower-bound", "0.9", "--out", path)
+    assert "No rule reaches these thresholds; lower one of them." in told
 
 
 @pytest.mark.parametrize("share", ["0", "1", "0.99", "-1"])

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,21 @@ def test_what_is_typical_stands_with_its_interval(comparison: Comparison) -> Non
         assert point.x[0] + point.error_x.array[0] == pytest.approx(wanted.high)
         assert point.x[0] - point.error_x.arrayminus[0] == pytest.approx(wanted.low)
     assert list(figure.layout.yaxis.ticktext)[1:] == ["filtered", "expert"]
+
+
+def test_whoever_never_crashes_says_so_where_others_say_how_often(comparison: Comparison) -> None:
+    *novices, expert = comparison.episodes
+    upright = replace(expert, terminated=np.zeros(len(expert), dtype=np.bool_))
+    comparison = replace(comparison, episodes=(*novices, upright))
+    texts = [point.text[0] for point in typical_figure(comparison).data]
+    assert [text[text.index("(") :] for text in texts] == [
+        "(100 % crash)",
+        "(100 % crash)",
+        "(0 % crash)",
+    ]
+    unknown = tuple(replace(found, env_id="Unknown-v0") for found in comparison.episodes)
+    for point in typical_figure(replace(comparison, episodes=unknown)).data:
+        assert "crash" not in point.text[0]
 
 
 def test_names_are_text_and_not_markup(comparison: Comparison) -> None:

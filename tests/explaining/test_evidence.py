@@ -24,7 +24,10 @@ from sarl_core.explaining.evidence_words import (
     influence_text,
     interval_text,
     more_text,
+    never_text,
     range_text,
+    remedy_text,
+    shortfall_text,
     stability_text,
     told_by_episodes,
     verdict_counts,
@@ -32,7 +35,7 @@ from sarl_core.explaining.evidence_words import (
 from sarl_core.mining.contradictions import EpisodeContradictions, find_contradictions
 from sarl_core.mining.episode_counts import Influence
 from sarl_core.mining.evidence import HeldOut, Interval
-from sarl_core.mining.holding_out import hold_out, more_episodes, with_held_out
+from sarl_core.mining.holding_out import Shortfall, hold_out, more_episodes, with_held_out
 from sarl_core.mining.learning_curve import LearningCurve
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.stability import Band, RuleStability, Stability
@@ -141,6 +144,84 @@ def test_a_band_and_a_return_are_said():
     assert stability_text(RuleStability("0.1", 0.9, 0.8, ()), 30) == "came back in 27 of 30 rounds"
 
 
+def test_rules_below_a_lower_bound_are_told_by_their_reason():
+    assert shortfall_text(Shortfall(0.8, 12, 2, 4, 3, 0.84)) == (
+        "2 of 9 rules reach 80 %; 4 were met in too few held-out episodes to show that even if "
+        "never wrong, and 3 were not right often enough"
+    )
+    assert shortfall_text(Shortfall(0.8, 12, 1, 1, 1, 0.84)) == (
+        "1 of 3 rules reaches 80 %; 1 was met in too few held-out episodes to show that even if "
+        "never wrong, and 1 was not right often enough"
+    )
+    assert shortfall_text(Shortfall(0.8, 12, 2, 0, 0, 0.84)) == "2 of 2 rules reach 80 %"
+
+
+@pytest.mark.parametrize(
+    ("found", "there", "expected"),
+    [
+        (
+            Shortfall(0.9, 12, 0, 8, 0, 0.781),
+            62,
+            "12 held-out episodes can show at most 87.8 %, even of a rule that is never wrong; "
+            "hold out at least 15 of the 62 (25 %), or ask for less: the best of these rules "
+            "shows 78.1 %",
+        ),
+        (
+            Shortfall(0.9, 12, 0, 8, 0, 0.781),
+            29,
+            "12 held-out episodes can show at most 87.8 %, even of a rule that is never wrong, "
+            "and 90 % takes at least 15: too many of the 29 there are; demonstrate more, or ask "
+            "for less: the best of these rules shows 78.1 %",
+        ),
+        (
+            Shortfall(1.0, 12, 0, 8, 0, 0.781),
+            62,
+            "12 held-out episodes can show at most 87.8 %, even of a rule that is never wrong, "
+            "and no number of them can show 100 %; ask for less: the best of these rules shows "
+            "78.1 %",
+        ),
+        (
+            Shortfall(0.5, 3, 0, 8, 0, 0.0),
+            62,
+            "3 held-out episodes can show nothing of a rule; hold out at least 5 of the 62 (9 %)",
+        ),
+        (
+            Shortfall(0.8, 12, 0, 2, 6, 0.781),
+            62,
+            "the best of these rules shows 78.1 %; ask for less, or hold out more episodes, so "
+            "that each rule is met in more of those held out",
+        ),
+        (
+            Shortfall(0.8, 12, 0, 8, 0, 0.0),
+            20,
+            "demonstrate more episodes, so that each rule is met in more of those held out",
+        ),
+        (Shortfall(0.8, 12, 1, 2, 6, 0.81), 62, ""),
+        (Shortfall(0.9, 12, 0, 0, 0, 0.0), 62, ""),
+    ],
+)
+def test_what_to_do_where_no_rule_reaches_a_lower_bound(found, there, expected):
+    assert remedy_text(found, there) == expected
+
+
+def test_what_to_do_is_written_as_it_is_typed():
+    told = remedy_text(Shortfall(0.9, 12, 0, 8, 0, 0.7899), 62, in_command=True)
+    assert "hold out at least 15 of the 62 (--hold-out 0.25), or" in told
+    assert told.endswith("shows 79.0 % (--lower-bound 0.78)")
+
+
+def test_where_no_number_of_episodes_helps_that_is_said():
+    never, unknown = float("inf"), float("nan")
+    assert never_text([never, unknown, never]) == (
+        "No rule would reach it: 2 never do at this rate, and 1 was met in too few held-out "
+        "episodes to say."
+    )
+    assert never_text([unknown] * 2) == (
+        "No rule would reach it: 2 were met in too few held-out episodes to say."
+    )
+    assert never_text([never, 12.0]) == never_text([0.0]) == ""
+
+
 def test_the_bar_marks_the_threshold_and_stays_within_its_scale():
     bar = evidence_bar(rule_of(412, 400, (96, 60, 14, 0.62, 0.5, 0.75)), 0.95)
     places = [float(part.split("%")[0]) for part in bar.split('style="left:')[1:]]
@@ -161,7 +242,8 @@ def test_columns_hold_what_was_counted(tried):
         tried.rules, columns["Held out"], columns["Lower bound"], strict=True
     ):
         assert text.endswith(("episodes", "episode", "no states"))
-        assert bound == rule.held_out.low
+        low = rule.held_out.low
+        assert bound == (low if low is None else pytest.approx(100 * low))
     counts = verdict_counts(tried.rules, 0.85)
     said = ("too low", "open", "reached", "too few episodes")
     words = [columns["Verdict"].count(word) for word in said]
@@ -173,10 +255,14 @@ def test_tables_have_a_row_a_rule(tried):
     missing = more_episodes(tried.rules, 20, 0.85)
     moved = [Influence(3, 100, 0.9, 0.8)] * len(tried)
     columns = enough_columns(tried.rules, tried, missing, 0.85, moved)
+    assert columns["Rule"] == [f"R{place}" for place in range(1, len(tried) + 1)]
+    assert columns["Held out"] == [held_out_text(rule.held_out) for rule in tried.rules]
     assert columns["Still missing"] == [more_text(more) for more in missing]
-    assert columns["Moved most by"] == [influence_text(one) for one in moved]
+    assert set(columns["Moved most by"]) == {"episode 3: 80 % without it"}
     one = tuple(RuleStability(rule.id, 0.5, 0.4, ()) for rule in tried.rules)
     stable = stability_columns(tried.rules, tried, Stability(4, 0.5, one))
+    assert set(stable["Comes back"]) == {50.0}
+    assert set(stable["Overlap"]) == {40.0}
     assert {len(values) for values in (*columns.values(), *stable.values())} == {len(tried)}
 
 

@@ -10,6 +10,7 @@ from sarl_core import Demonstrations, RuleSet, mine_rules
 from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
 from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks, tick_text
 from sarl_core.mining.holding_out import hold_out, with_held_out
+from sarl_core.mining.rules import Rule
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +35,9 @@ def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None
     html = overview_plot(tried.rules, tried, 0.85)
     drawn = whiskers(html)
     assert len(drawn) == 2 * len(tried)
-    ticks = re.findall(r'class="y" style="bottom:([\d.]+)%">([\d.]+)<', html)
+    ticks = re.findall(r'class="y" style="bottom:([\d.]+)%">([\d.]+) %<', html)
     (low, at_low), (high, at_high) = [
-        (float(text), float(b) / 100) for b, text in ticks[:: len(ticks) - 1]
+        (float(text) / 100, float(b) / 100) for b, text in ticks[:: len(ticks) - 1]
     ]
     per_share = (at_high - at_low) / (high - low)
 
@@ -63,6 +64,22 @@ def test_without_held_out_episodes_there_is_one_dot_a_rule(tried: RuleSet) -> No
     alone = replace(tried, rules=tuple(replace(rule, held_out=None) for rule in tried.rules))
     drawn = whiskers(overview_plot(alone.rules, alone, 0.85))
     assert [height for _, _, height, _ in drawn] == [0.0] * len(tried)
+
+
+def test_rules_stand_above_their_names_and_many_rules_above_some(tried: RuleSet) -> None:
+    largest = sorted(tried.rules, key=lambda rule: -rule.samples)
+
+    def named(rules: list[Rule], rule_set: RuleSet) -> list[str]:
+        return re.findall(r'class="x"[^>]*>([^<]+)<', overview_plot(rules, rule_set, 0.85))
+
+    names = [f"R{tried.rules.index(rule) + 1}" for rule in largest]
+    assert names != sorted(names)
+    assert named(largest, tried) == names
+    many = replace(
+        tried, rules=tuple(replace(tried.rules[0], id=f"0.{node}") for node in range(200))
+    )
+    backwards = list(reversed(many.rules))
+    assert named(backwards, many) == [f"R{201 - place}" for place in range(25, 201, 25)]
 
 
 def test_names_in_the_overview_are_no_markup(tried: RuleSet) -> None:

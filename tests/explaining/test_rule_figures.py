@@ -167,10 +167,14 @@ def test_the_path_table_escapes_names_from_files(
 
 def test_the_largest_rules_are_the_first_of_all(lander_trees: tuple[PolicyTree, ...]) -> None:
     everything = mine_rules(lander_trees, supp_min=0.0, conf_min=1.0)
-    some = top_rules(lander_trees, Thresholds(0.0, 1.0), 7)
+    some, names = top_rules(lander_trees, Thresholds(0.0, 1.0), 7)
     largest = sorted((rule.samples for rule in everything.rules), reverse=True)[:7]
     assert [rule.samples for rule in some.rules] == largest
     assert {rule.id for rule in some.rules} <= {rule.id for rule in everything.rules}
+    whole = {rule.id: everything.name_of(rule) for rule in everything.rules}
+    assert list(names) == [whole[rule.id] for rule in some.rules]
     columns = rule_columns(some.rules, some)
     assert columns["States"] == largest
-    assert columns["Joint support"] == [rule.joint_support for rule in some.rules]
+    assert columns["Joint support"] == [100 * rule.joint_support for rule in some.rules]
+    assert columns["Support"] == [100 * rule.support for rule in some.rules]
+    assert columns["Confidence"] == [100 * rule.confidence for rule in some.rules]

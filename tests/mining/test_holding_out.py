@@ -20,6 +20,8 @@ from sarl_core.mining.holding_out import (
     hold_out,
     lower_bound,
     more_episodes,
+    most_shown,
+    shortfall,
     verdict,
     with_held_out,
     with_lower_bound,
@@ -260,6 +262,32 @@ def test_a_rule_set_is_filtered_by_the_lower_bound(lander_like):
     assert [rule for rule in rules.rules if lower_bound(rule) >= 0.7] == list(kept.rules)
     with pytest.raises(InputError, match="give a share from 0 to 1"):
         with_lower_bound(rules, 1.2)
+
+
+@given(st.integers(5, 400))
+def test_no_rule_shows_more_than_one_that_is_never_wrong(episodes):
+    most = most_shown(episodes)
+    assert most == pytest.approx(t_interval(np.ones(episodes))[0])
+    assert most_shown(episodes + 1) > most
+    wrong_once = np.append(np.ones(episodes - 1), 0.9)
+    assert lower_bound(rule_of(100, 98, wrong_once)) < most
+
+
+def test_few_episodes_show_nothing_at_all():
+    assert [most_shown(episodes) for episodes in range(5)] == [0.0] * 5
+
+
+def test_what_is_met_too_rarely_is_told_from_what_is_too_often_wrong():
+    sure, wrong = rule_of(100, 98, [1.0] * 20), rule_of(100, 98, [1.0, 0.2] * 10)
+    rare, rare_and_wrong = rule_of(100, 98, [1.0] * 12), rule_of(100, 98, [0.1] * 12)
+    never = rule_of(100, 98, []), rule_of(100, 98)
+    found = shortfall([sure, wrong, rare, rare_and_wrong, *never], 0.9, 20)
+    assert (found.reached, found.wrong, found.too_few) == (1, 1, 4)
+    assert found.rules == 6
+    assert found.best == lower_bound(sure)
+    lower = shortfall([sure, wrong, rare, rare_and_wrong, *never], 0.85, 20)
+    assert (lower.reached, lower.wrong, lower.too_few) == (2, 2, 2)
+    assert shortfall([], 0.9, 20) == (0.9, 20, 0, 0, 0, 0.0)
 
 
 # --- enough demonstrations ------------------------------------------------------------------------
