@@ -22,6 +22,7 @@ from sarl_core.explaining.ablation_figures import (
 from sarl_core.explaining.cells import safe_cells
 from sarl_core.explaining.language import sentence
 from sarl_core.rollouts.ablation import Ablation
+from sarl_core.rollouts.failures import no_failures_text
 
 PLAIN = {"displayModeBar": False}
 TABLE_ROWS = 14
@@ -37,15 +38,14 @@ def show(found: Ablation, wanted: Wanted, *, at_work: bool, linked: str | None) 
         at_work: Whether more is on its way.
         linked: The set under which its rules are found on the Rules page; None if they are not.
     """
+    why = no_failures_text(found.base.env_id)
     with st.grid(4, min_column_width=150):
         st.metric("Return, all rules", f"{found.base.returns.mean():,.1f}", border=True)
         st.metric(
             "Failures, all rules",
             f"{found.base_failures:,} of {len(found.base):,}" if found.failures_known else "–",
             border=True,
-            help=None
-            if found.failures_known
-            else "It is not known which ends of this environment's episodes are failures.",
+            help=None if found.failures_known else f"{why[0].upper()}{why[1:]}.",
         )
         st.metric("Rules taken out", f"{len(found.rules):,}", border=True)
         st.metric(
@@ -148,7 +148,7 @@ def column_config(found: Ablation) -> dict[str, Any]:
     failures = (
         f"Of {len(found.base):,} episodes; with all rules it is {found.base_failures:,}"
         if found.failures_known
-        else "Not known for this environment"
+        else no_failures_text(found.base.env_id)
     )
     return {
         "Rule": column.TextColumn(pinned=True, width=76),

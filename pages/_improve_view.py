@@ -29,12 +29,13 @@ from sarl_core.explaining.aggregation_figures import (
     rounds_figure,
 )
 from sarl_core.explaining.comparison_text import POLICY_TEXT
-from sarl_core.explaining.language import counted, share_text
+from sarl_core.explaining.language import at_least_text, counted, share_text
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.rollouts.aggregation import Aggregation
 from sarl_core.rollouts.aggregation_files import aggregation_card, card_path
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.failures import no_failures_text
 
 PLAIN = {"displayModeBar": False}
 BUDGETS = "budgets.json"
@@ -139,9 +140,10 @@ def failures_of(episodes: Episodes) -> tuple[str, str]:
     """The share of episodes that ended in failure, and what it tells."""
     found = episodes.failures
     if found is None:
-        return "–", "It is not known which ends of this environment are failures"
+        why = no_failures_text(episodes.env_id)
+        return "–", f"{why[0].upper()}{why[1:]}"
     return (
-        share_text(found.rate),
+        at_least_text(found.rate, found.unknown),
         f"{found.count:,} of {found.of:,} fresh episodes, 95 % interval {share_text(found.low)} to "
         f"{share_text(found.high)}",
     )
@@ -388,7 +390,9 @@ def _failures_of_card(reported: dict[str, Any]) -> str:
     if "failures" not in reported:
         return ""
     low, high = (share_text(float(reported[f"failure_{end}"])) for end in ("low", "high"))
-    return f"; {int(reported['failures']):,} of them failed (95 % interval {low} to {high})"
+    cut = int(reported.get("cut", 0))
+    also = f", and {cut:,} were cut off before they could" if cut else ""
+    return f"; {int(reported['failures']):,} of them failed{also} (95 % interval {low} to {high})"
 
 
 def _policy_of_card(reported: dict[str, Any]) -> str:

@@ -14,7 +14,7 @@ from _words import escaped
 
 from sarl_core.explaining.comparison_figures import ArmStyle, returns_figure, typical_figure
 from sarl_core.explaining.comparison_text import POLICY_TEXT, verdict_on_all
-from sarl_core.explaining.language import share_text
+from sarl_core.explaining.language import at_least_text, share_text
 from sarl_core.rollouts.comparison import Arm, Comparison
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
@@ -207,7 +207,7 @@ def column_config(env_id: str) -> dict[str, Any]:
             alignment="right",
             help="Share of the episodes that ended in failure: a fall, a crash, or whatever else "
             "ends an episode of this environment before its time. A landing or an arrival is none. "
-            "A dash where it is not known which ends are failures.",
+            "A dash where it is not known which ends are failures, or none is.",
         ),
         "Crashes, 95 %": column.TextColumn(
             alignment="right",
@@ -237,7 +237,7 @@ def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
         flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
         if rules is not None and episodes.flips is not None
         else "–",
-        "Crashes": "–" if failures is None else share_text(failures.rate),
+        "Crashes": "–" if failures is None else at_least_text(failures.rate, failures.unknown),
         "Crashes, 95 %": "–"
         if failures is None
         else f"{share_text(failures.low)} to {share_text(failures.high)}",

@@ -325,11 +325,14 @@ def print_rules(
     )
 
 
-def print_episodes(document: dict[str, Any], title: str, shield: Shield | None = None) -> None:
+def print_episodes(
+    document: dict[str, Any], env_id: str, title: str, shield: Shield | None = None
+) -> None:
     """Print what `Episodes.to_dict` holds.
 
     Args:
         document: What it gave.
+        env_id: Environment.
         title: Above the table.
         shield: In force, or None.
     """
@@ -344,7 +347,7 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
         [
             ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
             ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
-            ("failures", failures_text(summary, len(document["episodes"]))),
+            ("failures", failures_text(summary, len(document["episodes"]), env_id)),
             *_cost(summary),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
             *(
@@ -364,24 +367,30 @@ def print_episodes(document: dict[str, Any], title: str, shield: Shield | None =
     print_notes(document["notes"])
 
 
-def failures_text(summary: dict[str, float], episodes: int) -> str:
+def failures_text(summary: dict[str, float], episodes: int, env_id: str) -> str:
     """How many episodes failed, and how sure one can be of the share.
 
     Args:
         summary: What `Episodes.summary` gave.
         episodes: How many there are.
+        env_id: Environment.
 
     Returns:
-        In words, also where it is not known which ends are failures.
+        In words, also where it is not known which ends are failures, or there are none.
     """
-    from sarl_core.explaining.language import share_text
+    from sarl_core.explaining.language import at_least_text, share_text
+    from sarl_core.rollouts.failures import cannot_fail, no_failures_text
 
     if "failures" not in summary:
-        return "not known: nothing says which ends of this environment are failures"
+        return f"{'none' if cannot_fail(env_id) else 'not known'}: {no_failures_text(env_id)}"
     low, high = (share_text(summary[name]) for name in ("failure_low", "failure_high"))
+    cut = int(summary.get("cut", 0))
+    if cut == episodes:
+        return "not known: no episode ran to its end"
+    ended = f" of the {episodes - cut:,} that ended" if cut else f" of {episodes:,} episodes"
     return (
-        f"{summary['failures']:,} of {episodes:,} episodes, "
-        f"{share_text(summary['failure_rate'])} (95 % interval {low} to {high})"
+        f"{summary['failures']:,}{ended}, {at_least_text(summary['failure_rate'], cut)}"
+        f"{' of all' if cut else ''} (95 % interval {low} to {high})"
     )
 
 

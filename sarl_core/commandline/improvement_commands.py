@@ -165,18 +165,18 @@ def aggregate(
             f"{', refined' if found.refined else ''}.",
             f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
             f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
-            *_beside(reported),
+            *_beside(reported, card["env_id"]),
             *(f"note: {note}" for note in notes),
         ]
     )
 
 
-def _beside(reported: dict[str, Any]) -> list[str]:
+def _beside(reported: dict[str, Any], env_id: str) -> list[str]:
     """How often these episodes failed, and what the rules left to choose from."""
     from sarl_core.commandline.answers import failures_text, freedom_text
 
     return [
-        f"Failures: {failures_text(reported, reported['episodes'])}.",
+        f"Failures: {failures_text(reported, reported['episodes'], env_id)}.",
         f"Freedom: {freedom_text(reported)}.",
     ]
 

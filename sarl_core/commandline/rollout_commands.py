@@ -72,7 +72,7 @@ def evaluate(
     from sarl_core.commandline.answers import print_episodes
 
     shielded = "unshielded" if rules is None else f"shielded by {rules}"
-    print_episodes(document, f"{found.agent} in {env}, {shielded}", shield)
+    print_episodes(document, env, f"{found.agent} in {env}, {shielded}", shield)
 
 
 def render(

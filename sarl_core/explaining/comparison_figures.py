@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import LABEL_COLOURS, faded
-from sarl_core.explaining.language import share_text
+from sarl_core.explaining.language import at_least_text
 from sarl_core.explaining.markup import plain
 from sarl_core.rollouts.comparison import Arm, Comparison
 from sarl_core.rollouts.episodes import Episodes
@@ -205,7 +205,9 @@ def typical_figure(
 def _crashing(episodes: Episodes) -> str:
     """How many episodes crash, beside a number that leaves out the worst ones."""
     found = episodes.failures
-    return "" if found is None else f" ({share_text(found.rate)} crash)"
+    if found is None or found.unknown == found.of:
+        return ""
+    return f" ({at_least_text(found.rate, found.unknown)} crash)"
 
 
 def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any]:

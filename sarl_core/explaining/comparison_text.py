@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sarl_core.explaining.language import share_text
+from sarl_core.explaining.language import at_least_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.shield_effect import ERROR_RATE, ShieldEffect, shield_effect
+from sarl_core.rollouts.statistics import Rate
 
 POLICY_TEXT = (
     "These rules decide every step (freedom 0 %), so they are a policy that replaces the agent "
@@ -97,8 +98,8 @@ def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     after = _whole(shielded.statistics.iqm)
     notes = [_difference(found, alone, shielded)]
     if alone.failures is not None and shielded.failures is not None:
-        rates = [alone.failures.rate, shielded.failures.rate]
-        notes += [f"{share_text(rates[1])} of its episodes crash"] if any(rates) else []
+        some = alone.failures.count or shielded.failures.count
+        notes += [f"{_share(shielded.failures)} of its episodes crash"] if some else []
     if found.effect == "harms":
         notes.append("these rules harm it")
     told = "; ".join(notes)
@@ -108,17 +109,20 @@ def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     return f"with {shield} it {word} to {after} ({told})"
 
 
+def _share(failures: Rate) -> str:
+    return at_least_text(failures.rate, failures.unknown)
+
+
 def _crashes(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
     """What to say of the failures; nothing where it is not known which ends are some."""
     if alone.failures is None or shielded.failures is None:
         return ""
-    before, after = alone.failures.rate, shielded.failures.rate
-    if before == after:
-        return (
-            f", and {share_text(after)} of its episodes end in a crash, as without" if after else ""
-        )
+    before, after = _share(alone.failures), _share(shielded.failures)
+    if alone.failures.rate == shielded.failures.rate:
+        none = not alone.failures.count
+        return "" if none else f", and {after} of its episodes end in a crash, as without"
     chance = "" if found.failure_p < ERROR_RATE else ", which alone may still be chance"
     return (
-        f", and {share_text(after)} instead of {share_text(before)} of its episodes end in a "
-        f"crash{'' if found.too_few else chance}"
+        f", and {after} instead of {before} of its episodes end in a crash"
+        f"{'' if found.too_few else chance}"
     )

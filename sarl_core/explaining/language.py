@@ -96,6 +96,19 @@ def share_text(share: float, *, decimals: int | None = None) -> str:
     return "< 0.01 %" if share < 0.5 else "> 99.99 %"
 
 
+def at_least_text(share: float, unknown: int) -> str:
+    """A share of which some are not known, and so may be more.
+
+    Args:
+        share: Of what is known to be so.
+        unknown: How many are not known.
+
+    Returns:
+        As "15 %", or "at least 15 %".
+    """
+    return f"at least {share_text(share)}" if unknown else share_text(share)
+
+
 def is_flag(feature: Feature, bounds: Bounds) -> bool:
     """Whether bounds on a feature say no more than yes or no, as those on a contact do.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from sarl_core.explaining.language import counted, share_text, threshold_text
 from sarl_core.files import whole_file
-from sarl_core.rollouts.failures import failure_known
+from sarl_core.rollouts.failures import failure_known, no_failures_text
 from sarl_core.rollouts.learning_files import LearningStudy
 from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
 
@@ -75,7 +75,7 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
     """
     rows: list[tuple[str, ...]] = []
     for summary in summaries:
-        alone, shielded = summary.alone, summary.shielded
+        alone, shielded, known = summary.alone, summary.shielded, summary.failures_known
         spread = (
             f" ({value_text(min(summary.crashes))}–{value_text(max(summary.crashes))})"
             if len(summary.crashes) > 1
@@ -85,14 +85,14 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
             (
                 summary.arm.title,
                 verdict(summary),
-                value_text(summary.mean_crashes) + spread,
+                value_text(summary.mean_crashes) + spread if known else "–",
                 value_text(float(np.mean(summary.episodes))),
                 share_text(summary.intervention_rate) if summary.arm.shielded else "–",
                 value_text(summary.learning_return),
                 _with_worst(alone.mean, alone.means),
                 f"{value_text(alone.returns.iqm)} ({value_text(alone.returns.low)} to "
                 f"{value_text(alone.returns.high)})",
-                share_text(alone.crash_rate),
+                share_text(alone.crash_rate) if known else "–",
                 "–" if shielded is None else value_text(shielded.mean),
             )
         )
@@ -136,11 +136,8 @@ def save_finding(study: LearningStudy, summaries: Sequence[ArmSummary], folder: 
 def _answer(
     study: LearningStudy, judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]
 ) -> str:
-    if not failure_known(study.env_id):
-        return (
-            f"Which ends of an episode are failures is not known of {study.env_id}, so which way "
-            "to learn is safe cannot be said."
-        )
+    if why := no_failures_text(study.env_id):
+        return f"{why[0].upper()}{why[1:]}, so which way to learn is safe cannot be said."
     if not judged:
         return (
             "Whether a way to learn is safe and good shows only beside the same learner without a "
@@ -199,9 +196,8 @@ def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
         return ""
     told = "Without any shield: " + _listed(
         [
-            f"“{summary.arm.title}” crashed {_times(summary.mean_crashes)} while learning, in "
-            f"{share_text(sum(summary.crashes) / sum(summary.episodes))} of its episodes, and "
-            f"returns {_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
+            f"“{summary.arm.title}” {_crashed(summary)}returns "
+            f"{_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
             for summary in alone
         ]
     )
@@ -222,6 +218,16 @@ def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
     )
 
 
+def _crashed(summary: ArmSummary) -> str:
+    """How often it did while learning; nothing where that is not known."""
+    if not summary.failures_known:
+        return ""
+    share = share_text(sum(summary.crashes) / sum(summary.episodes))
+    return (
+        f"crashed {_times(summary.mean_crashes)} while learning, in {share} of its episodes, and "
+    )
+
+
 def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     """How good the rules are themselves, as far as they decide everything."""
     covered = [
@@ -232,10 +238,12 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     # Where an interval leaves the learner room, it matters what was learned.
     if not covered or np.ptp([trials.mean for trials in covered]) > _SAME:
         return ""
+    crashes = f", crashes in {share_text(covered[0].crash_rate)} of the episodes"
+    if not summaries[0].failures_known:
+        crashes = ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "
-        f"whatever was learned: return {value_text(covered[0].mean)}, crashes in "
-        f"{share_text(covered[0].crash_rate)} of the episodes."
+        f"whatever was learned: return {value_text(covered[0].mean)}{crashes}."
     )
 
 
@@ -251,13 +259,19 @@ def _conditions(study: LearningStudy) -> str:
         )
         by = f"{counted(int(rules['count']), 'rule')} ({cut})"
     seeds = len(study.seeds)
+    meant = ""
+    if failure_known(study.env_id):
+        meant = (
+            f"Safe means at most {share_text(SAFE_SHARE)} of the crashes of the same learner "
+            "without a shield; good means at least its mean return, both averaged over the "
+            "learners. "
+        )
     return (
         f"{study.env_id}, {by}, {study.steps:,} steps, {counted(seeds, 'learner')} of each kind, "
-        f"{counted(int(study.settings['trial_episodes']), 'episode')} each afterwards. Safe means "
-        f"at most {share_text(SAFE_SHARE)} of the crashes of the same learner without a shield; "
-        "good means at least its mean return, both averaged over the learners. The typical "
-        "return is the mean of the middle half; its interval comes from drawing learners and "
-        "episodes anew." + (" So few learners show large differences only." if seeds < 10 else "")
+        f"{counted(int(study.settings['trial_episodes']), 'episode')} each afterwards. {meant}The "
+        "typical return is the mean of the middle half; its interval comes from drawing learners "
+        "and episodes anew."
+        + (" So few learners show large differences only." if seeds < 10 else "")
     )
 
 

@@ -13,10 +13,12 @@ from typing import Any, get_args
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.comparison_text import POLICY_TEXT
-from sarl_core.explaining.language import number_text, share_text
+from sarl_core.explaining.language import at_least_text, number_text, share_text
 from sarl_core.explaining.report_svg import MUTED, NEUTRAL, Scale, dot_and_interval
 from sarl_core.limits import limited_bytes
 from sarl_core.rollouts.comparison import Comparison, comparison_row
+from sarl_core.rollouts.episodes import cut_text
+from sarl_core.rollouts.failures import cannot_fail
 from sarl_core.rollouts.shield_effect import Effect
 from sarl_core.rollouts.statistics import MeanInterval
 
@@ -32,7 +34,7 @@ _HEADINGS = (
     "Episodes",
 )
 _ALWAYS = ("Failures",)  # a typical return hides them
-_UNKNOWN, _NOT_KNOWN = "–", "not known"
+_UNKNOWN, _NOT_KNOWN, _NONE = "–", "not known", "cannot fail"
 _NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
 _DIFFERENCE = ("return_difference", "difference_low", "difference_high")
 HARMS: Effect = "harms"
@@ -57,6 +59,7 @@ class Result:
         covered: Share of steps at which a rule applied, None without a shield.
         crashes: Share of episodes that ended in failure, None where unknown.
         crash_ends: Its 95 % interval, None where unknown.
+        cut: Episodes that were cut off before their end; their failures are not among `crashes`.
         freedom: What the rules left the agent to choose from, 0 to 1, None where unknown.
         gained: Return with the shield less the return without it on the same seeds, mean and 95 %
             interval; None where both were not run.
@@ -78,6 +81,7 @@ class Result:
     covered: float | None
     crashes: float | None
     crash_ends: tuple[float, float] | None = None
+    cut: int = 0
     freedom: float | None = None
     gained: MeanInterval | None = None
     effect: str = ""
@@ -217,6 +221,11 @@ def compared(results: Sequence[Result]) -> Compared | None:
             "the episodes; the line through the dot shows where it probably lies (95 % interval). "
             "It leaves out the worst quarter of the episodes, so it hides crashes: read the mean "
             "and the failures beside it.",
+            *(
+                f"{one.name}: {cut_text(one.env_id, one.cut, one.episodes)}."
+                for one in results
+                if one.cut
+            ),
             *(f"{one.name}: these rules harm the agent." for one in results if one.effect == HARMS),
             *(f"{one.name}: {_policy(one)}" for one in results if one.freedom == 0.0),
         ),
@@ -268,7 +277,13 @@ def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
     first = episodes[0].get("seed") if isinstance(episodes[0], dict) else None
     # Without a shield no rule ever applies, which is what is shown of it.
     alone = not summary.get("coverage")
-    row = {"arm": name[: -len(".json")], "episodes": len(episodes), "seed": first, **summary}
+    row = {
+        "arm": name[: -len(".json")],
+        "environment": document.get("environment"),
+        "episodes": len(episodes),
+        "seed": first,
+        **summary,
+    }
     return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
 
 
@@ -319,6 +334,7 @@ def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Resul
         covered=share("coverage"),
         crashes=share("failure_rate") if row.get("crash_rate") is None else share("crash_rate"),
         crash_ends=_both(share("failure_low"), share("failure_high")),
+        cut=whole("cut") or 0,
         freedom=None if row.get("coverage") is None else share("freedom"),
         gained=gained,
         effect=effect if effect in get_args(Effect) else "",
@@ -341,12 +357,15 @@ def _policy(one: Result) -> str:
 
 def _crashes(one: Result) -> str:
     """The share of failures with its interval."""
-    if one.crashes is None:
+    if cannot_fail(one.env_id):
+        return _NONE
+    if one.crashes is None or one.cut == one.episodes:
         return _NOT_KNOWN
+    told = at_least_text(one.crashes, one.cut)
     if one.crash_ends is None:
-        return share_text(one.crashes)
+        return told
     low, high = map(share_text, one.crash_ends)
-    return f"{share_text(one.crashes)} ({low} to {high})"
+    return f"{told} ({low} to {high})"
 
 
 def _gained(one: Result) -> str:

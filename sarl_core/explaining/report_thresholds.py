@@ -345,11 +345,13 @@ def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
             )
         failures = number(reported.get("failures"))
         shares = [number(100 * share) for share in _shares(reported)]
+        cut = number(reported.get("cut"))
+        over = f", {cut} of which were cut off before they could fail" if cut else ""
         if failures is not None and episodes is not None and len(shares) == 2:
             found.append(
                 (
                     "Failures of an agent that follows the rules",
-                    f"{failures} of {episodes} episodes (95 % interval {shares[0]} to "
+                    f"{failures} of {episodes} episodes{over} (95 % interval {shares[0]} to "
                     f"{shares[1]} %)",
                 )
             )

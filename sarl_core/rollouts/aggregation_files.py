@@ -186,6 +186,6 @@ def _reported(found: Aggregation) -> dict[str, Any] | None:
         **{
             name: value if isinstance(value, int) else round(value, 4)
             for name, value in episodes.summary().items()
-            if name.startswith("failure") or name in ("intervention_rate", "freedom")
+            if name.startswith("failure") or name in ("cut", "intervention_rate", "freedom")
         },
     }

@@ -204,14 +204,15 @@ def crashed(episodes: Episodes, env_id: str) -> NDArray[np.bool_]:
 
 
 def crash_rate(episodes: Episodes, env_id: str) -> float:
-    """Share of the episodes that ended by failure, as `crashed` says.
+    """Share of the episodes that ended by failure, as `crashed` says; see `Episodes.failures`.
 
     Args:
         episodes: E finished episodes.
         env_id: Their environment.
 
     Returns:
-        0 to 1; NaN where it is not known which ends are failures.
+        0 to 1; NaN where it is not known which ends are failures. Where episodes were cut off, the
+        least that it can be.
     """
     if not failure_known(env_id):
         return float("nan")

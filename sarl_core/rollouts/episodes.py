@@ -59,7 +59,7 @@ class Episodes:
             (E,) int64; none where not given.
         invalid: Steps at which the action passed because the observation was no state or the
             action none that there is, (E,) int64; None where no shield lets them pass.
-        cut: Whether that was the run's, for it had no end of its own, (E,) bool; none where not
+        cut: Whether that was the run's, before the episode's own end, (E,) bool; none where not
             given.
         freedom: What the rules left the agent to choose from, mean over the steps, 0 to 1, (E,);
             NaN where not given.
@@ -142,10 +142,14 @@ class Episodes:
 
     @cached_property
     def failures(self) -> Rate | None:
-        """How many ended by failure; None where it is not known which ends are some."""
+        """How many ended by failure; None where it is not known which ends are some.
+
+        Whether an episode that was cut off would have failed later is not known: then the rate is
+        the least that it can be.
+        """
         if not failure_known(self.env_id):
             return None
-        return rate_of(self.failed)
+        return rate_of(self.failed, self.cut)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
@@ -156,27 +160,19 @@ class Episodes:
     def cost(self) -> NDArray[np.float64]:
         """What each episode cost, (E,): what the environment said; else 1 for a failure.
 
-        NaN where neither is known.
+        NaN where neither is known, as of an episode that was cut off before it could fail.
         """
         if not np.isnan(self.costs).any() or self.failures is None:
             return self.costs
-        return self.failed.astype(np.float64)
+        return np.where(self.cut, np.nan, self.failed)
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a person should know of how they came about, as clauses."""
-        count = int(self.cut.sum())
-        if not count:
+        if not self.cut.any():
             return self.notes
-        longest = int(self.lengths[self.cut].max())
-        who = "the episode" if len(self) == 1 else f"{count} of the {len(self)} episodes"
-        if 1 < len(self) == count:
-            who = f"all {count} episodes"
-        return (
-            *self.notes,
-            f"{who} had no end and {'was' if count == 1 else 'were'} cut off after {longest:,} "
-            "steps (max_steps), so the return counts these alone",
-        )
+        steps = int(self.lengths[self.cut].max())
+        return (*self.notes, cut_text(self.env_id, int(self.cut.sum()), len(self), steps))
 
     def summary(self) -> dict[str, float]:
         """What the episodes say together (``evaluate --json``).
@@ -186,9 +182,10 @@ class Episodes:
             steps `intervention_rate` and `coverage`; and `outside_rate`, the share of the
             interventions, those that were withheld with them, outside the rules' data. Where
             invalid steps pass, `invalid_steps`, how many there were; where there are some, `cut`,
-            the number of episodes without an end. Where they are known, `freedom` and `cost`,
+            the number of episodes that were cut off. Where they are known, `freedom` and `cost`,
             means over the steps and over the episodes, and `failures`, `failure_rate`,
-            `failure_low` and `failure_high` (95 %, Clopper and Pearson's).
+            `failure_low` and `failure_high` (95 %, Clopper and Pearson's). With `cut`, the rate is
+            the least that it can be, and the interval leaves room for all that were cut off.
         """
         returns = self.statistics
         steps = float(self.lengths.sum())
@@ -241,7 +238,7 @@ class Episodes:
             episodes, self.failed.tolist(), self.cost.tolist(), self.cut.tolist(), strict=True
         ):
             if self.failures is not None:
-                episode["failed"] = fell
+                episode["failed"] = None if cut else fell
             if not np.isnan(cost):
                 episode["cost"] = cost
             if cut:
@@ -249,7 +246,12 @@ class Episodes:
         if self.invalid is not None:
             for episode, count in zip(episodes, self.invalid.tolist(), strict=True):
                 episode["invalid"] = count
-        return {"episodes": episodes, "summary": self.summary(), "notes": list(self.remarks)}
+        return {
+            "environment": self.env_id,
+            "episodes": episodes,
+            "summary": self.summary(),
+            "notes": list(self.remarks),
+        }
 
     def to_frame(self) -> pd.DataFrame:
         """One row an episode: its columns, and how it ended."""
@@ -279,6 +281,35 @@ _COLUMNS = tuple(
     for column in fields(Episodes)
     if column.name not in ("env_id", "agent", "steps", "flips", "notes", "invalid")
 )
+
+
+def cut_text(
+    env_id: str, count: int, of: int, steps: int | None = None, *, episodes: str = "episodes"
+) -> str:
+    """What is to be said of episodes that were cut off.
+
+    Args:
+        env_id: Environment.
+        count: How many were, at least 1.
+        of: How many there are.
+        steps: After how many steps; None if not known.
+        episodes: What they are, in the plural.
+
+    Returns:
+        A clause.
+    """
+    who, be = f"{count:,} of the {of:,} {episodes}", "were"
+    if of == count:
+        who = f"the {episodes.removesuffix('s')}" if of == 1 else f"all {of:,} {episodes}"
+    alone, it = "their returns count these steps alone", "they"
+    if count == 1:
+        be, alone, it = "was", "its return counts these steps alone", "it"
+    after = f" after {steps:,} step{'' if steps == 1 else 's'}" if steps is not None else ""
+    later = f", and whether {it} would have failed later is not known"
+    return (
+        f"{who} {be} cut off{after} (max_steps), before {'its' if count == 1 else 'their'} end: "
+        f"{alone}{later if failure_known(env_id) else ''}"
+    )
 
 
 def join(pieces: Sequence[Episodes]) -> Episodes:

@@ -61,9 +61,37 @@ def failure_known(env_id: str) -> bool:
         env_id: Environment.
 
     Returns:
-        False for an environment that this project knows nothing of.
+        False for an environment that this project knows nothing of, and for one that cannot fail.
     """
-    return _failure(env_id) is not None
+    return not no_failures_text(env_id)
+
+
+def cannot_fail(env_id: str) -> bool:
+    """Whether no end of an environment's episodes is a failure.
+
+    Args:
+        env_id: Environment.
+
+    Returns:
+        False where it is not known.
+    """
+    return _failure(env_id) == _NO_END
+
+
+def no_failures_text(env_id: str) -> str:
+    """Why nothing is said of failures in an environment.
+
+    Args:
+        env_id: Environment.
+
+    Returns:
+        A clause; "" where it is known which ends of its episodes are failures.
+    """
+    if _failure(env_id) is None:
+        return "nothing says which ends of this environment's episodes are failures"
+    if cannot_fail(env_id):
+        return "no end of this environment's episodes is a failure"
+    return ""
 
 
 def _failure(env_id: str) -> str | float | None:

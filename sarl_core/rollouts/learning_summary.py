@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -70,6 +70,8 @@ class ArmSummary:
             ends of an episode are failures.
         good: Whether, without a shield after learning, its mean return is at least that of the
             same learner that never had one; likewise.
+        failures_known: Whether it is known which ends of an episode are failures; else nothing is
+            to be said of crashes.
     """
 
     arm: LearningArm
@@ -84,6 +86,7 @@ class ArmSummary:
     shielded: TrialSummary | None
     safe: bool | None = None
     good: bool | None = None
+    failures_known: bool = True
 
     @property
     def mean_crashes(self) -> float:
@@ -96,18 +99,22 @@ class ArmSummary:
             "arm": self.arm.name,
             "title": self.arm.title,
             "seeds": list(self.seeds),
-            "crashes": list(self.crashes),
+            "crashes": list(self.crashes) if self.failures_known else None,
             "episodes": list(self.episodes),
-            "mean_crashes": self.mean_crashes,
+            "mean_crashes": self.mean_crashes if self.failures_known else None,
             "learning_return": _number(self.learning_return),
             "late_return": _number(self.late_return),
             "intervention_rate": _number(self.intervention_rate),
             "late_intervention_rate": _number(self.late_intervention_rate),
-            "alone": _trial_dict(self.alone),
-            "shielded": None if self.shielded is None else _trial_dict(self.shielded),
+            "alone": self._trials(self.alone),
+            "shielded": None if self.shielded is None else self._trials(self.shielded),
             "safe": self.safe,
             "good": self.good,
         }
+
+    def _trials(self, trials: TrialSummary) -> dict[str, Any]:
+        found = _trial_dict(trials)
+        return found if self.failures_known else found | {"crash_rate": None}
 
 
 def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
@@ -121,7 +128,7 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
     """
     found = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
     if not failure_known(study.env_id):
-        return tuple(found.values())
+        return tuple(replace(summary, failures_known=False) for summary in found.values())
     return tuple(_judged(summary, found.get(summary.arm.alone)) for summary in found.values())
 
 
@@ -191,8 +198,6 @@ def _returns(groups: tuple[tuple[float, ...], ...]) -> Interval:
 
 
 def _judged(summary: ArmSummary, alone: ArmSummary | None) -> ArmSummary:
-    from dataclasses import replace
-
     if alone is None or not summary.arm.shielded:
         return summary
     return replace(

@@ -27,8 +27,8 @@ class ShieldEffect:
         episodes: How many pairs, E.
         returns: Return with the shield less the return without it, mean over the pairs, and
             the 95 % interval of that mean by the same test (`sign_flip_interval`).
-        failures: The same of failures, as a share of the episodes; None where it is not known
-            which ends are some.
+        failures: The same of failures, as a share of the pairs that were not cut off; None where
+            it is not known which ends are some, or all were cut off.
         fell: Episodes that fail with the shield and not without it; None likewise.
         spared: Episodes that fail without it and not with it; None likewise.
         return_p: How often chance alone would bring such a difference in return, both tests
@@ -74,9 +74,11 @@ def shield_effect(alone: Episodes, shielded: Episodes) -> ShieldEffect:
             "the episodes with and without the shield are not of the same seeds; run both with "
             "the same --seed and --episodes"
         )
-    known = alone.failures is not None
+    # Whether an episode that was cut off would have failed later, nobody knows.
+    ended = ~(alone.cut | shielded.cut)
+    known = alone.failures is not None and bool(ended.any())
     gained = shielded.returns - alone.returns
-    worse = shielded.failed.astype(np.float64) - alone.failed
+    worse = np.where(ended, shielded.failed.astype(np.float64) - alone.failed, 0.0)
     both = np.stack([gained, worse])
     tested = both.any(axis=1)
     adjusted = np.ones(_TESTS)
@@ -90,7 +92,7 @@ def shield_effect(alone: Episodes, shielded: Episodes) -> ShieldEffect:
     return ShieldEffect(
         episodes=len(alone),
         returns=sign_flip_interval(gained),
-        failures=sign_flip_interval(worse) if known else None,
+        failures=sign_flip_interval(worse[ended]) if known else None,
         fell=int((worse > 0).sum()) if known else None,
         spared=int((worse < 0).sum()) if known else None,
         return_p=return_p,

@@ -55,11 +55,13 @@ class Rate:
     """How often something happened, and how sure one can be of it.
 
     Attributes:
-        count: How often.
+        count: How often, as far as is known.
         of: Among how many.
-        rate: The share.
-        low: Lower end of its exact 95 % interval (Clopper and Pearson's).
-        high: Upper end.
+        rate: The share; where some are unknown, the least that it can be.
+        low: Lower end of its exact 95 % interval (Clopper and Pearson's), as if it had happened in
+            none of the unknown ones.
+        high: Upper end, as if it had in all of them.
+        unknown: Of how many it is not known.
     """
 
     count: int
@@ -67,13 +69,15 @@ class Rate:
     rate: float
     low: float
     high: float
+    unknown: int = 0
 
 
-def rate_of(happened: ArrayLike) -> Rate:
+def rate_of(happened: ArrayLike, unknown: ArrayLike = False) -> Rate:
     """A share of independent episodes with its exact interval.
 
     Args:
         happened: One truth value an episode, shape (E,), E at least 1.
+        unknown: Whether it is not known of an episode, (E,) or one for all.
 
     Returns:
         The share; its interval covers in at least 95 % of all cases, however rare it is.
@@ -81,10 +85,12 @@ def rate_of(happened: ArrayLike) -> Rate:
     from scipy.special import betaincinv
 
     values = np.asarray(happened, dtype=np.bool_).reshape(-1)
-    count, of = int(values.sum()), len(values)
+    open_ends = np.broadcast_to(np.asarray(unknown, dtype=np.bool_), values.shape)
+    count, of = int((values & ~open_ends).sum()), len(values)
+    most = int((values | open_ends).sum())
     low = 0.0 if count == 0 else float(betaincinv(count, of - count + 1, 0.025))
-    high = 1.0 if count == of else float(betaincinv(count + 1, of - count, 0.975))
-    return Rate(count, of, count / of, low, high)
+    high = 1.0 if most == of else float(betaincinv(most + 1, of - most, 0.975))
+    return Rate(count, of, count / of, low, high, most - count)
 
 
 def mean_interval(values: ArrayLike) -> MeanInterval:

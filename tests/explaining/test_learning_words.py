@@ -115,6 +115,29 @@ def test_without_the_learner_alone_there_is_no_verdict() -> None:
     assert verdict(summaries[0]) == "–"
 
 
+@pytest.mark.parametrize(
+    ("env_id", "why"),
+    [
+        ("Pendulum-v1", "No end of this environment's episodes is a failure, so"),
+        ("mine:Own-v0", "Nothing says which ends of this environment's episodes are failures, so"),
+    ],
+)
+def test_where_nothing_is_known_of_failures_nothing_is_said(
+    study: LearningStudy, env_id: str, why: str
+) -> None:
+    other = replace(study, env_id=env_id)
+    summaries = summarise_study(other)
+    told = finding(other, summaries)
+    assert told[0].startswith(why)
+    assert not any("crash" in text for text in told)
+    places = [HEADINGS.index(name) for name in HEADINGS if "rash" in name]
+    assert len(places) == 2
+    assert {row[place] for row in table_rows(summaries) for place in places} == {"–"}
+    document = summaries[0].to_dict()
+    assert document["crashes"] is document["mean_crashes"] is None
+    assert document["alone"]["crash_rate"] is None
+
+
 def test_an_empty_study_says_so() -> None:
     assert finding(a_study(), ()) == ["No run is finished yet."]
 

@@ -106,9 +106,17 @@ def test_in_an_environment_that_knows_only_failure_every_end_is_one() -> None:
 
 
 @pytest.mark.parametrize("env_id", ["MountainCar-v0", "MountainCarContinuous-v0", "Acrobot-v1"])
-def test_who_reaches_the_goal_has_not_crashed(env_id: str) -> None:
-    episodes = ended([True, False, True], [0.0, -1.0, 100.0])
-    assert crash_rate(episodes, env_id) == 0.0
+def test_who_reaches_the_goal_has_not_crashed_and_nothing_is_said_of_failures(env_id: str) -> None:
+    lengths = np.array([5, 5, 5])
+    episodes = replace(
+        ended([True, False, True], [0.0, -1.0, 100.0]), env_id=env_id, lengths=lengths
+    )
+    assert not crashed(episodes, env_id).any()
+    assert np.isnan(crash_rate(episodes, env_id))
+    assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
+    assert not {"failures", "failure_rate", "cost"} & set(episodes.summary())
+    assert "failed" not in episodes.to_dict()["episodes"][0]
+    assert "crash" not in verdict("novice", "the rules", episodes, episodes)
 
 
 def test_where_failures_are_not_known_none_is_claimed() -> None:

@@ -1,6 +1,7 @@
 """Episodes without an end are cut off where one says, and it is told apart and said."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -8,11 +9,14 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from scipy.stats import binomtest
 
 from sarl_core.cli import main
 from sarl_core.errors import InputError
+from sarl_core.explaining.report_comparison import compared, results_from_text
 from sarl_core.rollouts.episodes import join, rollout
 from sarl_core.rollouts.rendering import render_episode
+from sarl_core.rollouts.shield_effect import shield_effect
 
 
 class Endless(gymnasium.Env):
@@ -53,7 +57,10 @@ def test_the_limit_of_the_run_is_told_from_that_of_the_environment():
     assert [one.get("cut", False) for one in document["episodes"]] == found.cut.tolist()
     assert document["summary"]["cut"] == 4
     (note,) = document["notes"]
-    assert "4 of the 6 episodes had no end and were cut off after 20 steps" in note
+    assert note == (
+        "4 of the 6 episodes were cut off after 20 steps (max_steps), before their end: their "
+        "returns count these steps alone"
+    )
     halves = join([found.part(0, 3), found.part(3, 6)])
     assert halves.cut.tolist() == found.cut.tolist()
     assert found.part(0, 1).remarks == ()
@@ -89,3 +96,74 @@ def test_both_commands_say_it(capsys, tmp_path: Path, command: str):
     assert "cut off after 11 steps" in document["notes"][0]
     assert main(run) == 0
     assert "cut off after 11 steps" in capsys.readouterr().out
+
+
+def test_whether_a_cut_episode_would_have_failed_is_not_known():
+    found = rollout("CartPole-v1", "novice", episodes=12, seed=0, max_steps=20, keep_steps=False)
+    whole = rollout("CartPole-v1", "novice", episodes=12, seed=0, keep_steps=False)
+    document, summary = found.to_dict(), found.summary()
+    ended = 12 - summary["cut"]
+    assert 0 < summary["failures"] == ended < 12
+    failed = [one["failed"] for one in document["episodes"]]
+    assert failed == [None if cut else True for cut in found.cut.tolist()]
+    assert [one.get("cost") for one in document["episodes"]] == [f and 1.0 for f in failed]
+    assert "cost" not in summary
+    least = binomtest(ended, 12).proportion_ci(method="exact").low
+    assert summary["failure_rate"] == ended / 12
+    assert (summary["failure_low"], summary["failure_high"]) == (pytest.approx(least), 1.0)
+    assert whole.summary()["failure_rate"] == 1.0
+    assert "whether they would have failed later is not known" in document["notes"][0]
+
+
+def test_pairs_in_which_one_was_cut_do_not_tell_of_failures():
+    short, long = (
+        rollout("CartPole-v1", "novice", episodes=12, seed=0, max_steps=limit, keep_steps=False)
+        for limit in (20, 500)
+    )
+    found = shield_effect(short, long)
+    assert (found.fell, found.spared, found.failure_p) == (0, 0, 1.0)
+    none = replace(short, cut=np.ones(12, dtype=np.bool_))
+    assert shield_effect(none, long).failures is None
+
+
+def test_it_is_said_in_words(capsys):
+    run = ["evaluate", "--env", "CartPole-v1", "--agent", "novice", "--seed", "0"]
+    assert main([*run, "--episodes", "12", "--max-steps", "20"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    found = rollout("CartPole-v1", "novice", episodes=12, seed=0, max_steps=20, keep_steps=False)
+    ended = 12 - int(found.cut.sum())
+    assert f"failures {ended} of the {ended} that ended, at least" in told
+    assert main([*run, "--episodes", "1", "--max-steps", "1"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "failures not known: no episode ran to its end" in told
+    assert (
+        "note: the episode was cut off after 1 step (max_steps), before its end: its return counts "
+        "these steps alone, and whether it would have failed later is not known"
+    ) in told
+
+
+def test_what_cannot_fail_is_told_apart_from_what_is_not_known(capsys):
+    for env_id, words in (
+        ("Pendulum-v1", "failures none: no end of this environment's episodes is a failure"),
+        (ENV, "failures not known: nothing says which ends of this environment's episodes are"),
+    ):
+        run = ["evaluate", "--env", env_id, "--agent", "novice", "--episodes", "1"]
+        assert main([*run, "--max-steps", "9"]) == 0
+        told = capsys.readouterr().out
+        assert words in " ".join(told.split())
+        assert "would have failed" not in told
+
+
+def test_a_report_says_the_same_of_what_evaluate_printed(capsys):
+    run = ["evaluate", "--agent", "novice", "--seed", "0", "--json", "--episodes", "12"]
+    assert main([*run, "--env", "CartPole-v1", "--max-steps", "20"]) == 0
+    text = capsys.readouterr().out
+    count = json.loads(text)["summary"]["cut"]
+    shown = compared(results_from_text(text, "novice.json"))
+    assert shown is not None
+    assert shown.rows[0].more[0].startswith("at least ")
+    assert any(f"novice: {count} of the 12 episodes were cut off" in one for one in shown.sentences)
+    assert main([*run, "--env", "Pendulum-v1"]) == 0
+    shown = compared(results_from_text(capsys.readouterr().out, "novice.json"))
+    assert shown is not None
+    assert shown.rows[0].more[0] == "cannot fail"
