@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 _LONGEST = 480  # characters of a message; nobody reads more
 _QUOTED = 40  # of what a message repeats from a file
-# Signs that move a terminal's cursor, turn the direction of text, or cannot be written as UTF-8.
-_UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 class SarlError(Exception):
@@ -35,32 +32,43 @@ class WorkError(SarlError):
     """The input was fine and the work failed all the same. The command line exits with 1."""
 
 
-def quoted(value: object) -> str:
+def quoted(value: object, longest: int = _QUOTED) -> str:
     """A value from a file as a sentence quotes it.
 
     Args:
         value: Whatever was read.
+        longest: Characters of it.
 
     Returns:
         A text in quotation marks, a number as Python writes it, anything else in words; short, on
         one line, and without signs that are not for people.
     """
     if isinstance(value, bytes):
-        value = value[: 4 * _QUOTED].decode(errors="replace")
+        value = value[: 4 * longest].decode(errors="replace")
     if isinstance(value, str):
-        return repr(_short(_seen(value[: 2 * _QUOTED])))
+        return repr(_short(_seen(value[: 2 * longest]), longest))
     if isinstance(value, (list, tuple)):
         return "a list"
     if isinstance(value, Mapping):
         return "an object"
-    if isinstance(value, int) and abs(value) > 10**_QUOTED:  # Python may refuse to write it
+    if isinstance(value, int) and abs(value) > 10**longest:  # Python may refuse to write it
         return "far too large"
-    return _short(_seen(repr(value)))
+    return _short(_seen(repr(value)), longest)
 
 
 def _seen(text: str) -> str:
-    return _UNSEEN.sub(lambda sign: " " if sign[0].isspace() else "\N{REPLACEMENT CHARACTER}", text)
+    """A text without signs that are not for people, nor for Python, which would escape them.
+
+    They move a terminal's cursor, turn the direction of text, are not to be seen at all, or cannot
+    be written as UTF-8.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() else " " if sign.isspace() else "\N{REPLACEMENT CHARACTER}"
+        for sign in text
+    )
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _QUOTED else f"{text[:_QUOTED]}..."
+def _short(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[:longest]}..."

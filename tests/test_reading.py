@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pickle
+import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sarl_core.documents import parse_json
@@ -33,10 +34,13 @@ def test_a_message_is_short_and_on_one_line_whatever_it_repeats(text):
         lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
     )
 )
+@example(value="\xad")
+@example(value="\u200b")
+@example(value="\U000e0001")
 def test_what_is_quoted_is_short_and_for_people(value):
     text = quoted(value)
     assert len(text) <= 90
-    assert "\\x" not in text.replace("\\\\", "")
+    assert not re.search(r"\\[xuUN]", text.replace("\\\\", ""))
     assert InputError(text).args == (text,)
 
 

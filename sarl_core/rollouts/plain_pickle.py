@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 MAX_BYTES = 16 * 2**20
 _MAX_INSTRUCTIONS = 100_000  # statistics of observations take some hundred
@@ -104,7 +104,7 @@ def shown(text: str) -> str:
     Returns:
         At most some hundred characters.
     """
-    return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}...")
+    return quoted(text, _LONGEST_SHOWN)
 
 
 class _Machine:
