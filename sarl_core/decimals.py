@@ -58,6 +58,18 @@ def decimal_within(value: float, error: float, *, fewest: int = 3) -> float:
     return value if found is None else found
 
 
+def float32_decimal(value: float) -> float:
+    """The shortest decimal number that is the same in 32 bits.
+
+    Args:
+        value: A number of 32 bits, or one near it.
+
+    Returns:
+        As 0.1, of 0.10000000149011612.
+    """
+    return float(str(np.float32(value)))
+
+
 def decimal_on_scale(value: float, low: float, high: float) -> float:
     """A decimal number near a value on a scale.
 

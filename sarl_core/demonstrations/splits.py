@@ -147,13 +147,18 @@ def written_threshold(
 
 
 def written_value(
-    value: float, thresholds: Sequence[float] = (), *, fewest: int = FEWEST_DIGITS
+    value: float,
+    thresholds: Sequence[float] = (),
+    *,
+    within: tuple[float, float] = (-math.inf, math.inf),
+    fewest: int = FEWEST_DIGITS,
 ) -> float:
     """The number that is written for a value, beside thresholds that are written too.
 
     Args:
         value: Any finite number.
-        thresholds: As they are written.
+        thresholds: As they are written, or other values.
+        within: Two numbers between which what is written lies, too, if there is such a number.
         fewest: Number of significant digits to begin with.
 
     Returns:
@@ -164,5 +169,10 @@ def written_value(
     room = _NEARER * min(ways, default=math.inf)
     # What lies on a threshold is at most the threshold, and so is what is written of it.
     most = value if value in thresholds else value + room
-    found = short_decimal(value, value - room, float(np.nextafter(most, math.inf)), fewest=fewest)
-    return value if found is None else found
+    least = value - room
+    for low, high in (within, (-math.inf, math.inf)):
+        above = float(np.nextafter(min(most, high), math.inf))
+        found = short_decimal(value, max(least, low), above, fewest=fewest)
+        if found is not None:
+            return found
+    return value

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
-from sarl_core.mining.written import limit_texts
+from sarl_core.mining.written import amount_text, limit_texts
 
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
@@ -230,6 +231,25 @@ def action_text(label: int, dimension: LabelledDimension) -> str:
     name = dimension.label_names[label]
     bare = name.lstrip("+-").replace(".", "", 1).isdigit()
     return f"{dimension.name} {name}" if bare else name
+
+
+def done_text(value: float, dimension: LabelledDimension, *, beside: Sequence[float] = ()) -> str:
+    """What was proposed or executed in one action dimension.
+
+    Args:
+        value: The action.
+        dimension: Whose it is.
+        beside: Other actions of the dimension that are shown with it.
+
+    Returns:
+        As "push right" or "torque -1.2"; two continuous actions that differ do not read the same.
+    """
+    if dimension.is_interval:
+        return f"{dimension.name} {amount_text(value, dimension, beside=beside)}"
+    label = dimension.label_of(value)
+    if not 0 <= label < dimension.n_labels:
+        return f"{dimension.name} {decimal_text(value)}"
+    return action_text(label, dimension)
 
 
 def label_text(label: int, dimension: LabelledDimension) -> str:

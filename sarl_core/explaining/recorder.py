@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.language import counted
-from sarl_core.explaining.replay import value_text
+from sarl_core.explaining.language import counted, done_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.step_filters import StepFilter
@@ -52,11 +51,18 @@ def recorder_columns(
     several = len(dimensions) > 1
     for index, dimension in enumerate(dimensions):
         before = f"{dimension.name}: " if several else ""
-        done = [value_text(value, dimension) for value in part.executed[:, index].tolist()]
+        proposed, executed = (one[:, index].tolist() for one in (part.proposed, part.executed))
+        done = [
+            done_text(value, dimension, beside=(other,))
+            for value, other in zip(executed, proposed, strict=True)
+        ]
         if rule_set is None:
             columns[_titled(f"{before}done")] = list(done)
             continue
-        wanted = [value_text(value, dimension) for value in part.proposed[:, index].tolist()]
+        wanted = [
+            done_text(value, dimension, beside=(other,))
+            for value, other in zip(proposed, executed, strict=True)
+        ]
         columns[_titled(f"{before}wanted")] = list(wanted)
         columns[_titled(f"{before}done")] = list(done)
         columns[_titled(f"{before}rule")] = [

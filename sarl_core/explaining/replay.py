@@ -14,12 +14,12 @@ from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import OUTSIDE_COLOUR
-from sarl_core.explaining.language import action_text, number_text, sentence
+from sarl_core.explaining.language import done_text, number_text, sentence
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.replay_figures import Track
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import RuleSet
-from sarl_core.mining.written import value_text as number_of
+from sarl_core.mining.written import value_text
 from sarl_core.rollouts.steps import StepTable
 
 
@@ -210,8 +210,8 @@ def step_view(
         views.append(
             ActionView(
                 dimension=dimension.name,
-                proposed=value_text(float(proposed), dimension),
-                executed=value_text(float(executed), dimension),
+                proposed=done_text(float(proposed), dimension, beside=(float(executed),)),
+                executed=done_text(float(executed), dimension, beside=(float(proposed),)),
                 proposed_label=dimension.label_of(float(proposed)),
                 executed_label=dimension.label_of(float(executed)),
                 changed=bool(proposed != executed) and steps.invalid[row] is None,
@@ -235,7 +235,7 @@ def step_view(
     state = tuple(
         (
             feature.name,
-            number_of(
+            value_text(
                 float(value),
                 rule_set.source.features[index] if rule_set is not None else feature,
                 [bounds for bounds in asked if bounds.feature == index],
@@ -278,9 +278,9 @@ def step_texts(
             strict=True,
         )
         for line, (proposed, executed, rule, invalid) in zip(lines, pairs, strict=True):
-            done = plain(value_text(executed, dimension))
+            done = plain(done_text(executed, dimension, beside=(proposed,)))
             if proposed != executed and invalid is None:
-                wanted = plain(value_text(proposed, dimension))
+                wanted = plain(done_text(proposed, dimension, beside=(executed,)))
                 line.append(f"{prefix}wanted {wanted}, done {done}")
             else:
                 line.append(f"{prefix}{done}")
@@ -310,24 +310,6 @@ def margin_text(margin: float) -> str:
         f"Smallest distance to a threshold on the way: {number_text(margin)} "
         "(in that feature's unit)"
     )
-
-
-def value_text(value: float, dimension: LabelledDimension) -> str:
-    """A recorded action in words.
-
-    Args:
-        value: What was proposed or executed in one dimension.
-        dimension: That dimension.
-
-    Returns:
-        As "push right" or "torque -1.2".
-    """
-    if dimension.is_interval:
-        return f"{dimension.name} {number_text(value)}"
-    label = dimension.label_of(value)
-    if not 0 <= label < dimension.n_labels:
-        return f"{dimension.name} {value:g}"
-    return action_text(label, dimension)
 
 
 def _edges(low: float, high: float, divider: int) -> NDArray[np.float64]:

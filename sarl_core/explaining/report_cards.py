@@ -16,8 +16,8 @@ from sarl_core.explaining.evidence_words import what_tells
 from sarl_core.explaining.language import (
     action_text,
     counted,
+    done_text,
     is_flag,
-    label_text,
     number_text,
     sentence,
     share_text,
@@ -287,11 +287,7 @@ def _picture(
 ) -> Picture:
     dimension, features = rule_set.actions[rule.dimension], rule_set.source.features
     value = frame.executed[rule.dimension].item()
-    did = (
-        f"{dimension.name} {number_text(float(value))}"
-        if dimension.is_interval
-        else label_text(dimension.label_of(value), dimension)
-    )
+    did = done_text(value, dimension)
     followed = dimension.label_of(value) == rule.action
     name = frame.player[:1].upper() + frame.player[1:]
     return Picture(

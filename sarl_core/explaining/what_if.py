@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.language import action_text, is_flag, number_text, short_condition
+from sarl_core.explaining.language import done_text, is_flag, number_text, short_condition
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds, Rule, RuleSet, node_of
@@ -131,30 +133,32 @@ def exact_text(value: float) -> str:
     Returns:
         As "0.020938473".
     """
-    return np.format_float_positional(np.float32(value), trim="-")
+    return decimal_text(float32_decimal(value))
 
 
-def executed_text(values: tuple[float, ...], dimensions: tuple[LabelledDimension, ...]) -> str:
+def executed_text(
+    values: Sequence[float],
+    dimensions: Sequence[LabelledDimension],
+    *,
+    beside: Sequence[float] | None = None,
+) -> str:
     """An action in words.
 
     Args:
         values: One an action dimension.
         dimensions: The m action dimensions.
+        beside: Another action that is shown with it.
 
     Returns:
-        As "fire main engine" or "hip −0.5, knee 0.25".
+        As "fire main engine" or "hip -0.5, knee 0.25".
     """
     parts = []
-    for value, dimension in zip(values, dimensions, strict=True):
+    for value, other, dimension in zip(values, beside or values, dimensions, strict=True):
         label = dimension.label_of(value)
-        if dimension.is_interval:
-            parts.append(f"{dimension.name} {number_text(value)}")
-        elif not 0 <= label < dimension.n_labels:
-            parts.append(f"{dimension.name} {value:g}")
-        elif len(dimensions) > 1:
+        if len(dimensions) > 1 and not dimension.is_interval and 0 <= label < dimension.n_labels:
             parts.append(f"{dimension.name}: {dimension.label_names[label]}")
         else:
-            parts.append(action_text(label, dimension))
+            parts.append(done_text(value, dimension, beside=(other,)))
     return ", ".join(parts)
 
 

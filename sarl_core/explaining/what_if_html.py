@@ -104,10 +104,12 @@ def decision_html(
         badges = badge("No rule applies")
     if decision.outside:
         badges += badge("Outside the data", "beyond")
-    proposed, executed = (
-        executed_text(tuple(np.asarray(values, dtype=float).reshape(-1).tolist()), rule_set.actions)
+    wanted, done = (
+        np.asarray(values, dtype=float).reshape(-1).tolist()
         for values in (decision.proposed, decision.executed)
     )
+    proposed = executed_text(wanted, rule_set.actions, beside=done)
+    executed = executed_text(done, rule_set.actions, beside=wanted)
     said = (
         f"The agent wants {proposed}; executed is {executed}"
         if decision.intervened

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.decimals import decimal_text, decimal_within
+from sarl_core.decimals import decimal_text, float32_decimal, short_decimal
 from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
 from sarl_core.errors import InputError
 
@@ -75,6 +76,11 @@ class LabelledDimension:
         """The edges between the intervals."""
         return self.edges[1:-1]
 
+    @cached_property
+    def _written_edges(self) -> list[str]:
+        """All edges, as the names of labels say them."""
+        return _edge_texts(self.edges)
+
     def centre(self, label: int) -> float:
         """The middle of an interval.
 
@@ -102,6 +108,21 @@ class LabelledDimension:
             return bisect_right(self.inner_edges, value)
         return int(value) - self.first
 
+    def written_interval(self, value: float) -> tuple[float, float]:
+        """The interval of one action as it is written.
+
+        Args:
+            value: An action of this continuous dimension.
+
+        Returns:
+            Its ends; the infinite ones if there is one label, which nothing lies beside.
+        """
+        if self.n_labels == 1:
+            return -math.inf, math.inf
+        label = self.label_of(value)
+        low, high = self._written_edges[label : label + 2]
+        return float(low), float(high)
+
     def labels_of(self, values: NDArray[np.generic]) -> NDArray[np.int64]:
         """The labels of many actions, as `label_of`.
 
@@ -118,15 +139,24 @@ class LabelledDimension:
 
 
 def _edge_texts(edges: Sequence[float]) -> list[str]:
-    """Edges with three significant digits, or with more where intervals are narrow for those."""
-    width = min(high - low for low, high in pairwise(edges))
+    """Edges with three significant digits, or with more where intervals are narrow for those.
+
+    The outer ones are rounded outwards: what lies between them lies between what is written, too.
+    """
+    low, high = edges[0], edges[-1]
+    if low == high:
+        return [decimal_text(float32_decimal(low))] * 2
+    width = min(after - before for before, after in pairwise(edges))
     texts = []
     for edge in map(float, edges):
-        if abs(edge) < _ROUNDING * width:
+        error = _EDGE_ERROR * width
+        least = edge if edge == high else edge - error
+        most = edge if edge == low else edge + error
+        if abs(edge) < _ROUNDING * width and least <= 0.0 <= most:
             texts.append("0")
             continue
-        room = _EDGE_ERROR * width if width > 0 else abs(edge)  # nothing to tell a single one from
-        texts.append(decimal_text(decimal_within(edge, room)))
+        found = short_decimal(edge, least, float(np.nextafter(most, math.inf)), fewest=3)
+        texts.append(decimal_text(edge if found is None else found))
     return texts
 
 

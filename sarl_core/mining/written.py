@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.splits import written_threshold, written_value
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Bounds
 
 
@@ -54,11 +55,35 @@ def value_text(value: float, feature: Feature, shown: Iterable[Bounds]) -> str:
         As "293.4": three significant digits, more where it takes them to stay on its side of
         each bound.
     """
-    if math.isnan(value):
-        return "not a number"
-    if math.isinf(value):
-        return f"{'-' if value < 0 else ''}infinite"
+    if not math.isfinite(value):
+        return _no_number(value)
     limits = [
         float(limit) for bounds in shown for limit in limit_texts(bounds, feature, beside=(value,))
     ]
     return decimal_text(written_value(value, limits))
+
+
+def amount_text(
+    amount: float, dimension: LabelledDimension | None = None, *, beside: Sequence[float] = ()
+) -> str:
+    """A continuous action, proposed or executed.
+
+    Args:
+        amount: Any number, or none.
+        dimension: Its own, where the interval that it lies in may be shown, too.
+        beside: Other amounts that are shown with it.
+
+    Returns:
+        As "-0.333": three significant digits, more where it takes them to tell the amount from
+        those beside it, or not to leave its interval as that is written.
+    """
+    if not math.isfinite(amount):
+        return _no_number(amount)
+    low, high = (-math.inf, math.inf) if dimension is None else dimension.written_interval(amount)
+    others = [other for other in beside if math.isfinite(other) and other != amount]
+    return decimal_text(written_value(amount, others, within=(low, high)))
+
+
+def _no_number(value: float) -> str:
+    """What is said of NaN and of the infinite."""
+    return "not a number" if math.isnan(value) else f"{'-' if value < 0 else ''}infinite"

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.environments import EnvironmentDescription
+from sarl_core.mining.written import amount_text
 from sarl_core.rollouts.canvas import INKS, PAPER_INDEX, TRACK_INDEX, Canvas, fitted, wrapped
 from sarl_core.rollouts.film import Film
 from sarl_core.rollouts.steps import StepTable
@@ -221,8 +222,10 @@ class Panel:
         reasons = [self.describe_rule(int(self.steps.rules[step, index])) for index in changed]
         return Caption(
             "CHANGED",
-            f"{action_text(self.description, proposed, changed)} → "
-            f"{action_text(self.description, executed, changed, named=len(changed) > 1)}",
+            f"{action_text(self.description, proposed, changed, beside=executed)} → "
+            + action_text(
+                self.description, executed, changed, beside=proposed, named=len(changed) > 1
+            ),
             ("Outside the data behind it: " if outside else "") + "; ".join(reasons),
             True,
         )
@@ -267,14 +270,16 @@ def action_text(
     action: NDArray[np.int64] | NDArray[np.float32],
     dimensions: list[int] | None = None,
     *,
+    beside: NDArray[np.int64] | NDArray[np.float32] | None = None,
     named: bool = True,
 ) -> str:
-    """An action in words, as "fire main engine" or "torque −1.20".
+    """An action in words, as "fire main engine" or "torque −1.2".
 
     Args:
         description: Of the environment.
         action: Shape (m,).
         dimensions: Those to speak of; all where not given.
+        beside: Another action that is shown with it.
         named: Whether a continuous action's name is said.
 
     Returns:
@@ -288,7 +293,8 @@ def action_text(
             text = labels[int(action[index]) - description.label_first[index]]
             words.append(f"{name}: {text}" if several and named else text)
         else:
-            text = signed(float(action[index]), 2)
+            others = () if beside is None else (float(beside[index]),)
+            text = amount_text(float(action[index]), beside=others).replace("-", "−")
             words.append(f"{name} {text}" if named else text)
     return ", ".join(words)
 

@@ -99,6 +99,9 @@ def test_actions_in_words():
     torque = LabelledDimension.of_edges("torque", (-1.0, 0.0, 1.0))
     assert executed_text((-0.5,), (torque,)) == "torque -0.5"
     assert executed_text((0.0, 1.0), (PUSH, PUSH)) == "push: left, push: right"
+    wanted, done = (0.50004, 0.1), (0.5, 0.1)
+    assert executed_text(wanted, (torque, torque), beside=done) == "torque 0.50004, torque 0.1"
+    assert executed_text(done, (torque, torque), beside=wanted) == "torque 0.5, torque 0.1"
 
 
 def test_features_that_many_states_are_asked_about_come_first():

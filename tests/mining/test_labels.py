@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,6 +62,27 @@ def test_one_and_many_agree(values, divider):
     dimension = LabelledDimension.of_edges("x", edges)
     array = np.array(values, dtype=np.float32)
     assert dimension.labels_of(array).tolist() == [dimension.label_of(float(v)) for v in array]
+
+
+@given(
+    st.floats(-1e6, 1e6, width=32),
+    st.floats(0.0, 1e3, width=32),
+    st.integers(2, 9),
+)
+def test_no_shown_value_is_outside_what_is_written(low, width, divider):
+    high = float(np.float32(low + width))
+    (dimension,) = label_dimensions(continuous([low, high]), divider)
+    read = [tuple(map(float, name.split(" to "))) for name in dimension.label_names]
+    assert np.float32(read[0][0]) <= low
+    assert np.float32(read[-1][-1]) >= high
+    assert all(first[-1] == after[0] for first, after in pairwise(read))
+
+
+def test_a_single_shown_value_is_written_whole():
+    (dimension,) = label_dimensions(continuous([1000000.5] * 2))
+    assert dimension.label_names == ("1000000.5",)
+    (dimension,) = label_dimensions(continuous([0.1] * 2))
+    assert dimension.label_names == ("0.1",)
 
 
 @pytest.mark.parametrize("divider", [1, 0, -3, 101, 2.5])

@@ -317,7 +317,11 @@ def test_actions_in_words() -> None:
     assert action_text(tiny, np.array([1, 2])) == "action 0: 1, action 1: 2"
     assert action_text(tiny, np.array([1, 2]), [1]) == "action 1: 2"
     pendulum = describe_environment("Pendulum-v1")
-    assert action_text(pendulum, np.array([-1.2], np.float32)) == "torque −1.20"
+    assert action_text(pendulum, np.array([-1.2], np.float32)) == "torque −1.2"
+    tiny_torques = np.array([[0.0004], [0.0]], np.float32)
+    assert action_text(pendulum, tiny_torques[0], beside=tiny_torques[1]) == "torque 0.0004"
+    near = np.array([[0.5004], [0.5]], np.float32)
+    assert action_text(pendulum, near[0], beside=near[1]) == "torque 0.5004"
     assert (signed(-0.001, 2), signed(-1234.5, 1)) == ("0.00", "−1,234.5")
 
 
