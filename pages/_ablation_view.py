@@ -8,6 +8,7 @@ from typing import Any
 import streamlit as st
 from _ablations import Wanted
 from _rule_table import action_column
+from _settings import notes_notice
 from _words import escaped
 
 from sarl_core.explaining.ablation_figures import (
@@ -39,6 +40,7 @@ def show(found: Ablation, wanted: Wanted, *, at_work: bool, linked: str | None) 
         linked: The set under which its rules are found on the Rules page; None if they are not.
     """
     why = no_failures_text(found.base.env_id)
+    notes_notice(note for note in found.remarks if note not in found.base.notes)
     with st.grid(4, min_column_width=150):
         st.metric("Return, all rules", f"{found.base.returns.mean():,.1f}", border=True)
         st.metric(

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.commandline import terminal
+from sarl_core.commandline.answers import print_notes
 from sarl_core.commandline.inputs import read_agent, read_shield
 from sarl_core.commandline.options import (
     AgentName,
     Env,
     Json,
+    MaxSteps,
     Normalise,
     OnInvalidName,
     OutsideName,
@@ -52,6 +54,7 @@ def ablate(
     projection: ProjectionName = "centre",
     outside: OutsideName = "act",
     on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -94,6 +97,7 @@ def ablate(
             seed=seed,
             most=most,
             jobs=jobs or os.cpu_count() or 1,
+            max_steps=max_steps,
             progress=lambda done, total: advance(done, total),
         )
         if out is not None:
@@ -118,6 +122,7 @@ def _document(found: Ablation) -> dict[str, Any]:
         "without_difference": [rules[index].id for index in found.unused],
         "left_out": [rules[index].id for index in found.left_out],
         "episodes_run": found.played,
+        "notes": list(found.remarks),
     }
 
 
@@ -146,5 +151,6 @@ def _print(found: Ablation, out: Path | None) -> None:
             ],
         )
     terminal.print_lines([*ablation_text(found), *filter(None, [left_out_text(found)])])
+    print_notes(found.remarks)
     if out is not None:
         terminal.print_lines([f"Wrote {out}."])

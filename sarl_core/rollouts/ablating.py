@@ -14,8 +14,8 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.rollouts.ablation import MOST_RULES, Ablation, rules_to_take_out
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.comparison import crashed
-from sarl_core.rollouts.episodes import Episodes, join, run_seeds
-from sarl_core.rollouts.player import shield_for
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join, run_seeds
+from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.pool import LARGEST_PIECE, Found, Task, WorkerPool
 from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rule
@@ -27,6 +27,14 @@ _TOGETHER = 32  # rules whose episodes are handed over at once: the processes wa
 
 Runner = Callable[[Sequence[Task]], Iterator[Found]]
 """Runs tasks, as `WorkerPool.run` does."""
+
+
+class _Outcome(NamedTuple):
+    """Of an episode without a rule."""
+
+    gained: float
+    failed: bool
+    cut: bool
 
 
 class Step(NamedTuple):
@@ -51,9 +59,18 @@ class AblationRecord:
         agent: Chooses the actions.
         shield: With all its rules, in the order of the environment's features.
         seed: Of the first episode.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
+        notes: What is to be said of how rules and environment were matched, as clauses.
     """
 
-    def __init__(self, env_id: str, agent: Agent, shield: Shield, seed: int) -> None:
+    def __init__(
+        self,
+        env_id: str,
+        agent: Agent,
+        shield: Shield,
+        seed: int,
+        max_steps: int | None = None,
+    ) -> None:
         """Begin with nothing.
 
         Args:
@@ -61,23 +78,27 @@ class AblationRecord:
             agent: Chooses the actions.
             shield: With all its rules.
             seed: Of the first episode; episode i has seed + i.
+            max_steps: After which an episode is cut off.
 
         Raises:
             InputError: If the environment cannot be used, the shield is not for it, or there is
                 no rule to take out.
         """
-        shield = shield_for(env_id, shield)
+        _, fitted, self.notes = check_environment(env_id, shield)
+        assert fitted is not None
+        shield = fitted
         if not any(rule.enabled for rule in shield.rule_set.rules):
             raise InputError(
                 "the rule set has no rule in force that could be taken out; mine with lower "
                 "thresholds, or switch a rule on"
             )
         self.env_id, self.agent, self.shield, self.seed = env_id, agent, shield, seed
+        self.max_steps = max_steps
         self._lock = Lock()
         self._base: Episodes | None = None
         self._use: RuleUse | None = None
-        # For each rule that was taken out: episode to its return, and whether it failed.
-        self._without: dict[int, dict[int, tuple[float, bool]]] = {}
+        # For each rule that was taken out, by episode.
+        self._without: dict[int, dict[int, _Outcome]] = {}
         self._latest: tuple[tuple[int, int, int], Ablation] | None = None
 
     def run(self, episodes: int, most: int, runner: Runner) -> Iterator[Step]:
@@ -130,7 +151,14 @@ class AblationRecord:
 
     def _task(self, episodes: int, rule: int, which: tuple[int, ...]) -> Task:
         return Task(
-            self.env_id, self.agent, self.shield, self.seed, episodes, without=rule, which=which
+            self.env_id,
+            self.agent,
+            self.shield,
+            self.seed,
+            episodes,
+            without=rule,
+            which=which,
+            max_steps=self.max_steps,
         )
 
     def _run_base(self, episodes: int, runner: Runner) -> Iterator[Step]:
@@ -145,6 +173,7 @@ class AblationRecord:
             self.seed + have,
             episodes - have,
             keep_steps=True,
+            max_steps=self.max_steps,
         )
         for piece in _pieces(runner([task])):
             assert isinstance(piece.result, Episodes)
@@ -160,20 +189,27 @@ class AblationRecord:
             known = self.seed + have - int(fresh.seeds[0])
             if not 0 <= known < len(fresh):
                 return
-            bare = replace(fresh, steps=None).part(known, len(fresh))
+            # The rules were put in order before, so the episodes do not tell how.
+            notes = tuple(dict.fromkeys((*self.notes, *fresh.notes)))
+            bare = replace(fresh, steps=None, notes=notes).part(known, len(fresh))
             use = use.part(known, len(fresh))
             if self._base is None or self._use is None:
                 self._base, self._use = bare, use
             else:
                 self._base, self._use = join([self._base, bare]), join_use([self._use, use])
 
-    def _known(self, rule: int) -> dict[int, tuple[float, bool]]:
+    def _known(self, rule: int) -> dict[int, _Outcome]:
         with self._lock:
             return dict(self._without.get(rule, {}))
 
     def _keep(self, rule: int, found: Episodes) -> None:
         places = (found.seeds - self.seed).tolist()
-        outcomes = zip(found.returns.tolist(), crashed(found, self.env_id).tolist(), strict=True)
+        outcomes = map(
+            _Outcome,
+            found.returns.tolist(),
+            crashed(found, self.env_id).tolist(),
+            found.cut.tolist(),
+        )
         with self._lock:
             self._without.setdefault(rule, {}).update(zip(places, outcomes, strict=True))
 
@@ -196,7 +232,7 @@ class AblationRecord:
                 return self._latest[1]
             base, use = self._base.part(0, episodes), self._use.part(0, episodes)
             chosen, rest = rules_to_take_out(use, most)
-            finished, returns, failed, played = [], [], [], 0
+            finished, returns, failed, cut, played = [], [], [], [], 0
             for rule in chosen:
                 known = self._without.get(rule, {})
                 places = np.flatnonzero(use.matters[rule]).tolist()
@@ -206,8 +242,9 @@ class AblationRecord:
                 played += len(places)
                 returns.append(base.returns.copy())
                 failed.append(crashed(base, self.env_id).copy())
+                cut.append(base.cut.copy())
                 for place in places:
-                    returns[-1][place], failed[-1][place] = known[place]
+                    returns[-1][place], failed[-1][place], cut[-1][place] = known[place]
             shape = (len(finished), episodes)
             found = Ablation(
                 shield=self.shield,
@@ -216,6 +253,7 @@ class AblationRecord:
                 rules=tuple(finished),
                 returns=np.array(returns, dtype=np.float64).reshape(shape),
                 failed=np.array(failed, dtype=np.bool_).reshape(shape),
+                cut=np.array(cut, dtype=np.bool_).reshape(shape),
                 left_out=(*(rule for rule in chosen if rule not in finished), *rest),
                 played=played,
             )
@@ -233,6 +271,7 @@ def ablate(
     most: int = MOST_RULES,
     stochastic: bool = False,
     jobs: int = 1,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Ablation:
     """Take the rules of a shield out one by one, and run the same episodes again.
@@ -247,6 +286,8 @@ def ablate(
         most: Rules to take out at most: those that change the most actions.
         stochastic: Whether a trained policy is sampled.
         jobs: Processes; changes the speed, never the result.
+        max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where not
+            given.
         progress: Called with (episodes done, in all, as far as can be told); returning False
             stops.
 
@@ -262,11 +303,12 @@ def ablate(
         ("seed", seed, 0),
         ("most", most, 1),
         ("jobs", jobs, 1),
+        ("max_steps", MAX_STEPS if max_steps is None else max_steps, 1),
     ):
         if value < least:
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
-    record = AblationRecord(env_id, actor, shield, seed)
+    record = AblationRecord(env_id, actor, shield, seed, max_steps)
     pool = WorkerPool(jobs, gives_way=False) if jobs > 1 else None
     try:
         for done, total, _ in record.run(episodes, most, run_here if pool is None else pool.run):
@@ -296,7 +338,14 @@ def run_here(tasks: Sequence[Task]) -> Iterator[Found]:
             seeds = task.seeds[start : start + LARGEST_PIECE]
             yield Found(
                 index,
-                run_seeds(task.env_id, task.agent, shield, seeds, keep_steps=task.keep_steps),
+                run_seeds(
+                    task.env_id,
+                    task.agent,
+                    shield,
+                    seeds,
+                    keep_steps=task.keep_steps,
+                    max_steps=task.max_steps,
+                ),
             )
 
 

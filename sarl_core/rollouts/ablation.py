@@ -8,7 +8,7 @@ nothing there, exactly.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.rollouts.comparison import crashed
-from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.episodes import Episodes, cut_text
 from sarl_core.rollouts.failures import failure_known
 from sarl_core.rollouts.paired import holm, sign_flip_test
 from sarl_core.rollouts.rule_use import RuleUse
@@ -76,6 +76,8 @@ class Ablation:
         left_out: Indices of rules that matter and were not taken out, because others were used
             more, or the work is not finished.
         played: Episodes that were run without some rule.
+        cut: Whether they were cut off before their end, (K, E) bool, and so it is not known
+            whether they would have failed; none where not given.
     """
 
     shield: Shield
@@ -86,9 +88,12 @@ class Ablation:
     failed: NDArray[np.bool_]
     left_out: tuple[int, ...]
     played: int
+    cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
+        if not len(self.cut):
+            object.__setattr__(self, "cut", np.zeros_like(self.failed))
         for column in fields(self):
             value = getattr(self, column.name)
             if isinstance(value, np.ndarray):
@@ -103,6 +108,15 @@ class Ablation:
     def failures_known(self) -> bool:
         """Whether it is known which ends of the environment's episodes are failures."""
         return failure_known(self.base.env_id)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of how the episodes came about, as clauses."""
+        cut = int((self.cut & self.use.matters[list(self.rules)]).sum())
+        if not cut:
+            return self.base.remarks
+        told = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
+        return (*self.base.remarks, told)
 
     @property
     def unused(self) -> tuple[int, ...]:
@@ -137,7 +151,8 @@ class Ablation:
 
     @property
     def _failure_differences(self) -> NDArray[np.float64]:
-        return self.failed.astype(np.float64) - crashed(self.base, self.base.env_id)
+        fell = self.failed.astype(np.float64) - crashed(self.base, self.base.env_id)
+        return np.where(self.cut | self.base.cut, 0.0, fell)
 
     @cached_property
     def effects(self) -> tuple[RuleEffect, ...]:
@@ -170,8 +185,8 @@ class Ablation:
         Returns:
             Columns `rule` (its id), `action` (its label), `verdict`, `steps_in_force`,
             `steps_changed`, `episodes`, `episodes_that_differ`, `return_difference`, `low`, `high`,
-            `failures_with`, `failures_without`, `return_p`, `failure_p`; where failures are not
-            known, theirs are empty.
+            `failures_with`, `failures_without`, `cut_with`, `cut_without` (episodes that were cut
+            off), `return_p`, `failure_p`; where failures are not known, theirs are empty.
         """
         import pandas as pd
 
@@ -191,10 +206,12 @@ class Ablation:
                     "high": effect.difference.high,
                     "failures_with": self.base_failures if known else None,
                     "failures_without": effect.failures if known else None,
+                    "cut_with": int(self.base.cut.sum()),
+                    "cut_without": int(cut.sum()),
                     "return_p": effect.return_p,
                     "failure_p": effect.failure_p if known else None,
                 }
-                for effect in self.effects
+                for effect, cut in zip(self.effects, self.cut, strict=True)
             ]
         )
 

@@ -45,6 +45,7 @@ class Task:
         keep_steps: Whether to keep the record of every step.
         without: Index of a rule that is taken out of the shield; None for none.
         which: Indices of the episodes that are run, ascending; all where None.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
     """
 
     env_id: str
@@ -55,6 +56,7 @@ class Task:
     keep_steps: bool = False
     without: int | None = None
     which: tuple[int, ...] | None = None
+    max_steps: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run.
@@ -187,7 +189,15 @@ class WorkerPool:
         from joblib.externals.loky.process_executor import ProcessPoolExecutor
 
         shield = None if content is None else PackedShield(content, task.without)
-        work = (_work, task.env_id, task.agent, shield, piece.seeds, task.keep_steps)
+        work = (
+            _work,
+            task.env_id,
+            task.agent,
+            shield,
+            piece.seeds,
+            task.keep_steps,
+            task.max_steps,
+        )
         with self._lock:
             if self._processes is not None:
                 try:
@@ -243,12 +253,15 @@ def _work(
     shield: PackedShield | None,
     seeds: NDArray[np.int64],
     keep_steps: bool,
+    max_steps: int | None,
 ) -> tuple[Episodes, float]:
     """Run one piece and say how long it took; in a process."""
     start = time.perf_counter()
     try:
         in_force = None if shield is None else unpack(shield)
-        episodes = run_seeds(env_id, agent, in_force, seeds, keep_steps=keep_steps)
+        episodes = run_seeds(
+            env_id, agent, in_force, seeds, keep_steps=keep_steps, max_steps=max_steps
+        )
     except SarlError:
         raise
     except Exception as error:  # of other people's environments, which may raise anything

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -15,8 +16,6 @@ from sarl_core.rollouts.ablating import ablate
 @pytest.fixture(scope="module")
 def few_rules(tmp_path_factory, cart_rules):
     """The largest rules of the set, so that there is little to run."""
-    from dataclasses import replace
-
     rules = RuleSet.load(cart_rules)
     largest = sorted(rules.rules, key=lambda rule: -rule.samples)[:4]
     path = tmp_path_factory.mktemp("few") / "rules.json"
@@ -67,11 +66,56 @@ def test_what_cannot_be_run_is_one_line(capsys, few_rules, more, words):
 
 
 def test_where_no_rule_is_in_force_nothing_is_run(capsys, few_rules, tmp_path):
-    from dataclasses import replace
-
     rules = RuleSet.load(few_rules)
     off = replace(rules, rules=tuple(replace(rule, enabled=False) for rule in rules.rules))
     for name, kept in (("off", off), ("empty", replace(rules, rules=()))):
         kept.save(tmp_path / f"{name}.json")
         assert main(list(arguments(tmp_path / f"{name}.json"))) == 2
         assert "no rule in force" in capsys.readouterr().err
+
+
+def test_cut_episodes_and_the_order_of_features_are_told(run, few_rules, tmp_path):
+    rules = RuleSet.load(few_rules)
+    turned = replace(
+        rules,
+        rules=tuple(
+            replace(
+                rule,
+                box=None,
+                conditions=tuple(one._replace(feature=3 - one.feature) for one in rule.conditions),
+            )
+            for rule in rules.rules
+        ),
+        source=replace(rules.source, features=rules.source.features[::-1]),
+    )
+    path = tmp_path / "turned.json"
+    turned.save(path)
+    as_it_is, other = (
+        json.loads(run(*arguments(one, "--max-steps", "12", "--json"))) for one in (few_rules, path)
+    )
+    assert as_it_is["rules"] == other["rules"]
+    assert "by their names" in other["notes"][0]
+    assert other["notes"][1:] == as_it_is["notes"]
+    whole = json.loads(run(*arguments(few_rules, "--json")))
+    assert whole["notes"] == []
+    assert as_it_is["mean_return"] == 12.0
+    assert as_it_is["notes"][0].startswith("all 3 episodes were cut off after 12 steps")
+    for row in as_it_is["rules"]:
+        assert row["cut_with"] == 3
+        assert row["cut_without"] + row["failures_without"] == 3
+        assert row["failure_p"] == 1.0
+    text = " ".join(run(*arguments(path, "--max-steps", "12")).split())
+    for note in other["notes"]:
+        assert f"note: {note}" in text
+
+
+def test_side_by_side_in_processes_the_limit_is_the_same(few_rules):
+    shield = Shield(RuleSet.load(few_rules))
+    one, two = (
+        ablate(
+            "CartPole-v1", "novice", shield, episodes=6, seed=20, max_steps=15, jobs=jobs
+        ).to_frame()
+        for jobs in (1, 2)
+    )
+    assert one.equals(two)
+    assert one["cut_with"].max() > 0
