@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import io
-import logging
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from sarl_core.errors import WorkError
-from sarl_core.explaining.landscape_files import cannot_draw
+from sarl_core.explaining.landscape_files import cannot_draw, silence_browser
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -68,13 +67,12 @@ class _Session:
             return self.runner.run(self._drawn(figure))
         except Exception:
             self._end()
-            raise cannot_draw(first, "install one and run it again") from first
+            raise cannot_draw(first, "leave the pictures out") from first
 
     async def _drawn(self, figure: go.Figure) -> bytes:
         import kaleido
 
-        # It logs a trace for a message cut in two, reads the next one, and draws all the same.
-        logging.getLogger("choreographer").setLevel(logging.CRITICAL)
+        silence_browser()
         if self.browser is None:
             # Formulas would make the browser ask a server for MathJax; there are none.
             self.browser = await kaleido.Kaleido(n=1, mathjax=False).__aenter__()

@@ -148,6 +148,28 @@ def test_failed_work_is_code_1(fail, monkeypatch):
     assert "Chromium" in fail("landscape", CART, "--out", "landscape.png", code=1)
 
 
+@pytest.mark.parametrize(
+    ("browser", "why"),
+    [
+        ("/bin/false", "could not be started; set BROWSER_PATH to one that works, or write .html"),
+        ("/nowhere/chromium", "does not exist; set BROWSER_PATH to one that works, or write .html"),
+    ],
+)
+def test_a_browser_that_does_not_work_is_named(fail, monkeypatch, browser, why):
+    monkeypatch.setenv("BROWSER_PATH", browser)
+    told = fail("landscape", CART, "--out", "landscape.png", code=1)
+    assert told.strip().endswith(f"'{browser}', to which BROWSER_PATH is set, {why}")
+
+
+def test_where_there_is_no_browser_it_is_said_what_to_do(fail, monkeypatch):
+    from choreographer.browsers.chromium import Chromium
+
+    monkeypatch.setattr(Chromium, "find_browser", lambda **_: None)
+    told = fail("landscape", CART, "--out", "landscape.png", code=1)
+    assert "there is none; install one and, if it is not found, set BROWSER_PATH" in told
+    assert "('" not in told
+
+
 def test_what_nobody_expected_is_one_line_and_with_debug_a_traceback(fail, monkeypatch, capsys):
     def broken(*_, **__):
         raise ZeroDivisionError("two\nlines")
