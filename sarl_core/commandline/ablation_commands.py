@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.answers import print_notes
 from sarl_core.commandline.inputs import read_agent, read_shield
 from sarl_core.commandline.options import (
     AgentName,
@@ -127,6 +126,7 @@ def _document(found: Ablation) -> dict[str, Any]:
 
 
 def _print(found: Ablation, out: Path | None) -> None:
+    from sarl_core.commandline.answers import print_notes
     from sarl_core.explaining.ablation_figures import (
         ablation_text,
         interval_text,
