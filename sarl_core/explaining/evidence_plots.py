@@ -143,18 +143,20 @@ def enough_plot(missing: Sequence[float]) -> str:
     turns = [0.0, *np.unique(some[some > 0]).tolist()]
     reached = np.searchsorted(some, turns, side="right").tolist()
     far, most = max(turns[-1] * 1.1, 1.0), len(missing)
-    across, upwards = Scale(0.0, far), Scale(0.0, most * 1.04)
+    # As high as it comes, since of many rules few may ever reach it.
+    top = max(reached[-1], 1)
+    across, upwards = Scale(0.0, far), Scale(0.0, top * 1.04)
     corners = []
     for turn, end, count in zip(turns, [*turns[1:], far], reached, strict=True):
         corners += [(turn, float(count)), (end, float(count))]
     colour = LABEL_COLOURS[0]
     middles = (np.arange(_TIPS) + 0.5) * far / _TIPS
     by_then = np.searchsorted(some, middles, side="right").tolist()
-    widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, most, 4, whole=True)
+    widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, top, 4, whole=True)
     return PLOT_STYLE + plot(
         area(corners, across, upwards, faded(colour, 0.55)),
         Axis(across, widths, list(map(tick_text, widths)), "More episodes"),
-        Axis(upwards, heights, list(map(tick_text, heights)), "Rules that reach it"),
+        Axis(upwards, heights, list(map(tick_text, heights)), f"Rules that reach it, of {most:,}"),
         label=f"Of {counted(most, 'rule')} {reached[0]:,} "
         f"{'reaches' if reached[0] == 1 else 'reach'} the minimum confidence now, and "
         f"{reached[-1]:,} ({share_text(reached[-1] / most)}) after enough more episodes",

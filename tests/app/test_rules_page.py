@@ -70,10 +70,10 @@ def test_search_and_action_narrow_the_table() -> None:
     assert "No rule matches the search" in texts(app)
 
 
-def test_the_table_fits_the_screen_the_action_first() -> None:
+def test_the_table_fits_the_screen_the_name_and_the_action_first() -> None:
     table = open_page("rules", data="cartpole").dataframe[0]
     names = list(table.value)
-    assert names[:2] == ["Action", "When"]
+    assert names[:3] == ["Rule", "Action", "When"]
     columns = json.loads(table.proto.columns)
     assert set(names) <= set(columns)
     widths = [columns[name]["width"] for name in names]

@@ -93,15 +93,23 @@ def test_enough_counts_the_rules_that_are_certain_by_then() -> None:
     html = enough_plot([0.0, 5.0, 5.0, 12.0, float("inf")])
     (outline,) = re.findall(r"polygon\(([^)]*)\)", html)
     corners = [
-        (float(x) / 100 * 13.2, (100 - float(y)) / 100 * 5 * 1.04)
+        (float(x) / 100 * 13.2, (100 - float(y)) / 100 * 4 * 1.04)
         for x, y in re.findall(r"([\d.]+)% ([\d.]+)%", outline)
     ][1:-1]
     wanted = [(0, 1), (5, 1), (5, 3), (12, 3), (12, 4), (13.2, 4)]
     assert np.allclose(corners, wanted, atol=1e-2)
+    assert "Rules that reach it, of 5<" in html
     assert 'aria-label="Of 5 rules 1 reaches the minimum confidence now, and 4 (80 %)' in html
     tips = re.findall(r'<u title="(\d) rules?', html)
     assert tips == sorted(tips)
     assert {"1", "3", "4"} == set(tips)
+
+
+def test_few_of_many_rules_are_still_seen() -> None:
+    html = enough_plot([3.0, 9.0] + [float("inf")] * 1_000)
+    (outline,) = re.findall(r"polygon\(([^)]*)\)", html)
+    assert min(float(y) for y in re.findall(r"% ([\d.]+)%", outline)) < 10
+    assert "of 1,002<" in html
 
 
 def test_nothing_is_missing_or_nothing_helps() -> None:
