@@ -13,7 +13,7 @@ import streamlit as st
 from _cache import cached
 from _evidence_work import worked_out
 from _hold_out import Parts
-from _rule_table import table_height
+from _rule_table import action_column, table_height
 
 from sarl_core.explaining import evidence_figures as figures
 from sarl_core.explaining.cross_fit_words import influence_sentences, judged_sentence
@@ -96,9 +96,12 @@ def _overview(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> str
 def _enough(key: tuple[object, ...], _found: Found, _rule_set: RuleSet) -> Any:
     import pandas as pd
 
-    return pd.DataFrame(
-        enough_columns(_found.rules, _rule_set, _found.missing, _found.threshold, _found.influences)
+    columns = enough_columns(
+        _found.rules, _rule_set, _found.missing, _found.threshold, _found.influences
     )
+    # A list of one, which the table shows in the action's colour.
+    columns["Action"] = [[action] for action in columns["Action"]]
+    return pd.DataFrame(columns)
 
 
 class Evidence:
@@ -198,7 +201,7 @@ def show_enough(evidence: Evidence) -> None:
             key="enough_table",
             column_config={
                 "Rule": column.TextColumn(width=60),
-                "Action": column.TextColumn(width=135),
+                "Action": action_column(evidence.rule_set.actions, "What the rule says")[0],
                 "Still missing": column.TextColumn(width=155),
                 "Held out": column.TextColumn(
                     width=170,

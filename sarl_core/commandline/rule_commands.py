@@ -91,7 +91,8 @@ def mine(
             max=1.0,
             show_default=False,
             help="Keep only rules whose 95 % interval of confidence, over the episodes held out, "
-            "lies at or above this; with --hold-out.",
+            "lies at or above this; with --hold-out. Few episodes can show little: 12 at most "
+            "0.87, 30 at most 0.95, even of a rule that is never wrong.",
         ),
     ] = None,
     cross_fit: Annotated[

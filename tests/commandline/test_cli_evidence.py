@@ -106,8 +106,8 @@ def test_where_the_lower_bound_leaves_nothing_the_reason_is_told(run, tmp_path):
     kept = run(*mine, "--lower-bound", least)
     assert len(RuleSet.load(path)) >= 1
     assert "No rule reaches" not in kept
-    run(*mine[:5], "0.25", *mine[6:], "--lower-bound", "0.9")
-    assert len(set(hold_out(load_demonstrations(LANDER), 0.25).held_out.episodes.tolist())) >= 15
+    more = run(*mine[:5], "0.25", *mine[6:], "--lower-bound", "0.9")
+    assert "held-out episodes can show at most" not in more
 
 
 def test_where_thresholds_leave_nothing_the_lower_bound_is_not_blamed(run, tmp_path):
