@@ -26,6 +26,7 @@ from _choices import (
 )
 from _environments import registered
 from _learning_view import archive, show_curves, show_study
+from _settings import notes_notice
 from _words import escaped, in_full
 
 from sarl_core.demonstrations.environments import describe_environment
@@ -218,7 +219,10 @@ def settings() -> learning.Order | None:
         chosen = tuple(arm for arm in ARMS.values() if arm.name in names)
         if not chosen:
             raise InputError("no way to learn is chosen; choose at least one above")
-        LearningPlan(env_id, rule_set, chosen, int(steps), tuple(range(int(seeds))), projection)
+        plan = LearningPlan(
+            env_id, rule_set, chosen, int(steps), tuple(range(int(seeds))), projection
+        )
+        notes_notice(plan.notes)
     except SarlError as error:
         st.error(in_full(str(error)), icon=":material/error:")
         return None

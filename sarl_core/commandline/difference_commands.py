@@ -51,7 +51,7 @@ def diff(
         else:
             shown = read_demonstrations(demonstrations, None)
             one, more = rules_for(one, shown, called="the states")
-            other, notes = comparable(one, other)[0], (*notes, *more)
+            other, notes = comparable(one, other)[0], (*shown.notes, *notes, *more)
             states = shown.observations
             states_from = f"The states are those of {demonstrations}."
         found = disagreement(one, other, states)

@@ -80,10 +80,14 @@ def export(
         given = None if demonstrations is None else read_demonstrations(demonstrations, env)
         prepared = prepare(rule_set, merged=merged, demonstrations=given)
         vectors = save_export(prepared.rule_set, out, projection, on_invalid)
+        notes = (*(given.notes if given is not None else ()), *prepared.notes)
     if as_json:
-        terminal.print_json(_document(prepared, out, vectors))
+        terminal.print_json({**_document(prepared, out, vectors), "notes": list(notes)})
     else:
+        from sarl_core.commandline.answers import print_notes
+
         terminal.print_lines(_lines(prepared, out, vectors))
+        print_notes(notes)
 
 
 def _document(prepared: Prepared, out: Path, vectors: Path) -> dict[str, Any]:

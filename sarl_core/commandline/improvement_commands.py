@@ -15,6 +15,7 @@ from sarl_core.commandline.options import (
     EnvOfFile,
     File,
     Json,
+    MaxSteps,
     Normalise,
     ProjectionName,
     Seed,
@@ -87,6 +88,7 @@ def aggregate(
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
     seed: Seed = 0,
+    max_steps: MaxSteps = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
     as_json: Json = False,
 ) -> None:
@@ -116,10 +118,13 @@ def aggregate(
             generations=refine,
             validation=validation,
             seed=seed,
+            max_steps=max_steps,
         )
         shown = read_demonstrations(file, env)
         agents = _agents(agent, expert, env or shown.env_id, normalise)
+        read = shown.notes
         shown, notes = in_order_of(shown, describe_environment(env or shown.env_id))
+        notes = tuple(dict.fromkeys((*read, *notes)))
     if nobody:
         _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json, notes)
         return
@@ -139,6 +144,7 @@ def aggregate(
     written, card = save_aggregation(found, out, command=_command(context))
     if not found.is_finished:
         raise terminal.StoppedError(_what_is_left(found, written, out))
+    notes = tuple(dict.fromkeys((*notes, *found.remarks)))
     if as_json:
         terminal.print_json({**card, "notes": list(notes)})
         return
@@ -241,6 +247,7 @@ def _gaps(
     found: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
         from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
         from sarl_core.rollouts.gaps import gaps_so_far
 
         at = plan.thresholds
@@ -254,6 +261,7 @@ def _gaps(
                 seed=plan.seed,
                 projection=plan.projection,
                 jobs=jobs,
+                max_steps=plan.max_steps,
                 progress=advance,
             ):
                 found = so_far
@@ -264,6 +272,10 @@ def _gaps(
     if found.episodes < plan.episodes:
         raise terminal.StoppedError(_keep_gaps(found, out, plan.episodes))
     _write_gaps(found, out)
+    if found.cut:
+        steps = plan.max_steps or MAX_STEPS
+        notes = (*notes, cut_text(env_id, found.cut, found.episodes, steps))
+    notes = tuple(dict.fromkeys((*notes, *found.notes)))
     document: dict[str, Any] = {
         "file": str(out),
         "rules": len(rules),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.commandline import terminal
-from sarl_core.commandline.options import Env, Json, ProjectionName, Rules, Seed
+from sarl_core.commandline.options import Env, Json, MaxSteps, ProjectionName, Rules, Seed
 
 if TYPE_CHECKING:
     from sarl_core.rollouts.learning_files import LearningStudy
@@ -59,6 +59,7 @@ def learn(
             help="After learning, with the shield and without.",
         ),
     ] = 50,
+    max_steps: MaxSteps = None,
     figures: Annotated[
         bool, typer.Option("--figures", help="Also draw the study, as .png.")
     ] = False,
@@ -91,7 +92,9 @@ def learn(
             tuple(range(seed, seed + seeds)),
             projection,
             episodes,
+            max_steps,
         )
+        notes = plan.notes
     with terminal.working("Learning") as advance, _stopping(watched) as stopped:
 
         def told(done: int, total: int) -> bool:
@@ -110,9 +113,12 @@ def learn(
 
             save_learning_figures(study, out)
     if as_json:
-        terminal.print_json(_document(study, summaries, out))
-    else:
-        _print_study(study, summaries, out)
+        terminal.print_json({**_document(study, summaries, out), "notes": list(notes)})
+        return
+    from sarl_core.commandline.answers import print_notes
+
+    _print_study(study, summaries, out)
+    print_notes(notes)
 
 
 @contextmanager

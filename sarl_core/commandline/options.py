@@ -76,7 +76,7 @@ MaxSteps = Annotated[
     typer.Option(
         "--max-steps",
         min=1,
-        show_default="100,000, and 5,000 of a picture",
+        show_default="100,000, and 5,000 of a moving picture",
         help="Cut an episode off after so many steps if it has not ended by then; the answer says "
         "so.",
     ),

@@ -10,7 +10,7 @@ import typer
 
 from sarl_core.commandline import terminal
 from sarl_core.commandline.inputs import read_agent, read_demonstrations
-from sarl_core.commandline.options import Json, Normalise
+from sarl_core.commandline.options import Json, MaxSteps, Normalise
 
 if TYPE_CHECKING:
     from sarl_core.rollouts.agents import Agent
@@ -82,6 +82,7 @@ def report(
     episodes: Annotated[
         int, typer.Option("--episodes", min=1, help="Played for the pictures.")
     ] = _EPISODES,
+    max_steps: MaxSteps = None,
     as_json: Json = False,
 ) -> None:
     """Write a report of rules: one HTML file for people who know only the task.
@@ -112,6 +113,7 @@ def report(
             "--normalise": normalise,
             "--seed": None if seed == _SEED else seed,
             "--episodes": None if episodes == _EPISODES else episodes,
+            "--max-steps": max_steps,
             "--out": out,
         }
         mined = mining_command(rule_set, rules, demonstrations, given, env=env)
@@ -122,6 +124,7 @@ def report(
             agent=_player(agent, env or given.env_id, normalise),
             seed=seed,
             episodes=episodes,
+            max_steps=max_steps,
             commands=(
                 *([mined] if mined else []),
                 command_line("report", rules, asked),
@@ -149,6 +152,7 @@ def report(
                 "pictures": found.pictures,
                 "without_pictures": found.without or None,
                 "bytes": size,
+                "notes": list(found.notes),
             }
         )
         return
@@ -158,7 +162,10 @@ def report(
     ]
     if found.without:
         lines.append(f"There are no pictures: {found.without}.")
+    from sarl_core.commandline.answers import print_notes
+
     terminal.print_lines(lines)
+    print_notes(found.notes)
 
 
 def _player(agent: str | None, env_id: str, normalise: str | None) -> Agent | str | None:

@@ -220,15 +220,18 @@ def landscape(
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        trees = grow_policy_trees(read_demonstrations(file, env), divider=divider)
+        shown = read_demonstrations(file, env)
+        trees = grow_policy_trees(shown, divider=divider)
         found = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
         title = f"{source.env_id or file.name}: {source.steps:,} steps"
         save_landscape(found, names, out, title=title)
     if as_json:
-        terminal.print_json(landscape_document(found, names))
+        terminal.print_json({**landscape_document(found, names), "notes": list(shown.notes)})
         return
+    from sarl_core.commandline.answers import print_notes
+
     cells = f"{found.rule_count.size:,} cells"
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
     terminal.print_lines(
@@ -237,3 +240,4 @@ def landscape(
             f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
         ]
     )
+    print_notes(shown.notes)

@@ -62,11 +62,13 @@ class Prepared(NamedTuple):
         rounding: What became of each threshold; None where none was to be rounded.
         changed: Demonstrated pairs that the rounded rules decide differently, by the shield's own
             count; 0 where none was to be rounded.
+        notes: What is to be said of how rules and demonstrations were matched, as clauses.
     """
 
     rule_set: RuleSet
     rounding: Rounding | None = None
     changed: int = 0
+    notes: tuple[str, ...] = ()
 
 
 def prepare(
@@ -86,13 +88,14 @@ def prepare(
         InputError: If there are no rules, or the demonstrations are for other features or actions.
     """
     require_rules(rule_set)
+    notes: tuple[str, ...] = ()
     rounding, changed = None, 0
     if demonstrations is not None:
-        rule_set = rules_for(rule_set, demonstrations).rule_set
+        rule_set, notes = rules_for(rule_set, demonstrations)
         rounding = rounded_rules(rule_set, demonstrations)
         changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)
         rule_set = rounding.rule_set
-    return Prepared(merged_rules(rule_set) if merged else rule_set, rounding, changed)
+    return Prepared(merged_rules(rule_set) if merged else rule_set, rounding, changed, notes)
 
 
 def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstrations) -> int:

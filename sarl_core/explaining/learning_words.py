@@ -7,11 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from sarl_core.explaining.language import counted, share_text, threshold_text
+from sarl_core.explaining.language import at_least_text, counted, share_text, threshold_text
 from sarl_core.files import whole_file
+from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
 from sarl_core.rollouts.failures import failure_known, no_failures_text
 from sarl_core.rollouts.learning_files import LearningStudy
-from sarl_core.rollouts.learning_summary import SAFE_SHARE, ArmSummary, best, reference
+from sarl_core.rollouts.learning_summary import (
+    SAFE_SHARE,
+    ArmSummary,
+    TrialSummary,
+    best,
+    reference,
+)
 
 _SAME = 1.0  # returns that differ by no more are the same
 _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the rules decide
@@ -92,7 +99,7 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
                 _with_worst(alone.mean, alone.means),
                 f"{value_text(alone.returns.iqm)} ({value_text(alone.returns.low)} to "
                 f"{value_text(alone.returns.high)})",
-                share_text(alone.crash_rate) if known else "–",
+                _crash_share(alone) if known else "–",
                 "–" if shielded is None else value_text(shielded.mean),
             )
         )
@@ -114,7 +121,7 @@ def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
     judged = [summary for summary in summaries if summary.safe is not None]
     paragraphs = [_answer(study, judged, summaries), *_others(judged, best(judged))]
     paragraphs.append(_alone(summaries, best(judged)))
-    paragraphs += [_rules(study, summaries), _conditions(study)]
+    paragraphs += [_rules(study, summaries), _cut(study, summaries), _conditions(study)]
     return [paragraph for paragraph in paragraphs if paragraph]
 
 
@@ -155,9 +162,9 @@ def _answer(
         f"Safe while learning and good afterwards: “{found.arm.title}”. While learning it crashed "
         f"{_times(found.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
-        f"crashes in {share_text(found.alone.crash_rate)} of the episodes; the same learner "
+        f"crashes in {_crash_share(found.alone)} of the episodes; the same learner "
         f"that never had a shield returns {value_text(alone.alone.halves[1])} and crashes in "
-        f"{share_text(alone.alone.crash_rate)}. (It was chosen by the first half of the episodes "
+        f"{_crash_share(alone.alone)}. (It was chosen by the first half of the episodes "
         "afterwards; these returns are of the second.)"
     )
 
@@ -210,7 +217,7 @@ def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
         return f"{told}."
     names = _listed([f"“{summary.arm.title}”" for summary in rivals])
     fewer = all(sum(summary.episodes) < sum(found.episodes) for summary in rivals)
-    share = share_text(sum(found.crashes) / sum(found.episodes))
+    share = share_text(sum(found.crashes) / max(sum(found.episodes), 1))
     return (
         f"{told}. Mind that {names} crashed no more often than the best shielded way to learn"
         f"{', in fewer and longer episodes' if fewer else ''}; of those of “{found.arm.title}” "
@@ -220,6 +227,8 @@ def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
 
 def _crashed(summary: ArmSummary) -> str:
     """How often it did while learning; nothing where that is not known."""
+    if not sum(summary.episodes):
+        return "finished no episode while learning, and "
     if not summary.failures_known:
         return ""
     share = share_text(sum(summary.crashes) / sum(summary.episodes))
@@ -238,13 +247,33 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     # Where an interval leaves the learner room, it matters what was learned.
     if not covered or np.ptp([trials.mean for trials in covered]) > _SAME:
         return ""
-    crashes = f", crashes in {share_text(covered[0].crash_rate)} of the episodes"
+    crashes = f", crashes in {_crash_share(covered[0])} of the episodes"
     if not summaries[0].failures_known:
         crashes = ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "
         f"whatever was learned: return {value_text(covered[0].mean)}{crashes}."
     )
+
+
+def _crash_share(trials: TrialSummary) -> str:
+    return at_least_text(trials.crash_rate, trials.cut)
+
+
+def _cut(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
+    """How many of the episodes afterwards were cut off."""
+    trials = [one for arm in summaries for one in (arm.alone, arm.shielded) if one is not None]
+    count, of = sum(one.cut for one in trials), sum(one.episodes for one in trials)
+    if not count:
+        return ""
+    told = cut_text(
+        study.env_id,
+        count,
+        of,
+        study.settings.get("trial_max_steps") or MAX_STEPS,
+        episodes="episodes after learning",
+    )
+    return f"{told[0].upper()}{told[1:]}."
 
 
 def _conditions(study: LearningStudy) -> str:

@@ -58,6 +58,7 @@ class Wishes:
             none, a novice that the rules shield.
         seed: Of the first episode that is played.
         episodes: How many each player plays.
+        max_steps: After which one is cut off; `episodes.MAX_STEPS` where None.
         commands: How the rules and the report are made again, one line each.
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
@@ -69,6 +70,7 @@ class Wishes:
     agent: str | Path | Agent | None = None
     seed: int = FIRST_SEED
     episodes: int = EPISODES
+    max_steps: int | None = None
     commands: tuple[str, ...] = ()
     rules_name: str = ""
     demonstrations_name: str = ""
@@ -83,6 +85,7 @@ class Wishes:
             ("the number of rules in full", self.in_full, 0, 1_000),
             ("the number of pictures a rule", self.frames, 0, MOST_FRAMES),
             ("the number of episodes", self.episodes, 1, 1_000),
+            ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, 2**31 - 1),
             ("the seed", self.seed, 0, 2**31 - 1 - self.episodes),
         ):
             if not least <= value <= most:
@@ -99,6 +102,7 @@ class Report:
         in_full: How many of them are shown in full.
         pictures: Number of example frames.
         without: Why there are none; "" where there are some, or none were wished for.
+        notes: How demonstrations, rules and environment were read and matched, as clauses.
     """
 
     html: str
@@ -106,6 +110,7 @@ class Report:
     in_full: int
     pictures: int
     without: str
+    notes: tuple[str, ...] = ()
 
 
 def make_report(
@@ -179,6 +184,9 @@ def make_report(
         in_full=len(order[0]),
         pictures=sum(len(found) for found in examples.frames.values()) if examples else 0,
         without=without,
+        notes=tuple(
+            dict.fromkeys((*demonstrations.notes, *notes, *(examples.remarks if examples else ())))
+        ),
     )
 
 
@@ -224,6 +232,7 @@ def _examples(
         each=wishes.frames,
         episodes=wishes.episodes,
         seed=wishes.seed,
+        max_steps=wishes.max_steps,
         progress=progress,
     )
     if not isinstance(found, SarlError):

@@ -24,7 +24,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.aggregation_plan import Plan
-from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
 from sarl_core.rollouts.progress import CancelledError, Progress, report
 from sarl_core.rollouts.questions import Answers, ask, importance, scores
 from sarl_core.rollouts.refinement import generation_cost, generation_seed, refine
@@ -49,6 +49,7 @@ class Round:
         disagreement: Share of the covered decisions in which the expert would do otherwise.
         needed: Share of the met states that no rule covers, or where the expert would do
             otherwise in some action dimension.
+        cut: How many of its episodes were cut off before their end.
     """
 
     number: int
@@ -58,6 +59,7 @@ class Round:
     coverage: float
     disagreement: float
     needed: float
+    cut: int = 0
 
     @property
     def mean_return(self) -> float:
@@ -95,6 +97,18 @@ class Aggregation:
     reported: Episodes | None
     demonstrations: Demonstrations
     seeds: RunSeeds
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of how the episodes came about, as clauses."""
+        cut, of = sum(one.cut for one in self.rounds), sum(len(one.returns) for one in self.rounds)
+        steps = self.plan.max_steps or MAX_STEPS
+        said = (
+            (cut_text(self.env_id, cut, of, steps, episodes="episodes of the rounds"),)
+            if cut
+            else ()
+        )
+        return (*said, *(() if self.reported is None else self.reported.remarks))
 
     @property
     def is_finished(self) -> bool:
@@ -257,6 +271,7 @@ class _Run:
             seed=seed,
             jobs=self.jobs,
             keep_steps=keep_steps,
+            max_steps=self.plan.max_steps,
             progress=clock.of(),
         )
 
@@ -296,6 +311,7 @@ class _Run:
                 coverage=float(covered.any(axis=1).mean()),
                 disagreement=float(otherwise.sum() / max(int(covered.sum()), 1)),
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
+                cut=int(found.cut.sum()),
             )
         )
         self.answers.add(table, wanted, seed=self.seed(number))
@@ -341,6 +357,7 @@ class _Run:
             projection=self.plan.projection,
             generations=self.plan.generations,
             marks=_MARKS,
+            max_steps=self.plan.max_steps,
             seed=self.plan.seed,
             jobs=self.jobs,
             progress=clock.of(),

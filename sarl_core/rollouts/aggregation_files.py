@@ -122,6 +122,7 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
         "divider": plan.divider,
         "projection": plan.projection,
         "seed": plan.seed,
+        **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
         "episodes_a_round": plan.episodes,
         "generations": plan.generations,
         "rounds": [_round(one) for one in found.rounds],

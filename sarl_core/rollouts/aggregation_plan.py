@@ -35,6 +35,8 @@ class Plan:
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
+        max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where
+            None.
     """
 
     max_rules: int
@@ -47,6 +49,7 @@ class Plan:
     validation: int = 256
     report: int = 100
     seed: int = 0
+    max_steps: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be done.
@@ -62,6 +65,7 @@ class Plan:
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, None),
             ("seed", self.seed, 0, None),
+            ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, None),
         ):
             if value < least:
                 raise InputError(f"the {name} is {value}; give {least} or more")

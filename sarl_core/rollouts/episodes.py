@@ -300,7 +300,11 @@ def cut_text(
     """
     who, be = f"{count:,} of the {of:,} {episodes}", "were"
     if of == count:
-        who = f"the {episodes.removesuffix('s')}" if of == 1 else f"all {of:,} {episodes}"
+        who = (
+            f"the {episodes.replace('episodes', 'episode', 1)}"
+            if of == 1
+            else f"all {of:,} {episodes}"
+        )
     alone, it = "their returns count these steps alone", "they"
     if count == 1:
         be, alone, it = "was", "its return counts these steps alone", "it"

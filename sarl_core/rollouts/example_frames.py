@@ -24,7 +24,7 @@ from sarl_core.rollouts.film import Palette
 from sarl_core.rollouts.filming import _no_display as no_display
 from sarl_core.rollouts.filming import _picture as draw
 from sarl_core.rollouts.filming import picture_speed
-from sarl_core.rollouts.player import shield_for
+from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.progress import CancelledError, Progress, report
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.rollouts.spaces import SpaceAdapter, adapt
@@ -82,11 +82,13 @@ class Played:
         player: Who.
         seeds: Of the episodes, (E,).
         steps: All their steps; `rules` holds the rule in force whether or not it was enforced.
+        remarks: What a person should know of how they came about, as clauses.
     """
 
     player: Player
     seeds: NDArray[np.int64]
     steps: StepTable
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +101,20 @@ class Examples:
             not asked for, or applied at no step that was played, are missing.
         played: What was played, in the order it was.
         size: Width and height of the pictures.
+        notes: What is to be said of how rules and environment were matched, as clauses.
     """
 
     env_id: str
     frames: dict[int, tuple[ExampleFrame, ...]]
     played: tuple[Played, ...]
     size: tuple[int, int]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of how rules were matched and episodes came about."""
+        played = [remark for one in self.played for remark in one.remarks]
+        return tuple(dict.fromkeys((*self.notes, *played)))
 
 
 class _Place(NamedTuple):
@@ -124,6 +134,7 @@ def example_frames(
     each: int = 3,
     episodes: int = EPISODES,
     seed: int = FIRST_SEED,
+    max_steps: int | None = None,
     width: int = 400,
     progress: Progress | None = None,
 ) -> Examples:
@@ -137,6 +148,7 @@ def example_frames(
         each: Frames a rule at most, spread over episodes.
         episodes: So many of each player.
         seed: Of a player's first episode.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         width: Of the pictures, in pixels.
         progress: Called with (units done, in all); returning False stops.
 
@@ -152,7 +164,8 @@ def example_frames(
         if value < 1:
             raise InputError(f"the number of {name} is {value}; give 1 or more")
     picture_speed(env_id)  # refuses an environment without pictures before anything is played
-    shield = shield_for(env_id, Shield(rule_set))
+    _, shield, notes = check_environment(env_id, Shield(rule_set))
+    assert shield is not None
     rule_set = shield.rule_set
     # Half the way is playing, half is drawing.
     total = 2 * episodes * len(players)
@@ -165,7 +178,7 @@ def example_frames(
         def told(done: int, _: int, before: int = number * episodes) -> None:
             report(progress, before + done, total)
 
-        played.append(_play(env_id, shield, player, episodes, seed, told))
+        played.append(_play(env_id, shield, player, episodes, seed, max_steps, told))
         for rule, found in places.items():
             if len(found) < each:
                 found += _spread(played[-1].steps, rule, rule_set, number, each - len(found))
@@ -186,11 +199,18 @@ def example_frames(
         frames={rule: found for rule, found in frames.items() if found},
         played=tuple(played),
         size=(int(size[0]), int(size[1])),
+        notes=notes,
     )
 
 
 def _play(
-    env_id: str, shield: Shield, player: Player, episodes: int, seed: int, told: Progress
+    env_id: str,
+    shield: Shield,
+    player: Player,
+    episodes: int,
+    seed: int,
+    max_steps: int | None,
+    told: Progress,
 ) -> Played:
     found = rollout(
         env_id,
@@ -198,6 +218,7 @@ def _play(
         shield=shield if player.shielded else None,
         episodes=episodes,
         seed=seed,
+        max_steps=max_steps,
         progress=told,
     )
     steps = found.steps
@@ -206,7 +227,7 @@ def _play(
         rules = shield.rules_in_force(steps.observation)
         columns = {name: getattr(steps, name) for name in StepTable.__dataclass_fields__}
         steps = StepTable(**(columns | {"rules": rules}))
-    return Played(player, found.seeds, steps)
+    return Played(player, found.seeds, steps, found.remarks)
 
 
 def _spread(

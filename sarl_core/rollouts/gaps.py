@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import rollout
-from sarl_core.rollouts.player import shield_for
+from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.progress import Progress
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -36,6 +36,8 @@ class Gaps:
         missing: Action dimensions without a rule, (K, m) bool.
         met: How many states were met in all.
         episodes: In how many episodes.
+        cut: How many of them were cut off before their end.
+        notes: What is to be said of how rules, agent and environment were matched, as clauses.
     """
 
     feature_names: tuple[str, ...]
@@ -45,6 +47,8 @@ class Gaps:
     missing: NDArray[np.bool_]
     met: int
     episodes: int
+    cut: int = 0
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Number of states K that need a demonstration."""
@@ -74,6 +78,7 @@ def find_gaps(
     seed: int = 0,
     projection: Projection = "centre",
     jobs: int = 1,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Gaps:
     """Run a shielded agent and collect the states in which some dimension has no rule.
@@ -86,6 +91,7 @@ def find_gaps(
         seed: Of the first.
         projection: How the shield replaces a continuous action.
         jobs: Processes.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         progress: Called with (episodes done, in all); returning False stops.
 
     Returns:
@@ -95,7 +101,8 @@ def find_gaps(
         InputError: If agent, rules and environment do not fit.
         CancelledError: If `progress` returned False.
     """
-    shield = shield_for(env_id, Shield(rules, projection=projection))
+    _, shield, notes = check_environment(env_id, Shield(rules, projection=projection))
+    assert shield is not None
     found = rollout(
         env_id,
         agent,
@@ -103,6 +110,7 @@ def find_gaps(
         episodes=episodes,
         seed=seed,
         jobs=jobs,
+        max_steps=max_steps,
         progress=progress,
     )
     table = found.steps
@@ -117,6 +125,8 @@ def find_gaps(
         missing=missing[rows],
         met=len(table),
         episodes=episodes,
+        cut=int(found.cut.sum()),
+        notes=tuple(dict.fromkeys((*notes, *found.notes))),
     )
 
 
@@ -129,6 +139,7 @@ def gaps_so_far(
     seed: int = 0,
     projection: Projection = "centre",
     jobs: int = 1,
+    max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Gaps]:
     """Do what `find_gaps` does, a few episodes at a time.
@@ -141,6 +152,7 @@ def gaps_so_far(
         seed: Of the first.
         projection: How the shield replaces a continuous action.
         jobs: Processes.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         progress: Called with (episodes done, in all); returning False stops.
 
     Yields:
@@ -168,6 +180,7 @@ def gaps_so_far(
                 seed=seed + start,
                 projection=projection,
                 jobs=min(jobs, count),
+                max_steps=max_steps,
                 progress=told,
             )
         )
@@ -194,4 +207,6 @@ def join_gaps(pieces: Sequence[Gaps]) -> Gaps:
         missing=np.concatenate([piece.missing for piece in pieces]),
         met=sum(piece.met for piece in pieces),
         episodes=sum(piece.episodes for piece in pieces),
+        cut=sum(piece.cut for piece in pieces),
+        notes=pieces[0].notes,
     )

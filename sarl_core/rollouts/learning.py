@@ -77,6 +77,7 @@ def learn(
     seed: int = 0,
     projection: Projection = "centre",
     episodes: int = TRIAL_EPISODES,
+    max_steps: int | None = None,
     checkpoint: Path | None = None,
     progress: Progress | None = None,
     watch: Watch | None = None,
@@ -93,6 +94,8 @@ def learn(
         seed: Of the learner and its environments. The same arguments give the same result.
         projection: What becomes of a continuous action that breaks a rule.
         episodes: After learning, without a shield and with it, on seeds from `seeds.TRIAL`.
+        max_steps: An episode after learning that has not ended by then is cut off;
+            `episodes.MAX_STEPS` where not given.
         checkpoint: File to take up the learning from, if it exists, and to keep it in meanwhile
             and when it is cancelled. A resumed run begins new episodes and draws new random
             numbers: it is not bit for bit what an uninterrupted one would have been.
@@ -152,8 +155,10 @@ def learn(
     def still(done: int, total: int) -> bool:
         return progress is None or progress(steps, steps) is not False
 
-    alone = _try(env_id, policy, None, episodes, still)
-    shielded = None if shield is None else _try(env_id, policy, shield, episodes, still)
+    def tried(shield: Shield | None) -> Trial:
+        return _try(env_id, policy, shield, episodes, max_steps, still)
+
+    alone, shielded = tried(None), None if shield is None else tried(shield)
     end = so_far(curve)
     return LearningResult(
         env_id, arm, steps, seed, curve, policy, alone, shielded, end.seconds, end.sittings
@@ -237,7 +242,12 @@ def _diverged(learner: Any, error: Exception) -> Exception:
 
 
 def _try(
-    env_id: str, policy: MlpPolicy, shield: Shield | None, episodes: int, still: Progress
+    env_id: str,
+    policy: MlpPolicy,
+    shield: Shield | None,
+    episodes: int,
+    max_steps: int | None,
+    still: Progress,
 ) -> Trial:
     """Episodes with a learned policy, which acts deterministically."""
     first = np.zeros(policy.n_dimensions, dtype=np.int64)
@@ -248,6 +258,7 @@ def _try(
         episodes=episodes,
         seed=seeds.TRIAL,
         keep_steps=False,
+        max_steps=max_steps,
         progress=still,
     )
     steps = float(found.lengths.sum())
@@ -256,4 +267,5 @@ def _try(
         crashes=int(crashed(found, env_id).sum()),
         intervention_rate=float(found.interventions.sum()) / steps,
         coverage=float(found.covered.sum()) / steps,
+        cut=int(found.cut.sum()),
     )

@@ -157,12 +157,14 @@ class Trial:
         crashes: Episodes that ended by failure.
         intervention_rate: Share of the steps that the rules changed; 0 without a shield.
         coverage: Share of the steps to which a rule applied; 0 without a shield.
+        cut: Episodes that were cut off before their end; none of them is among the crashes.
     """
 
     returns: tuple[float, ...]
     crashes: int
     intervention_rate: float
     coverage: float
+    cut: int = 0
 
     @property
     def mean(self) -> float:
@@ -171,7 +173,7 @@ class Trial:
 
     @property
     def crash_rate(self) -> float:
-        """Share of the episodes that ended by failure."""
+        """Share of the episodes that ended by failure; with some cut off, the least it can be."""
         return self.crashes / len(self.returns)
 
     def to_dict(self) -> dict[str, Any]:
@@ -181,6 +183,7 @@ class Trial:
             "crashes": self.crashes,
             "intervention_rate": self.intervention_rate,
             "coverage": self.coverage,
+            **({"cut": self.cut} if self.cut else {}),
         }
 
     @classmethod
@@ -202,6 +205,7 @@ class Trial:
                 crashes=int(entry["crashes"]),
                 intervention_rate=float(entry["intervention_rate"]),
                 coverage=float(entry["coverage"]),
+                cut=int(entry.get("cut", 0)),
             )
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"a trial after learning lacks a number ({error})") from error

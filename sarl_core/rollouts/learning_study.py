@@ -53,6 +53,7 @@ class LearningPlan:
         seeds: Of the learners.
         projection: What becomes of a continuous action that breaks a rule.
         episodes: Of each trial after learning.
+        max_steps: After which one of these is cut off; `episodes.MAX_STEPS` where None.
     """
 
     env_id: str
@@ -62,6 +63,7 @@ class LearningPlan:
     seeds: tuple[int, ...]
     projection: Projection = "centre"
     episodes: int = TRIAL_EPISODES
+    max_steps: int | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be learned.
@@ -78,9 +80,20 @@ class LearningPlan:
             )
         if self.episodes < 1:
             raise InputError(f"episodes is {self.episodes} and must be at least 1")
+        if self.max_steps is not None and self.max_steps < 1:
+            raise InputError(f"max_steps is {self.max_steps} and must be at least 1")
         for arm in self.arms:
             for seed in (min(self.seeds), max(self.seeds)):
                 check_learning(self.env_id, self.rules, arm, steps=self.steps, seed=seed)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of how rules and environment were matched, as clauses."""
+        from sarl_core.rollouts.player import check_environment
+        from sarl_core.shielding.shield import Shield
+
+        shield = None if self.rules is None else Shield(self.rules)
+        return check_environment(self.env_id, shield).notes
 
     def settings(self) -> dict[str, Any]:
         """What the runs share and what was asked for, ready for JSON."""
@@ -94,6 +107,7 @@ class LearningPlan:
             "seeds": list(self.seeds),
             "projection": self.projection,
             "trial_episodes": self.episodes,
+            "trial_max_steps": self.max_steps,
             "rules": None
             if rules is None
             else {
@@ -221,6 +235,7 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
             seed=seed,
             projection=plan.projection,
             episodes=plan.episodes,
+            max_steps=plan.max_steps,
             checkpoint=checkpoint,
             progress=progress,
             watch=watch,

@@ -35,6 +35,8 @@ class TrialSummary:
         crash_rate: Share of all episodes that ended by failure.
         intervention_rate: Mean share of the steps that the rules changed.
         coverage: Mean share of the steps to which a rule applied.
+        episodes: How many there are, of all runs.
+        cut: How many of them were cut off before their end; none of them is among the crashes.
     """
 
     means: tuple[float, ...]
@@ -43,6 +45,8 @@ class TrialSummary:
     crash_rate: float
     intervention_rate: float
     coverage: float
+    episodes: int
+    cut: int
 
     @property
     def mean(self) -> float:
@@ -188,6 +192,8 @@ def _trials(trials: Sequence[Trial]) -> TrialSummary:
         crash_rate=sum(trial.crashes for trial in trials) / episodes,
         intervention_rate=float(np.mean([trial.intervention_rate for trial in trials])),
         coverage=float(np.mean([trial.coverage for trial in trials])),
+        episodes=episodes,
+        cut=sum(trial.cut for trial in trials),
     )
 
 
@@ -243,4 +249,5 @@ def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
         "crash_rate": trials.crash_rate,
         "intervention_rate": trials.intervention_rate,
         "coverage": trials.coverage,
+        **({"cut": trials.cut} if trials.cut else {}),
     }

@@ -87,6 +87,7 @@ def refine(
     projection: Projection = "centre",
     generations: int,
     marks: int,
+    max_steps: int | None = None,
     seed: int = 0,
     jobs: int = 1,
     progress: Progress | None = None,
@@ -102,6 +103,7 @@ def refine(
         projection: How the shield replaces a continuous action.
         generations: How many steps to go.
         marks: How many points on the way to give back.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         seed: Another one gives another way.
         jobs: Processes; changes the speed, never the result.
         progress: Called with (episodes done, in all); returning False stops.
@@ -145,7 +147,7 @@ def refine(
             ]
             means = work(
                 delayed(_mean_return)(
-                    env_id, structures, few, trees[0].divider, agent, projection, first
+                    env_id, structures, few, trees[0].divider, agent, projection, first, max_steps
                 )
                 for structures in shaken
             )
@@ -216,11 +218,20 @@ def _mean_return(
     agent: Agent,
     projection: Projection,
     seed: int,
+    max_steps: int | None,
 ) -> float:
     trees = [
         count_tree(structure, few, index, divider=divider)
         for index, structure in enumerate(structures)
     ]
     shield = Shield(leaf_rules(trees), projection=projection)
-    found = rollout(env_id, agent, shield=shield, episodes=EPISODES, seed=seed, keep_steps=False)
+    found = rollout(
+        env_id,
+        agent,
+        shield=shield,
+        episodes=EPISODES,
+        seed=seed,
+        keep_steps=False,
+        max_steps=max_steps,
+    )
     return float(found.returns.mean())
