@@ -146,7 +146,7 @@ def _show(remaining: Demonstrations, rule_set: RuleSet, found: Contradictions) -
                 hide_index=True,
                 height=table_height(int(found.near[:, place].sum()), 6),
                 key=f"pairs_{place}",
-                column_config={"Distance": st.column_config.NumberColumn(format="%.3f")},
+                column_config={"Distance": st.column_config.NumberColumn(format="%.3g")},
                 alt="States and their nearest ones with another action",
             )
 

@@ -10,6 +10,7 @@ from _improving import Outcome
 from _rule_table import table_height
 from _words import escaped
 
+from sarl_core.decimals import digits_across
 from sarl_core.explaining.gap_figures import gap_figure, gap_histograms
 from sarl_core.explaining.language import counted, share_text
 from sarl_core.rollouts.gaps import Gaps
@@ -110,8 +111,8 @@ def show_states(outcome: Outcome, gaps: Gaps) -> None:
         height=table_height(len(rows), 10),
         key="gaps_table",
         column_config={
-            name: st.column_config.NumberColumn(format="%.4g")
-            for name in columns
+            name: st.column_config.NumberColumn(format=f"%.{digits_across(values)}g")
+            for name, values in columns.items()
             if name not in ("Episode", "Step", "Without a rule")
         },
         alt="States without a rule",

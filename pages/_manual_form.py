@@ -169,7 +169,7 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             "Number",
             value=None,
             step=None,
-            format="%.6g",
+            format="%.17g",  # every digit, and no more than tell the number from all others
             key=draft.key("at", row),
             persist_state="session",
             label_visibility="collapsed",

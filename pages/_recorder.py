@@ -14,7 +14,7 @@ import streamlit as st
 from _replays import Order, Replay, compared, kept_comparisons
 from numpy.typing import NDArray
 
-from sarl_core.decimals import digits_telling
+from sarl_core.decimals import digits_across
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.language import action_text
 from sarl_core.explaining.prose import heading
@@ -272,7 +272,9 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
             width=80,
             help="To the nearest threshold that was asked, in that feature's own unit",
         ),
-        "Reward": column.NumberColumn(format="%.3g", width=70),
+        "Reward": column.NumberColumn(
+            format=f"%.{digits_across(recorded.steps.reward)}g", width=70
+        ),
     }
     several = len(replay.dimensions) > 1
     for dimension in replay.dimensions:
@@ -302,9 +304,7 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
     lived = recorded.steps.observation
     for index, feature in enumerate(replay.features):
         title = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
-        values = lived[np.isfinite(lived[:, index]), index].astype(np.float64)
-        width, largest = np.ptp(values) if len(values) else 0.0, np.abs(values).max(initial=0.0)
-        digits = digits_telling(float(width) / 1000, float(largest))
+        digits = digits_across(lived[:, index])
         found.setdefault(title, column.NumberColumn(format=f"%.{digits}g"))
     return found
 

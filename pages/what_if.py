@@ -176,17 +176,23 @@ def settings() -> None:
 
 def slider(index: int) -> float:
     """One feature's slider."""
-    feature, span = demonstrations.features[index], spans[index]
+    feature = demonstrations.features[index]
+    name = escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name)
+    return slide(name, spans[index], f"x{index}")
+
+
+def slide(name: str, span: Span, key: str) -> float:
+    """A slider with as many digits as its steps need."""
     step = (span.high - span.low) / STEPS
     digits = digits_telling(step, max(abs(span.low), abs(span.high)))
     return float(
         st.slider(
-            escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name),
+            name,
             span.low,
             span.high,
             span.middle,
             step=step,
-            key=f"x{index}",
+            key=key,
             bind="query-params",
             format=f"%.{digits}g",
         )
@@ -217,18 +223,7 @@ def proposal() -> Any:
             low, high = dimension.edges[0], dimension.edges[-1]
             if low == high:  # the rules know a single value; the agent may want another
                 low, high = low - 1.0, high + 1.0
-            values.append(
-                st.slider(
-                    title,
-                    low,
-                    high,
-                    (low + high) / 2,
-                    step=(high - low) / STEPS,
-                    key=f"a{index}",
-                    bind="query-params",
-                    format="%.3g",
-                )
-            )
+            values.append(slide(title, Span(low, (low + high) / 2, high), f"a{index}"))
             continue
         names = [label_text(label, dimension) for label in range(dimension.n_labels)]
         chosen = st.selectbox(title, names, key=f"a{index}", bind="query-params")

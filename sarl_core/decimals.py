@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 _UNSEEN = 0.005  # of a scale: nobody sees a number that is off by less
 
@@ -99,6 +101,21 @@ def digits_telling(step: float, largest: float, *, fewest: int = 4) -> int:
     if not 0.0 < step < largest < math.inf:
         return fewest
     return min(max(math.floor(math.log10(largest)) - math.floor(math.log10(step)) + 1, fewest), 17)
+
+
+def digits_across(values: NDArray[Any]) -> int:
+    """How many significant digits the numbers of a column need.
+
+    Args:
+        values: Any shape; what is not finite does not count.
+
+    Returns:
+        So many that a thousandth of their range is seen.
+    """
+    finite = np.asarray(values, dtype=np.float64)[np.isfinite(values)]
+    if not finite.size:
+        return digits_telling(0.0, 0.0)
+    return digits_telling(float(np.ptp(finite)) / 1000, float(np.abs(finite).max()))
 
 
 def decimal_text(value: float) -> str:

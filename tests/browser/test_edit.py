@@ -22,8 +22,9 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     changed = metric(screen, "Decided differently")
     assert changed != "0"
     press(screen, "Pin")
-    screen.get_by_label("Number").fill("0.05")
+    screen.get_by_label("Number").fill("0.0512345678")
     screen.get_by_label("Number").press("Enter")
+    expect(screen.get_by_label("Number")).to_have_value("0.0512345678")
     expect(screen.get_by_text("The rule has no action; choose what it says")).to_be_visible()
     settle(screen)
     says = screen.get_by_role("combobox", name="Then")
@@ -43,7 +44,9 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     path = tmp_path / "edited.json"
     started.value.save_as(path)
     rules = json.loads(path.read_text())["rules"]
-    assert [rule["id"] for rule in rules if rule["origin"] == "manual"] == ["manual.1"]
+    (by_hand,) = (rule for rule in rules if rule["origin"] == "manual")
+    assert by_hand["id"] == "manual.1"
+    assert by_hand["conditions"][0]["threshold"] == 0.0512345678
     (off,) = (rule for rule in rules if not rule["enabled"])
     assert off["pinned"]
     # The edits are still there on another page, and go into a comparison.

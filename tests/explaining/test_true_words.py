@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Rule, RuleSet, grow_policy_trees, mine_rules
-from sarl_core.decimals import digits_telling
+from sarl_core.decimals import digits_across, digits_telling
 from sarl_core.explaining.evidence import example_columns
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
 from sarl_core.explaining.language import conditions_text, number_text, sentence
@@ -365,6 +365,13 @@ def test_digits_tell_a_step(step: float, times: float) -> None:
     texts = {f"{largest - place * 1.01 * step:.{digits}g}" for place in range(2)}
     assert len(texts) == 2
     assert digits_telling(0.0, largest) == digits_telling(step, np.inf) == 4
+
+
+def test_digits_tell_the_numbers_of_a_column() -> None:
+    rewards = np.array([1000.25, 1000.75, np.nan, np.inf])
+    assert digits_across(rewards) == 8
+    assert len({f"{value:.{digits_across(rewards)}g}" for value in rewards[:2]}) == 2
+    assert digits_across(np.array([])) == digits_across(np.full(3, 293.4)) == 4
 
 
 def test_a_state_that_is_none_leaves_the_sentence_as_it_is() -> None:
