@@ -73,13 +73,13 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
             st.caption("  \n".join(lines))
             return
         lines += [
-            f"Support at least **{thresholds.support:g}**",
-            f"Confidence at least **{thresholds.confidence:g}**",
+            f"Support at least **{threshold_text(thresholds.support)}**",
+            f"Confidence at least **{threshold_text(thresholds.confidence)}**",
         ]
         if not demonstrations.is_discrete:
             lines.append(f"Divider **{divider}**")
         if thresholds.lift:
-            lines.append(f"Lift at least **{thresholds.lift:g}**")
+            lines.append(f"Lift at least **{threshold_text(thresholds.lift)}**")
         if thresholds.max_depth:
             lines.append(f"Depth at most **{thresholds.max_depth}**")
         st.caption("  \n".join(lines))

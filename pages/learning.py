@@ -31,7 +31,7 @@ from _words import escaped, in_full
 
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError, SarlError
-from sarl_core.explaining.language import counted
+from sarl_core.explaining.language import counted, threshold_text
 from sarl_core.mining.rules import RuleSet
 from sarl_core.rollouts.learning import rules_digest
 from sarl_core.rollouts.learning_arms import ARMS
@@ -115,7 +115,8 @@ def commands(study: LearningStudy) -> list[str]:
         if shipped_file is None:
             first = [
                 f"python -m sarl_core mine data/demonstrations/{data}.parquet --support "
-                f"{rules['support']:g} --confidence {rules['confidence']:g} --out rules.json"
+                f"{threshold_text(rules['support'])} --confidence "
+                f"{threshold_text(rules['confidence'])} --out rules.json"
             ]
     names = ["all"] if len(study.arms) == len(ARMS) else [arm.name for arm in study.arms]
     arms = " ".join(f"--arm {name}" for name in names)

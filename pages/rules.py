@@ -18,7 +18,7 @@ from _words import in_full
 
 from sarl_core.explaining.evidence_words import remedy_text, shortfall_text
 from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import action_text, conditions_text
+from sarl_core.explaining.language import action_text, conditions_text, threshold_text
 from sarl_core.mining.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet
@@ -90,9 +90,9 @@ def downloads(count: int, make_set: Callable[[], RuleSet]) -> None:
 def nothing_in_force() -> None:
     """What to do where no rule is in force."""
     st.info(
-        f"No part of the tree has a support of at least {thresholds.support:g} and a confidence "
-        f"of at least {thresholds.confidence:g}, so there is no rule. Lower one of them on the "
-        "Thresholds page, whose maps show where there are rules.",
+        f"No part of the tree has a support of at least {threshold_text(thresholds.support)} and a "
+        f"confidence of at least {threshold_text(thresholds.confidence)}, so there is no rule. "
+        "Lower one of them on the Thresholds page, whose maps show where there are rules.",
         icon=":material/filter_alt_off:",
     )
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")

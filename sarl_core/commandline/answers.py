@@ -182,6 +182,8 @@ def _print_actions(actions: list[dict[str, Any]]) -> None:
                     for label in action["labels"]
                 ],
             )
+    from sarl_core.decimals import decimal_text, float32_decimal
+
     intervals = [action for action in actions if action["kind"] == "interval"]
     if intervals:
         terminal.print_table(
@@ -189,7 +191,9 @@ def _print_actions(actions: list[dict[str, Any]]) -> None:
             [
                 (
                     action["name"],
-                    f"{action['low']:g} to {action['high']:g}",
+                    " to ".join(
+                        decimal_text(float32_decimal(action[end])) for end in ("low", "high")
+                    ),
                     action["bounds_from"],
                     *_numbers(action),
                 )
@@ -222,7 +226,14 @@ def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _numbers(spread: dict[str, float]) -> tuple[str, str, str]:
-    least, median, largest = (f"{spread[name]:.4g}" for name in ("min", "median", "max"))
+    from sarl_core.decimals import decimal_text
+    from sarl_core.demonstrations.splits import written_value
+
+    numbers = [spread[name] for name in ("min", "median", "max")]
+    least, median, largest = (
+        decimal_text(written_value(one, [other for other in numbers if other != one], fewest=4))
+        for one in numbers
+    )
     return least, median, largest
 
 

@@ -138,5 +138,9 @@ def _lines(prepared: Prepared, out: Path, vectors: Path) -> list[str]:
 
 
 def _kept(kept: Any, rule_set: RuleSet) -> str:
+    from sarl_core.decimals import decimal_text
+    from sarl_core.demonstrations.splits import written_threshold
+
     name = rule_set.source.features[kept.feature].name
-    return f"{name} {kept.threshold!r} ({kept.why})"
+    # What tells all states apart as it does: as a double it may have digits that tell nothing.
+    return f"{name} {decimal_text(written_threshold(kept.threshold, None))} ({kept.why})"

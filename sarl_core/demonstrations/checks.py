@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.giveaways import find_giveaways
 from sarl_core.demonstrations.requirements import (
     LARGEST,
@@ -134,8 +135,8 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
     for dimension, column in zip(demonstrations.action_dimensions, columns, strict=True):
         if np.all(column == column[0]):
             found.append(
-                f"action {dimension.name!r} is {column[0]:g} in every step, so the only rule is to "
-                "do that always"
+                f"action {dimension.name!r} is {decimal_text(column[0])} in every step, so the "
+                "only rule is to do that always"
             )
         elif dimension.kind == "discrete":
             counts = np.bincount(column - dimension.first, minlength=len(dimension.labels))
@@ -297,8 +298,8 @@ def _bounds(
     if not (low <= high).all():
         i = int(np.argmin(low <= high))
         raise InputError(
-            f"the bounds of action {action_names[i]!r}, {low[i]:g} and {high[i]:g}, "
-            "are no interval; give the lower one first"
+            f"the bounds of action {action_names[i]!r}, {decimal_text(low[i])} and "
+            f"{decimal_text(high[i])}, are no interval; give the lower one first"
         )
     if source == "action space":
         require_within(

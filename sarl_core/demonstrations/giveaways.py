@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.requirements import rises_steadily
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def _clockwork(values: NDArray[np.float32], together: NDArray[np.bool_]) -> str 
     if rises_steadily(-values, together, least=_LEAST_ROWS // 2):
         return "falls by the same amount at every step"
     if together.all() and _begins_again(values):
-        return f"counts by one and keeps beginning again at {values[0]:g}"
+        return f"counts by one and keeps beginning again at {decimal_text(values[0])}"
     return None
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.errors import InputError
 
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
@@ -116,7 +117,7 @@ def require_within(
         row, i = _first(outside)
         raise InputError(
             f"{columns[i]} is {values[row, i]} in row {_number(row, rows)}, outside the action "
-            f"space [{low[i]:g}, {high[i]:g}]; mend that row"
+            f"space [{decimal_text(low[i])}, {decimal_text(high[i])}]; mend that row"
         )
 
 
@@ -274,7 +275,7 @@ def told_of_whole_numbers(
         return (
             f"{column} was taken as an amount (continuous), because {count:,} of its "
             f"{len(values):,} values {'is' if count == 1 else 'are'} not whole, the first "
-            f"{values[row]:g} in row {_number(row, rows)}; if it holds labels, mend "
+            f"{decimal_text(values[row])} in row {_number(row, rows)}; if it holds labels, mend "
             f"{'that row' if count == 1 else 'those rows'}"
         )
     return (

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.distributions import EpisodeSeries, Histogram
@@ -39,7 +41,7 @@ def feature_figure(
     positions: Any = histogram.centres
     widths: Any = np.diff(histogram.edges)
     if histogram.values is not None:
-        positions, widths = [f"{value:g}" for value in histogram.values], 0.72
+        positions, widths = _value_texts(histogram.values), 0.72
     for label in range(dimension.n_labels):
         name = plain(label_text(label, dimension))
         figure.add_bar(
@@ -171,10 +173,14 @@ def episode_figure(series: EpisodeSeries, name: str, colour: str) -> go.Figure:
     return figure
 
 
+def _value_texts(values: NDArray[np.float64]) -> list[str]:
+    return [decimal_text(float32_decimal(value)) for value in values.tolist()]
+
+
 def _bin_texts(histogram: Histogram, unit: str) -> list[str]:
     suffix = f" {plain(unit)}" if unit else ""
     if histogram.values is not None:
-        return [f"{value:g}{suffix}" for value in histogram.values]
+        return [f"{text}{suffix}" for text in _value_texts(histogram.values)]
     return [
         f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{suffix}"
         for low, high in pairwise(histogram.edges.tolist())

@@ -23,6 +23,7 @@ from sarl_core.explaining.language import (
     label_text,
     sentence,
     share_text,
+    threshold_text,
 )
 from sarl_core.files import whole_file
 from sarl_core.mining.evidence import HeldOut
@@ -339,13 +340,13 @@ def limits_text(rule_set: RuleSet) -> str:
     """
     thresholds = rule_set.thresholds
     limits = [
-        f"support at least {thresholds.support:g}",
-        f"confidence at least {thresholds.confidence:g}",
+        f"support at least {threshold_text(thresholds.support)}",
+        f"confidence at least {threshold_text(thresholds.confidence)}",
     ]
     if rule_set.cut == "leaves":
         limits = ["every leaf of the tree"]
     if thresholds.lift:
-        limits.append(f"lift at least {thresholds.lift:g}")
+        limits.append(f"lift at least {threshold_text(thresholds.lift)}")
     if thresholds.max_depth is not None:
         limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
     if any(dimension.is_interval for dimension in rule_set.actions):

@@ -41,7 +41,7 @@ def _rounded(value: float, digits: int) -> str:
     if value == 0:
         return "0"
     if not 1e-4 <= abs(value) < 1e6:
-        return f"{value:.{digits}g}"
+        return decimal_text(float(f"{value:.{digits}g}"))
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text

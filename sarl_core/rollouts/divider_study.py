@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.errors import InputError
@@ -240,7 +241,7 @@ def _check_actions(env_id: str, dimensions: Sequence[Quantisation]) -> None:
         edges = each.dimension.edges
         if each.dimension.bounds_from == "action space" and (edges[0], edges[-1]) != (low, high):
             raise InputError(
-                f"the demonstrated {each.dimension.name} goes from {edges[0]:g} to {edges[-1]:g} "
-                f"and that of {env_id} from {low:g} to {high:g}; give demonstrations of this "
-                "environment"
+                f"the demonstrated {each.dimension.name} goes from {decimal_text(edges[0])} to "
+                f"{decimal_text(edges[-1])} and that of {env_id} from {decimal_text(low)} to "
+                f"{decimal_text(high)}; give demonstrations of this environment"
             )

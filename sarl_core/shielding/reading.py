@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import decimal_text
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -282,7 +283,8 @@ class ActionReader:
         if not self.form.labels:
             return f"{subject} is infinite"
         first, count = self.form.labels[dimension]
-        return f"{subject} is {value:.6g}, which is none of {first} to {first + count - 1}"
+        said, last = decimal_text(float(value)), first + count - 1
+        return f"{subject} is {said}, which is none of {first} to {last}"
 
 
 def numbers_in(value: Any, name: str) -> NDArray[Any]:

@@ -367,6 +367,11 @@ def test_digits_tell_a_step(step: float, times: float) -> None:
     assert digits_telling(0.0, largest) == digits_telling(step, np.inf) == 4
 
 
+def test_two_large_numbers_are_told_apart_without_an_exponent() -> None:
+    assert number_text(1000000.0625, apart_from=1000000.0) == "1000000.06"
+    assert number_text(1234567.0) == "1230000"
+
+
 def test_digits_tell_the_numbers_of_a_column() -> None:
     rewards = np.array([1000.25, 1000.75, np.nan, np.inf])
     assert digits_across(rewards) == 8
