@@ -33,15 +33,15 @@ def number_text(value: float, *, apart_from: float | None = None) -> str:
     for digits in range(_DIGITS, 18):
         text = _rounded(value, digits)
         if not apart or abs(float(text) - value) <= _OFF * apart:
-            return text
-    return repr(value)
+            return text if apart_from is None else decimal_text(float(text))
+    return decimal_text(value)
 
 
 def _rounded(value: float, digits: int) -> str:
     if value == 0:
         return "0"
     if not 1e-4 <= abs(value) < 1e6:
-        return decimal_text(float(f"{value:.{digits}g}"))
+        return f"{value:.{digits}g}"
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
