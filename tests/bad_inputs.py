@@ -217,6 +217,11 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         ),
         ("'obs_x' is -3.40282e+38 in row 2", "first of 2", "no reading"),
     ),
+    "too large to sum up csv": (
+        "demo.csv",
+        changed(2, "0,1,1.0000002e30,1,0"),
+        ("'obs_x' is 1.00000017e+30 in row 2", "first of 1 beyond 1e+30", "larger unit"),
+    ),
     "actions beyond measure npz": (
         "demo.npz",
         npz_bytes(**good_arrays() | {"actions": np.array([3e38, -3e38, 0.5, 1, 2], np.float32)}),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.splits import written_value
 from sarl_core.errors import InputError
 
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
@@ -18,7 +19,8 @@ _STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
 _SEVERAL = 3  # episodes that run alike; two may do so by chance
 _MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
 _EXACT = 2**53  # up to here every whole number is a float64
-# Nothing is measured beyond it, and the sum of as many numbers as fit in memory is a float32 yet.
+# The sum of as many numbers as fit in memory is a float32 yet: scikit-learn sums up all values to
+# see whether some are missing, and takes them to be where the sum is no number.
 LARGEST = 1e30
 
 
@@ -50,11 +52,12 @@ def require_finite(
     value = values[row, column]
     where = f"in row {_number(row, rows)}"
     if np.isfinite(value):
-        count = int((~fine[:, column]).sum())
+        count = int((np.abs(values[:, column]) > np.float32(LARGEST)).sum())
+        said = decimal_text(written_value(float(value), (LARGEST,), fewest=6))
         raise InputError(
-            f"{columns[column]} is {value:g} {where}, the first of {count:,}, which is no "
-            "measurement but what is often written where there was no reading; mend or remove "
-            "such rows"
+            f"{columns[column]} is {said} {where}, the first of {count:,} beyond {LARGEST:g}, "
+            "which cannot be summed up in the 32 bits in which rules are mined; mend or remove "
+            "such rows if they stand for no reading, else give the column in a larger unit"
         )
     kind = "not a number (NaN)" if np.isnan(value) else "infinite"
     raise InputError(f"{columns[column]} is {kind} {where}; mend or remove that row")
