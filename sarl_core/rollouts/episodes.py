@@ -247,10 +247,10 @@ class Episodes:
             for episode, count in zip(episodes, self.invalid.tolist(), strict=True):
                 episode["invalid"] = count
         return {
-            "environment": self.env_id,
             "episodes": episodes,
             "summary": self.summary(),
             "notes": list(self.remarks),
+            "environment": self.env_id,
         }
 
     def to_frame(self) -> pd.DataFrame:
