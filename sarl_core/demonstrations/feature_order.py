@@ -17,6 +17,7 @@ _T = TypeVar("_T")
 How = Literal["same", "permuted", "trusted"]
 
 _COUNTED = re.compile(r"(\D*?)[ _.\-\[(]?(\d{1,9})[\])]?")
+_SEVERAL = re.compile(r"the (\w+ )?(rules|demonstrations|states)")
 _SHORT = 7  # as "feature": a longer word before a number says what is counted
 _OBSERVATION = ("observation", "observations")
 _MOST_CHARACTERS = 110  # of a list in a message
@@ -75,9 +76,14 @@ def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
         InputError: If there are not as many, or their names are of different things.
     """
     if len(first.names) != len(second.names):
+        several = [_SEVERAL.fullmatch(side.whose) is not None for side in (first, second)]
+        asks = "ask about" if several[0] else "asks about"
+        if what != "features":
+            asks = "are for" if several[0] else "is for"
         raise InputError(
-            f"there are {len(first.names)} {what} in {first.whose} and {len(second.names)} in "
-            f"{second.whose}; give two of the same environment"
+            f"{first.whose} {asks} {len(first.names)} {what} and {second.whose} "
+            f"{'have' if several[1] else 'has'} {len(second.names)}; give two of the same "
+            "environment"
         )
     as_they_are = tuple(range(len(first.names)))
     one, other = _plain(first.names), _plain(second.names)

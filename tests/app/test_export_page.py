@@ -80,7 +80,7 @@ def test_rules_of_other_features_are_refused_and_go_without_rounding() -> None:
     upload.set_value([("rules.json", content, "application/json")])
     app.run()
     (error,) = errors(app)
-    assert "3 features in the rules and 4 in the demonstrations" in error
+    assert "ask about 3 features and the demonstrations have 4" in error
     assert "Or switch rounding off" in error
     app.toggle(key="rounded").set_value(False).run()
     assert not errors(app)

@@ -102,4 +102,4 @@ def test_rules_or_states_of_something_else_are_refused_in_one_line(capsys, cart_
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.count("\n") == 1
-    assert "4 features in the rules and 3 in the states" in printed.err
+    assert "4 features and the states have 3" in printed.err

@@ -81,7 +81,7 @@ def test_what_cannot_be_exported_is_one_sentence(capsys, cart_rules, tmp_path, m
         2, "export", cart_rules, "--out", out, "--demonstrations", CART
     )
     other = CART.replace("cartpole", "pendulum")
-    assert "4 features in the rules and 3 in the demonstrations" in refused(
+    assert "ask about 4 features and the demonstrations have 3" in refused(
         2, "export", cart_rules, "--out", out, "--rounded", "--demonstrations", other
     )
     empty = json.loads(cart_rules.read_text()) | {"rules": []}

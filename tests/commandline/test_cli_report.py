@@ -60,7 +60,7 @@ def test_results_and_the_card_stand_in_it(run, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--demonstrations", LANDER), "4 features in the rules and 8 in the demonstrations"),
+        (("--demonstrations", LANDER), "4 features and the demonstrations have 8"),
         (("--demonstrations", "missing.parquet"), "missing.parquet"),
         (("--demonstrations", CART, "--out", "report.pdf"), ".html"),
         (("--demonstrations", CART, "--comparison", "missing.csv"), "missing.csv"),

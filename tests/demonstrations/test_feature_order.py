@@ -82,7 +82,7 @@ def test_long_lists_are_shortened():
 
 
 def test_another_number_of_features_is_refused():
-    with pytest.raises(InputError, match="2 features in the rules and 4 in CartPole-v1"):
+    with pytest.raises(InputError, match="ask about 2 features and CartPole-v1 has 4"):
         line_up(Named("the rules", ("a", "b")), ENV)
 
 

@@ -191,7 +191,7 @@ def test_merged_rules_apply_where_they_did(lander_like: Demonstrations) -> None:
 
 def test_other_features_are_refused(lander_like: Demonstrations) -> None:
     rules = mine_rules(lander_like, supp_min=0.01, conf_min=0.9)
-    with pytest.raises(InputError, match="8 features in the rules and 1 in the demonstrations"):
+    with pytest.raises(InputError, match="ask about 8 features and the demonstrations have 1"):
         rounded_rules(rules, pair(0, 1))
 
 
