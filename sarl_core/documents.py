@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from sarl_core.errors import InputError, quoted
-from sarl_core.limits import READ_LIMIT, read_limit
+from sarl_core.limits import require_memory
 
 LARGEST_WHOLE = 2**53  # whole numbers up to here are exact in floating point too
 _LARGEST = sys.float_info.max
@@ -34,26 +34,26 @@ def parse_json(
         What it says, of dicts, lists, texts, numbers, true, false and null.
 
     Raises:
-        ValueError: If it is anything else, or would take too much memory; the message is a
-            reason in a few words, without anything of the text.
+        ValueError: If it is anything else; the message is a reason in a few words, without
+            anything of the text.
+        InputError: If it would take too much memory.
     """
     # One character beyond the usual ones makes all of them four bytes wide.
     width = 1 if text.isascii() else 4
-    needed = (1 + 2 * width) * len(text) + sum(
-        cost * (text.count(sign) if isinstance(text, str) else text.count(sign.encode()))
-        for sign, cost in _COSTS.items()
-    )
-    if needed > read_limit():
-        raise ValueError(
-            f"it takes more than {read_limit() / 2**30:g} GiB of memory, the most that the "
-            f"environment variable {READ_LIMIT} allows"
+    require_memory(
+        (1 + 2 * width) * len(text)
+        + sum(
+            cost * (text.count(sign) if isinstance(text, str) else text.count(sign.encode()))
+            for sign, cost in _COSTS.items()
         )
+    )
     try:
         return json.loads(
             text,
             object_pairs_hook=object_pairs_hook,
             parse_constant=_refuse_constant if finite else None,
             parse_float=_finite if finite else None,
+            parse_int=_whole,
         )
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
@@ -63,6 +63,13 @@ def parse_json(
 
 def _refuse_constant(constant: str) -> Any:
     raise ValueError(f"it holds {constant}, which is no number")
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:  # it has thousands of digits, which Python does not convert
+        raise ValueError(f"it holds a number of {len(text):,} digits") from error
 
 
 def _finite(text: str) -> float:

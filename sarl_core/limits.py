@@ -54,8 +54,8 @@ def require_memory(size: int) -> None:
     if size > limit:
         raise InputError(
             f"it unpacks to {_in_gib(size)}, more than the {limit / 2**30:g} GiB of memory that a "
-            f"file may take; keep fewer steps or columns, or set the environment variable "
-            f"{READ_LIMIT} to more"
+            f"file may take; give a smaller one, or set the environment variable {READ_LIMIT} to "
+            "more"
         )
 
 
@@ -74,7 +74,12 @@ def table_memory(rows: int, features: int, others: int) -> int:
 
 
 def _in_gib(size: int) -> str:
-    return f"{size / 2**30:,.1f} GiB" if size < 2**60 else "far more than any computer has"
+    # Rounded up: it is more than a limit.
+    return (
+        f"{-(-100 * size // 2**30) / 100:,} GiB"
+        if size < 2**60
+        else "far more than any computer has"
+    )
 
 
 def limited_bytes(path: Path, limit: int | None = None) -> bytes:

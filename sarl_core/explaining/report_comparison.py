@@ -263,6 +263,8 @@ def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
 def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
     try:
         document = parse_json(text)
+    except InputError as error:
+        raise InputError(f"the comparison {name} is too large: {error}") from error
     except ValueError as error:
         raise InputError(
             f"the comparison {name} is not JSON ({error}); give what `evaluate --json` printed"

@@ -6,7 +6,9 @@ import hashlib
 import json
 import math
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,9 +27,11 @@ from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
-VERSIONS = (1, 2)
+VERSIONS = (1, 2, 3)
 """Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
-version 1, which is what it was before there was another."""
+version 1, which is what it was before there was another. Version 3 is written where rules have
+very many conditions: those that many rules share stand in it once, and a rule numbers its own."""
+_MOST_CONDITIONS = 500_000  # written out with their rules: a file of 50 MB
 
 
 def rules_to_json(rule_set: RuleSet) -> str:
@@ -39,7 +43,18 @@ def rules_to_json(rule_set: RuleSet) -> str:
     Returns:
         JSON; numbers read back as the same floats.
     """
-    return json.dumps(_document(rule_set), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    return "".join(_parts(rule_set))
+
+
+def write_rules(rule_set: RuleSet, path: Path) -> None:
+    """Write a rule file as `rules_to_json` gives it, without ever having it whole.
+
+    Args:
+        rule_set: To write.
+        path: The file.
+    """
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(_parts(rule_set))
 
 
 def rules_digest(rule_set: RuleSet) -> str:
@@ -53,8 +68,10 @@ def rules_digest(rule_set: RuleSet) -> str:
         data around thresholds: that is no part of the rules.
     """
     bare = rule_set.source.with_splits([None] * len(rule_set.source.features))
-    text = rules_to_json(replace(rule_set, source=bare))
-    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+    digest = hashlib.blake2b(digest_size=16)
+    for part in _parts(replace(rule_set, source=bare)):
+        digest.update(part.encode())
+    return digest.hexdigest()
 
 
 def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSet:
@@ -72,6 +89,8 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
     """
     try:
         document = parse_json(text, finite=False)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
     except ValueError as error:
         raise InputError(
             f"{name} is not JSON ({error}); give a rule file that `mine` wrote"
@@ -101,7 +120,7 @@ def save_rules(rule_set: RuleSet, path: Path) -> None:
         WorkError: If it cannot be written to.
     """
     with whole_file(path) as unfinished:
-        unfinished.write_text(rules_to_json(rule_set), encoding="utf-8")
+        write_rules(rule_set, unfinished)
 
 
 def load_rules(path: Path) -> RuleSet:
@@ -125,18 +144,60 @@ def load_rules(path: Path) -> RuleSet:
     return rules_from_json(text, name=str(path))
 
 
-def _document(rule_set: RuleSet) -> dict[str, Any]:
+def _parts(rule_set: RuleSet) -> Iterator[str]:
+    """The text of a rule file, in parts of which each has one rule at most."""
+    indented = sum(map(len, _paths(rule_set))) <= _MOST_CONDITIONS
+    known: dict[Condition, int] = {}
+    if not indented:
+        for condition in chain.from_iterable(_paths(rule_set)):
+            known.setdefault(condition, len(known))
+    opening = "{"
+    for key, value in _document(rule_set, known).items():
+        yield f"{opening}\n {json.dumps(key)}: "
+        opening = ","
+        if not isinstance(value, Iterator):
+            yield _value(value, 1, indented)
+            continue
+        start = "["
+        for entry in value:
+            yield f"{start}\n  {_value(entry, 2, indented)}"
+            start = ","
+        yield "[]" if start == "[" else "\n ]"
+    yield "\n}\n"
+
+
+def _value(value: Any, depth: int, indented: bool) -> str:
+    """A value so deep in the document: with a line for each of what is in it, or on one line."""
+    indent = 1 if indented else None
+    text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False)
+    return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
+
+
+def _paths(rule_set: RuleSet) -> Iterator[tuple[Condition, ...]]:
+    return (rule.conditions for rule in rule_set.rules)
+
+
+def _document(rule_set: RuleSet, known: dict[Condition, int]) -> dict[str, Any]:
+    """What the file says.
+
+    Args:
+        rule_set: To write.
+        known: Conditions that are numbered; none to write them out with their rules.
+
+    Returns:
+        A value of JSON under each key, or an iterator that makes those of a list.
+    """
     source, thresholds = rule_set.source, rule_set.thresholds
     asked: list[set[float]] = [set() for _ in source.features]
-    for rule in rule_set.rules:
-        for feature, _, threshold in rule.conditions:
-            asked[feature].add(threshold)
+    for feature, _, threshold in chain.from_iterable(_paths(rule_set)):
+        asked[feature].add(threshold)
+    held_out = any(rule.held_out is not None for rule in rule_set.rules)
     return {
         "format": FORMAT,
-        "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
+        "version": 3 if known else 2 if held_out else 1,
         "env_id": source.env_id,
-        "features": list(map(_feature, source.features, asked)),
-        "actions": [_action(action) for action in rule_set.actions],
+        "features": map(_feature, source.features, asked),
+        "actions": map(_action, rule_set.actions),
         "thresholds": {
             "support": thresholds.support,
             "confidence": thresholds.confidence,
@@ -151,7 +212,8 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
             "steps": source.steps,
             "episodes": source.episodes,
         },
-        "rules": [_rule(rule) for rule in rule_set.rules],
+        **({"conditions": map(Condition._asdict, known)} if known else {}),
+        "rules": (_rule(rule, known) for rule in rule_set.rules),
     }
 
 
@@ -185,11 +247,13 @@ def _action(action: LabelledDimension) -> dict[str, Any]:
     }
 
 
-def _rule(rule: Rule) -> dict[str, Any]:
+def _rule(rule: Rule, known: dict[Condition, int]) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "id": rule.id,
         "dimension": rule.dimension,
-        "conditions": [condition._asdict() for condition in rule.conditions],
+        "conditions": [
+            known[condition] if known else condition._asdict() for condition in rule.conditions
+        ],
         "action": rule.action,
         "support": rule.support,
         "confidence": rule.confidence,
@@ -217,12 +281,13 @@ def _rule_set(document: DocumentReader) -> RuleSet:
     actions = tuple(_read_action(part) for part in document.parts("actions"))
     if not features or not actions:
         raise document.fail("there are no features or no actions")
+    known = _read_conditions(document, len(features)) if version == 3 else None
     thresholds = document.part("thresholds")
     demonstrations = document.part("demonstrations")
     steps = demonstrations.count("steps", low=1)
     rule_set = RuleSet(
         rules=tuple(
-            _read_rule(part, len(features), actions, steps, version)
+            _read_rule(part, len(features), actions, steps, version, known)
             for part in document.parts("rules")
         ),
         actions=actions,
@@ -315,16 +380,11 @@ def _read_rule(
     actions: tuple[LabelledDimension, ...],
     steps: int,
     version: int,
+    known: Sequence[Condition] | None,
 ) -> Rule:
-    conditions = []
-    for entry in part.parts("conditions"):
-        feature, op = entry.take("feature", int), entry.take("op", str)
-        if not 0 <= feature < n_features:
-            raise entry.fail(f"there is no feature {quoted(feature)}")
-        if op not in ("<=", ">"):
-            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
-        conditions.append(Condition(feature, op, entry.number("threshold")))
-        entry.finish()
+    conditions = (
+        _read_conditions(part, n_features) if known is None else _read_numbered(part, known)
+    )
     dimension, action = part.take("dimension", int), part.take("action", int)
     if not 0 <= dimension < len(actions):
         raise part.fail(f"there is no action dimension {quoted(dimension)}")
@@ -360,6 +420,28 @@ def _read_rule(
     )
     part.finish()
     return rule
+
+
+def _read_conditions(part: DocumentReader, n_features: int) -> list[Condition]:
+    conditions = []
+    for entry in part.parts("conditions"):
+        feature, op = entry.take("feature", int), entry.take("op", str)
+        if not 0 <= feature < n_features:
+            raise entry.fail(f"there is no feature {quoted(feature)}")
+        if op not in ("<=", ">"):
+            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
+        conditions.append(Condition(feature, op, entry.number("threshold")))
+        entry.finish()
+    return conditions
+
+
+def _read_numbered(part: DocumentReader, known: Sequence[Condition]) -> list[Condition]:
+    conditions = []
+    for number in part.take("conditions", list):
+        if type(number) is not int or not 0 <= number < len(known):
+            raise part.fail(f"{quoted(number)} is none of the {len(known):,} conditions")
+        conditions.append(known[number])
+    return conditions
 
 
 def _read_box(part: DocumentReader, n_features: int) -> DataBox:

@@ -12,7 +12,7 @@ import numpy as np
 
 from sarl_core.errors import WorkError
 from sarl_core.files import whole_file
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_files import write_rules
 from sarl_core.rollouts.aggregation import Aggregation, Round
 from sarl_core.rollouts.statistics import summarise
 
@@ -72,7 +72,7 @@ def save_aggregation(found: Aggregation, out: Path, *, command: str) -> Saved:
     card = aggregation_card(found, command=command)
     # Both are written before the first takes its place.
     with whole_file(out) as rules:
-        rules.write_text(rules_to_json(found.rule_set), encoding="utf-8")
+        write_rules(found.rule_set, rules)
         with whole_file(card_path(out)) as beside:
             beside.write_text(json.dumps(card, indent=2) + "\n", encoding="utf-8")
     return Saved(out, card)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
+from sarl_core.limits import READ_LIMIT
 from sarl_core.mining.evidence import DataBox, HeldOut
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rule_files import rules_digest, rules_from_json, rules_to_json
+from sarl_core.mining.rules import Condition
 from tests.mining.strategies import labelled_states
 
 
@@ -87,6 +90,76 @@ def test_what_a_rule_carries_comes_back(lander_like):
     assert not again.rules[1].placed
 
 
+def test_a_file_of_ordinary_size_has_a_line_for_each_value(lander_like):
+    mined = mine_rules(lander_like, supp_min=0.02, conf_min=0.8)
+    first = replace(mined.rules[0], id="line\nbreak \\n \N{DEGREE SIGN}")
+    for rules in (mined, replace(mined, rules=(first,)), replace(mined, rules=())):
+        text = rules_to_json(rules)
+        assert text == json.dumps(json.loads(text), indent=1, ensure_ascii=False) + "\n"
+
+
+@pytest.fixture(scope="module")
+def deep(lander_like):
+    """Rules with 640,400 conditions, 1,000 of them different."""
+    mined = mine_rules(lander_like, supp_min=0.02, conf_min=0.8)
+    conditions = tuple(Condition(index % 2, ">", index / 7) for index in range(1000))
+    return replace(
+        mined,
+        rules=tuple(
+            replace(mined.rules[0], id=f"0.{index}", conditions=conditions[index // 2 :])
+            for index in range(800)
+        ),
+    )
+
+
+def test_conditions_that_very_many_rules_share_stand_in_a_file_once(deep, tmp_path):
+    text = rules_to_json(deep)
+    written = json.loads(text)
+    assert written["version"] == 3
+    assert len(written["conditions"]) == 1000
+    assert written["rules"][2]["conditions"] == list(range(1, 1000))
+    path = tmp_path / "rules.json"
+    deep.save(path)
+    assert path.read_text(encoding="utf-8") == text
+    again = RuleSet.load(path)
+    assert again == deep
+    assert rules_to_json(again) == text
+    assert rules_digest(again) == rules_digest(deep) != rules_digest(replace(deep, rules=()))
+
+
+def test_saving_very_many_conditions_takes_little_memory(deep, tmp_path):
+    tracemalloc.start()
+    try:
+        deep.save(tmp_path / "rules.json")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 2 * 2**20
+
+
+@pytest.mark.parametrize("number", [-1, 1, 0.0, True, "0", None, 10**30])
+def test_conditions_that_a_file_does_not_list_are_refused(document, number):
+    first = {"feature": 0, "op": ">", "threshold": 0.5}
+    rule = document["rules"][0] | {"conditions": [0, number], "length": 2}
+    with pytest.raises(InputError, match=r"none of the 1 conditions in rules 1; mend"):
+        read(document | {"version": 3, "conditions": [first], "rules": [rule]})
+    rule["conditions"] = [0, 0]
+    found = read(document | {"version": 3, "conditions": [first], "rules": [rule]})
+    assert found.rules[0].conditions == (Condition(0, ">", 0.5),) * 2
+
+
+def test_a_file_that_takes_too_much_memory_is_said_to(deep, tmp_path, monkeypatch):
+    path = tmp_path / "rules.json"
+    deep.save(path)
+    monkeypatch.setenv(READ_LIMIT, "0.01")
+    with pytest.raises(InputError) as error:
+        RuleSet.load(path)
+    message = str(error.value)
+    assert message.startswith(f"{path}: it unpacks to 0.03 GiB, more than the 0.01 GiB")
+    assert READ_LIMIT in message
+    assert "JSON" not in message
+
+
 def test_held_out_pairs_of_version_1_are_read_without_episodes(lander_like):
     document = json.loads(rules_to_json(mine_rules(lander_like, supp_min=0.02, conf_min=0.8)))
     assert document["version"] == 1  # nothing in it is new
@@ -143,7 +216,7 @@ BAD = {
     ),
     "a pin that is no yes or no": (carrying("pinned", 1), "'pinned'"),
     "another format": (lambda d: d.update(format="other"), "format"),
-    "a later version": (lambda d: d.update(version=3), "version 3"),
+    "a later version": (lambda d: d.update(version=4), "version 4"),
     "a version that is yes": (lambda d: d.update(version=True), "version True"),
     "episodes in version 1": (held(version=1, episodes=3), "'episodes' is not known"),
     "version 2 without episodes": (held(), "'episodes' is missing"),

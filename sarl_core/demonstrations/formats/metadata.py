@@ -92,6 +92,8 @@ def decode_metadata(text: str | bytes) -> Metadata:
     """
     try:
         raw = parse_json(text, object_pairs_hook=_unique)
+    except InputError as error:
+        raise InputError(f"its metadata {KEY!r} is too large: {error}") from error
     except ValueError as error:
         raise InputError(
             f"its metadata {KEY!r} is not JSON ({error}); save the file again, or without metadata"
