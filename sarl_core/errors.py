@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from codecs import getincrementaldecoder
 from collections.abc import Mapping
 
 _LONGEST = 480  # characters of a message; nobody reads more
 _QUOTED = 40  # of what a message repeats from a file
+_NO_TEXT = "bytes that are no text"
 
 
 class SarlError(Exception):
@@ -44,7 +46,13 @@ def quoted(value: object, longest: int = _QUOTED) -> str:
         one line, and without signs that are not for people.
     """
     if isinstance(value, bytes):
-        value = value[: 4 * longest].decode(errors="replace")
+        start = value[: 4 * longest]
+        try:  # a sign may be cut off at the end
+            value = getincrementaldecoder("utf-8")().decode(start, final=start == value)
+        except UnicodeDecodeError:
+            return _NO_TEXT
+        if "\0" in value:
+            return _NO_TEXT
     if isinstance(value, str):
         return repr(_short(_seen(value[: 2 * longest]), longest))
     if isinstance(value, (list, tuple)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 from pathlib import Path
@@ -74,12 +75,9 @@ def table_memory(rows: int, features: int, others: int) -> int:
 
 
 def _in_gib(size: int) -> str:
-    # Rounded up: it is more than a limit.
-    return (
-        f"{-(-100 * size // 2**30) / 100:,} GiB"
-        if size < 2**60
-        else "far more than any computer has"
-    )
+    if size >= 2**60:
+        return "far more than any computer has"
+    return f"{math.ceil(size / 2**30 * 10) / 10:,} GiB"  # rounded up: it is more than a limit
 
 
 def limited_bytes(path: Path, limit: int | None = None) -> bytes:

@@ -181,6 +181,11 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         ("'observations'", "no numbers"),
     ),
     "empty field csv": ("demo.csv", changed(3, "0,2,,1.0,0"), ("'obs_x'", "empty", "row 3")),
+    "bytes in a number parquet": (
+        "demo.parquet",
+        parquet_bytes(good_columns() | {"obs_x": pa.array([b"\0\0\x80\x3f"] * 5, pa.binary(4))}),
+        ("'obs_x' holds bytes that are no text in row 1", "no number"),
+    ),
     "empty field parquet": (
         "demo.parquet",
         parquet_bytes(with_value("obs_x", 3, None)),
@@ -220,7 +225,7 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "too large to sum up csv": (
         "demo.csv",
         changed(2, "0,1,1.0000002e30,1,0"),
-        ("'obs_x' is 1.00000017e+30 in row 2", "first of 1 beyond 1e+30", "larger unit"),
+        ("'obs_x' is 1.00000017e+30 in row 2, beyond 1e+30", "larger unit"),
     ),
     "actions beyond measure npz": (
         "demo.npz",

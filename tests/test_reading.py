@@ -44,6 +44,23 @@ def test_what_is_quoted_is_short_and_for_people(value):
     assert InputError(text).args == (text,)
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (b"word", "'word'"),
+        ("\N{DEGREE SIGN}".encode() * 100, "'" + "\N{DEGREE SIGN}" * 40 + "...'"),
+        (b"x" + "\N{EURO SIGN}".encode() * 60, "'x" + "\N{EURO SIGN}" * 39 + "...'"),
+        (b"a\tb", "'a b'"),
+        (b"", "''"),
+        (b"\0\0\0\x3f", "bytes that are no text"),
+        (b"\xff\xfe", "bytes that are no text"),
+        (b"\xe2\x82", "bytes that are no text"),
+    ],
+)
+def test_bytes_are_quoted_as_the_text_that_they_are(value, text):
+    assert quoted(value) == text
+
+
 def test_a_number_that_python_does_not_write_is_quoted():
     assert quoted(10**5000) == "far too large"
     assert quoted(-3) == "-3"

@@ -53,9 +53,10 @@ def require_finite(
     where = f"in row {_number(row, rows)}"
     if np.isfinite(value):
         count = int((np.abs(values[:, column]) > np.float32(LARGEST)).sum())
+        which = "" if count == 1 else f"the first of {count:,} "
         said = decimal_text(written_value(float(value), (LARGEST,), fewest=6))
         raise InputError(
-            f"{columns[column]} is {said} {where}, the first of {count:,} beyond {LARGEST:g}, "
+            f"{columns[column]} is {said} {where}, {which}beyond {LARGEST:g}, "
             "which cannot be summed up in the 32 bits in which rules are mined; mend or remove "
             "such rows if they stand for no reading, else give the column in a larger unit"
         )

@@ -70,20 +70,16 @@ def read_limited_npz(path: Path) -> dict[str, NDArray[Any]]:
         raise InputError(f"{path} cannot be read as a policy: {error}") from error
 
 
-def check_unpacked_size(archive: zipfile.ZipFile, path: Path) -> None:
+def check_unpacked_size(archive: zipfile.ZipFile) -> None:
     """Refuse an archive that unpacks to more than any policy needs.
 
     Args:
         archive: Opened, nothing read yet. Reading an entry stops at its declared size.
-        path: Named in the error.
 
     Raises:
         InputError: If it is larger.
     """
-    try:
-        _require_size(sum(entry.file_size for entry in archive.infolist()))
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+    _require_size(sum(entry.file_size for entry in archive.infolist()))
 
 
 def _require_size(size: int) -> None:

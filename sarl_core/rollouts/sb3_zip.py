@@ -61,7 +61,7 @@ def load_sb3_zip(
         told = read_data(text)
         settings = read_settings(told.policy_class, told.arguments)
         policy = policy_from_state(
-            _state(weights, source),
+            _state(weights),
             discrete=not box,
             label_counts=counts,
             action_low=space.low.reshape(-1).astype(np.float32) if box else None,
@@ -93,7 +93,7 @@ def _entries(path: Path) -> tuple[bytes, bytes]:
     """The weights and the text."""
     try:
         with opened(limited_bytes(path, MAX_POLICY_BYTES)) as archive:
-            check_unpacked_size(archive, path)
+            check_unpacked_size(archive)
             found = []
             # Half of what a policy may take: the weights are in memory twice while they are read.
             for name, most in (("policy.pth", MAX_POLICY_BYTES // 2), ("data", MAX_BYTES)):
@@ -119,7 +119,7 @@ def _entries(path: Path) -> tuple[bytes, bytes]:
         raise InputError(f"{path} cannot be read as a zip file: {error}") from error
 
 
-def _state(data: bytes, path: Path) -> dict[str, NDArray[np.float32]]:
+def _state(data: bytes) -> dict[str, NDArray[np.float32]]:
     """Weights by name, from the bytes of `policy.pth`."""
     import torch
 
@@ -128,7 +128,7 @@ def _state(data: bytes, path: Path) -> dict[str, NDArray[np.float32]]:
     try:
         # Torch's older format is a bare pickle stream; only the zip has sizes to check first.
         with opened(data) as archive:
-            check_unpacked_size(archive, path)
+            check_unpacked_size(archive)
             for entry in archive.infolist():
                 # Each byte of a pickle may become an object of a hundred.
                 if entry.filename.endswith(".pkl") and entry.file_size > _MAX_STRUCTURE:

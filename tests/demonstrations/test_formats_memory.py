@@ -77,6 +77,14 @@ def plain_texts() -> bytes:
     return out.getvalue()
 
 
+def one_long_text() -> bytes:
+    return zstd(obs_a=["x" * 10**8, "1"], action=labels(2))
+
+
+def long_bytes() -> bytes:
+    return zstd(obs_a=pa.array([b"\0" * 10**8] * 2, pa.binary(10**8)), action=labels(2))
+
+
 def deflated(compression: int = zipfile.ZIP_DEFLATED, **entries: bytes) -> bytes:
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", compression) as archive:
@@ -115,7 +123,9 @@ N = 8_000_000
 REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "texts in row groups": ("parquet", texts_in_row_groups, "is no number"),
     "a dictionary of one text": ("parquet", dictionary_of_one_text, "is no number"),
-    "plain texts": ("parquet", plain_texts, " GiB, more than the 0.125 GiB"),
+    "plain texts": ("parquet", plain_texts, "0.3 GiB, more than the 0.125 GiB"),
+    "one long text": ("parquet", one_long_text, "column 'obs_a' holds no numbers"),
+    "long bytes": ("parquet", long_bytes, "column 'obs_a' holds no numbers"),
     "zeros": ("parquet", lambda: zstd(obs_a=np.zeros(N), action=labels(N)), READ_LIMIT),
     "nothing": ("parquet", lambda: zstd(obs_a=pa.nulls(N), action=labels(N)), READ_LIMIT),
     "metadata": ("parquet", wide_metadata, "its metadata 'sarl' is too large: it unpacks to"),

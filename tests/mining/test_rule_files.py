@@ -155,7 +155,7 @@ def test_a_file_that_takes_too_much_memory_is_said_to(deep, tmp_path, monkeypatc
     with pytest.raises(InputError) as error:
         RuleSet.load(path)
     message = str(error.value)
-    assert message.startswith(f"{path}: it unpacks to 0.03 GiB, more than the 0.01 GiB")
+    assert message.startswith(f"{path}: it unpacks to 0.1 GiB, more than the 0.01 GiB")
     assert READ_LIMIT in message
     assert "JSON" not in message
 

@@ -98,8 +98,9 @@ def test_zip_bombs_are_refused(model_zip: Path, tmp_path: Path) -> None:
         archive.writestr("archive/data.pkl", b"\0" * (257 * 2**20))
     nested = rewrite(model_zip, tmp_path / "nested.zip", policy_pth=inner.getvalue())
     for path in (bomb, nested):
-        with pytest.raises(InputError, match="unpacks to 257 MB"):
+        with pytest.raises(InputError, match="unpacks to 257 MB") as caught:
             make_agent(path, "CartPole-v1")
+        assert str(caught.value).count(str(path)) == 1
     swollen = {"action_net.weight": torch.zeros(1).expand(100_000, 100_000)}
     claimed = rewrite(model_zip, tmp_path / "claimed.zip", policy_pth=saved(swollen))
     with pytest.raises(InputError, match="claim more memory"):

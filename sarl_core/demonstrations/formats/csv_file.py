@@ -187,9 +187,10 @@ class CsvTable:
                 row += block.num_rows
         except pa.ArrowInvalid as error:
             if wrong and wrong[0].number is not None:
+                count = wrong[0].actual_columns
                 raise InputError(
-                    f"{self._place(wrong[0].number)} has {wrong[0].actual_columns} fields in place "
-                    f"of {len(self.names)}; mend that row"
+                    f"{self._place(wrong[0].number)} has {count} field{'s' if count > 1 else ''} "
+                    f"in place of {len(self.names)}; mend that row"
                 ) from error
 
     def _place(self, row: int) -> str:

@@ -25,10 +25,11 @@ from sarl_core.demonstrations.formats.parquet_pages import (
 )
 from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
 from sarl_core.errors import InputError, quoted
-from sarl_core.limits import require_memory, table_memory
+from sarl_core.limits import read_limit, require_memory, table_memory
 
 MAGIC = b"PAR1"
 _BATCH = 2**17  # rows that are brought into their final form at once
+_COPIES = 4  # that Arrow has of a long text while it reads it
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,16 @@ class ParquetTable:
             needed = len(self.data) + table_memory(rows, d, len(columns.used) - d)
             # Before a page is unpacked: a few bytes can stand for any number of rows, or of bytes.
             require_memory(needed)
-            places = _places(self.file, columns.used)
-            require_memory(needed + largest_chunk(self.data, rows, places))
+            places = _places(self.file)
+            used = [places[name] for name in columns.used]
+            require_memory(needed + largest_chunk(self.data, rows, used))
+            others = [name for name in columns.used if not _is_numeric(schema.field(name).type)]
+            size = largest_chunk(self.data, rows, [places[name] for name in others])
+            # It is refused in any case: it is read to name the row, where that takes little.
+            if _COPIES * size > read_limit():
+                raise InputError(
+                    f"column {quoted(others[0])} holds no numbers; write numbers, or leave it out"
+                )
             # Texts by their dictionary: each stands there once, however often it occurs.
             texts = [name for name in columns.used if _is_text(schema.field(name).type)]
             file = _opened(self.data, texts)
@@ -159,8 +168,8 @@ def _column(file: Any, name: str, dtype: Any) -> Column:
     return Column(values, missing)
 
 
-def _places(file: Any, names: Sequence[str]) -> list[int]:
-    """Where flat columns stand among all, as a row group counts them."""
+def _places(file: Any) -> dict[str, int]:
+    """Where columns stand among all flat ones, as a row group counts them."""
     places: dict[str, int] = {}
     at = 0
     for field in file.schema_arrow:
@@ -168,7 +177,7 @@ def _places(file: Any, names: Sequence[str]) -> list[int]:
         at += _leaves(field.type)
     if at != file.metadata.num_columns:
         raise _damaged()
-    return [places[name] for name in names]
+    return places
 
 
 def _leaves(kind: Any) -> int:
@@ -225,8 +234,7 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> Column:
         column, kind = pc.cast(column, kind.value_type), kind.value_type
     if pa.types.is_decimal(kind):
         column, kind = pc.cast(column, pa.float64()), pa.float64()
-    numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)
-    if not numeric and not pa.types.is_null(kind):
+    if not _is_numeric(kind):
         found = pc.index(pc.is_valid(column), True).as_py()
         if found < 0:
             raise InputError(
@@ -247,6 +255,21 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> Column:
 
 def _numbers(column: Any) -> NDArray[Any]:
     return np.asarray(column.to_numpy(zero_copy_only=False))
+
+
+def _is_numeric(kind: Any) -> bool:
+    """Whether its values are numbers, true and false, or nothing at all."""
+    import pyarrow as pa
+
+    if pa.types.is_dictionary(kind):
+        return _is_numeric(kind.value_type)
+    return bool(
+        pa.types.is_integer(kind)
+        or pa.types.is_floating(kind)
+        or pa.types.is_boolean(kind)
+        or pa.types.is_decimal(kind)
+        or pa.types.is_null(kind)
+    )
 
 
 def _is_text(kind: Any) -> bool:
