@@ -43,16 +43,17 @@ def require_finite(
     Raises:
         InputError: With the column and the first row.
     """
-    if values.dtype.kind != "f":
+    if values.dtype.kind != "f" or not values.size:
         return
-    fine = np.abs(values) <= np.float32(LARGEST)
-    if fine.all():
-        return
-    row, column = _first(~fine)
+    most = np.float32(LARGEST)
+    with np.errstate(invalid="ignore"):
+        if values.min() >= -most and values.max() <= most:  # of NaN, both are NaN
+            return
+    row, column = _first(~(np.abs(values) <= most))
     value = values[row, column]
     where = f"in row {_number(row, rows)}"
     if np.isfinite(value):
-        count = int((np.abs(values[:, column]) > np.float32(LARGEST)).sum())
+        count = int((np.abs(values[:, column]) > most).sum())
         which = "" if count == 1 else f"the first of {count:,} "
         said = decimal_text(written_value(float(value), (LARGEST,), fewest=6))
         raise InputError(

@@ -19,6 +19,7 @@ from sarl_core.mining.labels import label_dimensions
 NEAR = 0.1
 """Two states are near if no feature differs by more than this share of its standard deviation."""
 _FIRST_NEIGHBOURS = 4
+_ROWS_AT_ONCE = 2**14  # that are compared with one another
 _AT_ONCE = 2_000_000  # neighbours asked for in one go
 
 Flags = NDArray[np.bool_]
@@ -168,8 +169,15 @@ def _same_states(demonstrations: Demonstrations) -> NDArray[np.int64]:
     # Zero has two signs and is one number; then equal states are equal bytes.
     states = np.ascontiguousarray(demonstrations.observations + np.float32(0.0))
     whole = states.view(np.dtype((np.void, states.itemsize * states.shape[1]))).reshape(-1)
-    _, number = np.unique(whole, return_inverse=True)
-    return np.asarray(number.reshape(-1), dtype=np.int64)
+    # As np.unique does, which has every state three times over.
+    order = np.argsort(whole)
+    other = np.zeros(len(order), dtype=np.bool_)  # than the one before
+    for start in range(1, len(order), _ROWS_AT_ONCE):
+        some = whole[order[start - 1 : start + _ROWS_AT_ONCE]]
+        other[start : start + _ROWS_AT_ONCE] = some[1:] != some[:-1]
+    number = np.empty(len(order), dtype=np.int64)
+    number[order] = np.cumsum(other)
+    return number
 
 
 def _identical(state: NDArray[np.int64], labels: NDArray[np.int64]) -> Flags:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -103,3 +105,21 @@ def test_continuous_actions_disagree_by_their_intervals():
 def test_a_distance_that_is_none_is_refused(lander_like, reach):
     with pytest.raises(InputError, match="give 0 or more standard deviations"):
         find_contradictions(lander_like, reach=reach)
+
+
+def test_looking_for_equal_states_takes_little_more_than_the_states():
+    rng = np.random.default_rng(0)
+    states = rng.integers(-1, 2, size=(100_000, 20)).astype(np.float32)
+    states[:, 7] = np.arange(100_000)
+    demonstrations = Demonstrations(
+        np.tile(states, (2, 1)), rng.integers(0, 2, 200_000), np.zeros(200_000, dtype=int)
+    )
+    tracemalloc.start()
+    try:
+        found = identical_contradictions(demonstrations)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    actions = np.asarray(demonstrations.actions)
+    assert np.array_equal(found[:, 0], np.tile(actions[:100_000] != actions[100_000:], 2))
+    assert peak < 2 * np.asarray(demonstrations.observations).nbytes
