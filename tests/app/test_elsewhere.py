@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 
 import numpy as np
@@ -65,6 +66,11 @@ def test_random_labels_end_with_a_warning(episodes: int) -> None:
         rng.integers(0, 2, 3_000),
         np.arange(3_000) * episodes // 3_000,
     )
+    open_page("thresholds", data="cartpole")
+    cache = sys.modules["_cache"]
+    visit = cache.Visit()
+    cache._VISITS.add(visit)
+    visit.bring(noise.digest)
     app = AppTest.from_file(ROUTER, default_timeout=120)
     app.session_state["_upload"] = noise
     for key, value in {"data": "upload", "support": "0", "confidence": "1"}.items():
@@ -77,6 +83,7 @@ def test_random_labels_end_with_a_warning(episodes: int) -> None:
     found = cross_fit(noise).at(UNFILTERED)
     assert found.fidelity.share == pytest.approx(0.5, abs=0.05)
     assert judged_sentence(found) in html(app)
+    cache._end(visit)
 
 
 def test_compact_rules_are_not_mined_again() -> None:
@@ -87,8 +94,6 @@ def test_compact_rules_are_not_mined_again() -> None:
 
 
 def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
-
     app = open_page("thresholds", data="pendulum")
     module = sys.modules["_elsewhere"]
     monkeypatch.setattr(module, "UNASKED", 1_000)
