@@ -6,9 +6,8 @@ import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,11 +26,10 @@ from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
-VERSIONS = (1, 2, 3)
+VERSIONS = (1, 2)
 """Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
-version 1, which is what it was before there was another. Version 3 is written where rules have
-very many conditions: those that many rules share stand in it once, and a rule numbers its own."""
-_MOST_CONDITIONS = 500_000  # written out with their rules: a file of 50 MB
+version 1, which is what it was before there was another."""
+_MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
 def rules_to_json(rule_set: RuleSet) -> str:
@@ -146,13 +144,9 @@ def load_rules(path: Path) -> RuleSet:
 
 def _parts(rule_set: RuleSet) -> Iterator[str]:
     """The text of a rule file, in parts of which each has one rule at most."""
-    indented = sum(map(len, _paths(rule_set))) <= _MOST_CONDITIONS
-    known: dict[Condition, int] = {}
-    if not indented:
-        for condition in chain.from_iterable(_paths(rule_set)):
-            known.setdefault(condition, len(known))
+    indented = sum(len(rule.conditions) for rule in rule_set.rules) <= _MOST_CONDITIONS
     opening = "{"
-    for key, value in _document(rule_set, known).items():
+    for key, value in _document(rule_set).items():
         yield f"{opening}\n {json.dumps(key)}: "
         opening = ","
         if not isinstance(value, Iterator):
@@ -173,28 +167,16 @@ def _value(value: Any, depth: int, indented: bool) -> str:
     return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
 
 
-def _paths(rule_set: RuleSet) -> Iterator[tuple[Condition, ...]]:
-    return (rule.conditions for rule in rule_set.rules)
-
-
-def _document(rule_set: RuleSet, known: dict[Condition, int]) -> dict[str, Any]:
-    """What the file says.
-
-    Args:
-        rule_set: To write.
-        known: Conditions that are numbered; none to write them out with their rules.
-
-    Returns:
-        A value of JSON under each key, or an iterator that makes those of a list.
-    """
+def _document(rule_set: RuleSet) -> dict[str, Any]:
+    """What stands under each key: a value of JSON, or what makes those of a list one by one."""
     source, thresholds = rule_set.source, rule_set.thresholds
     asked: list[set[float]] = [set() for _ in source.features]
-    for feature, _, threshold in chain.from_iterable(_paths(rule_set)):
-        asked[feature].add(threshold)
-    held_out = any(rule.held_out is not None for rule in rule_set.rules)
+    for rule in rule_set.rules:
+        for feature, _, threshold in rule.conditions:
+            asked[feature].add(threshold)
     return {
         "format": FORMAT,
-        "version": 3 if known else 2 if held_out else 1,
+        "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
         "env_id": source.env_id,
         "features": map(_feature, source.features, asked),
         "actions": map(_action, rule_set.actions),
@@ -212,8 +194,7 @@ def _document(rule_set: RuleSet, known: dict[Condition, int]) -> dict[str, Any]:
             "steps": source.steps,
             "episodes": source.episodes,
         },
-        **({"conditions": map(Condition._asdict, known)} if known else {}),
-        "rules": (_rule(rule, known) for rule in rule_set.rules),
+        "rules": map(_rule, rule_set.rules),
     }
 
 
@@ -247,13 +228,11 @@ def _action(action: LabelledDimension) -> dict[str, Any]:
     }
 
 
-def _rule(rule: Rule, known: dict[Condition, int]) -> dict[str, Any]:
+def _rule(rule: Rule) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "id": rule.id,
         "dimension": rule.dimension,
-        "conditions": [
-            known[condition] if known else condition._asdict() for condition in rule.conditions
-        ],
+        "conditions": [condition._asdict() for condition in rule.conditions],
         "action": rule.action,
         "support": rule.support,
         "confidence": rule.confidence,
@@ -281,13 +260,12 @@ def _rule_set(document: DocumentReader) -> RuleSet:
     actions = tuple(_read_action(part) for part in document.parts("actions"))
     if not features or not actions:
         raise document.fail("there are no features or no actions")
-    known = _read_conditions(document, len(features)) if version == 3 else None
     thresholds = document.part("thresholds")
     demonstrations = document.part("demonstrations")
     steps = demonstrations.count("steps", low=1)
     rule_set = RuleSet(
         rules=tuple(
-            _read_rule(part, len(features), actions, steps, version, known)
+            _read_rule(part, len(features), actions, steps, version)
             for part in document.parts("rules")
         ),
         actions=actions,
@@ -380,11 +358,16 @@ def _read_rule(
     actions: tuple[LabelledDimension, ...],
     steps: int,
     version: int,
-    known: Sequence[Condition] | None,
 ) -> Rule:
-    conditions = (
-        _read_conditions(part, n_features) if known is None else _read_numbered(part, known)
-    )
+    conditions = []
+    for entry in part.parts("conditions"):
+        feature, op = entry.take("feature", int), entry.take("op", str)
+        if not 0 <= feature < n_features:
+            raise entry.fail(f"there is no feature {quoted(feature)}")
+        if op not in ("<=", ">"):
+            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
+        conditions.append(Condition(feature, op, entry.number("threshold")))
+        entry.finish()
     dimension, action = part.take("dimension", int), part.take("action", int)
     if not 0 <= dimension < len(actions):
         raise part.fail(f"there is no action dimension {quoted(dimension)}")
@@ -420,28 +403,6 @@ def _read_rule(
     )
     part.finish()
     return rule
-
-
-def _read_conditions(part: DocumentReader, n_features: int) -> list[Condition]:
-    conditions = []
-    for entry in part.parts("conditions"):
-        feature, op = entry.take("feature", int), entry.take("op", str)
-        if not 0 <= feature < n_features:
-            raise entry.fail(f"there is no feature {quoted(feature)}")
-        if op not in ("<=", ">"):
-            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
-        conditions.append(Condition(feature, op, entry.number("threshold")))
-        entry.finish()
-    return conditions
-
-
-def _read_numbered(part: DocumentReader, known: Sequence[Condition]) -> list[Condition]:
-    conditions = []
-    for number in part.take("conditions", list):
-        if type(number) is not int or not 0 <= number < len(known):
-            raise part.fail(f"{quoted(number)} is none of the {len(known):,} conditions")
-        conditions.append(known[number])
-    return conditions
 
 
 def _read_box(part: DocumentReader, n_features: int) -> DataBox:

@@ -112,19 +112,14 @@ def deep(lander_like):
     )
 
 
-def test_conditions_that_very_many_rules_share_stand_in_a_file_once(deep, tmp_path):
+def test_rules_with_very_many_conditions_stand_on_a_line_each(deep, tmp_path):
     text = rules_to_json(deep)
-    written = json.loads(text)
-    assert written["version"] == 3
-    assert len(written["conditions"]) == 1000
-    assert written["rules"][2]["conditions"] == list(range(1, 1000))
+    assert len(text.splitlines()) < 2_000
     path = tmp_path / "rules.json"
     deep.save(path)
     assert path.read_text(encoding="utf-8") == text
-    again = RuleSet.load(path)
-    assert again == deep
-    assert rules_to_json(again) == text
-    assert rules_digest(again) == rules_digest(deep) != rules_digest(replace(deep, rules=()))
+    assert RuleSet.load(path) == deep
+    assert rules_digest(deep) != rules_digest(replace(deep, rules=()))
 
 
 def test_saving_very_many_conditions_takes_little_memory(deep, tmp_path):
@@ -135,17 +130,6 @@ def test_saving_very_many_conditions_takes_little_memory(deep, tmp_path):
     finally:
         tracemalloc.stop()
     assert peak < 2 * 2**20
-
-
-@pytest.mark.parametrize("number", [-1, 1, 0.0, True, "0", None, 10**30])
-def test_conditions_that_a_file_does_not_list_are_refused(document, number):
-    first = {"feature": 0, "op": ">", "threshold": 0.5}
-    rule = document["rules"][0] | {"conditions": [0, number], "length": 2}
-    with pytest.raises(InputError, match=r"none of the 1 conditions in rules 1; mend"):
-        read(document | {"version": 3, "conditions": [first], "rules": [rule]})
-    rule["conditions"] = [0, 0]
-    found = read(document | {"version": 3, "conditions": [first], "rules": [rule]})
-    assert found.rules[0].conditions == (Condition(0, ">", 0.5),) * 2
 
 
 def test_a_file_that_takes_too_much_memory_is_said_to(deep, tmp_path, monkeypatch):
