@@ -23,9 +23,9 @@ SETTLED = 3000  # milliseconds for the charts to come to rest
 
 SCREENS = {
     # file: (address, colour scheme, what must be on the page)
-    "thresholds.png": ("thresholds", "light", "Mean length of a rule"),
-    "thresholds_dark.png": ("thresholds", "dark", "Mean length of a rule"),
-    "rules.png": ("rules", "light", "Its place in the tree"),
+    "thresholds.png": ("thresholds", "light", "judged by rules mined without it"),
+    "thresholds_dark.png": ("thresholds", "dark", "judged by rules mined without it"),
+    "rules.png": ("rules", "light", "judged by rules mined without it"),
     "demonstrations.png": ("", "light", "Return of each episode"),
 }
 
@@ -98,7 +98,7 @@ def screenshots() -> None:
                 )
                 page = context.new_page()
                 page.goto(f"http://127.0.0.1:{port}/{path}")
-                page.get_by_text(words).first.wait_for(timeout=60_000)
+                page.get_by_text(words).first.wait_for(timeout=300_000)
                 page.wait_for_timeout(SETTLED)
                 page.screenshot(path=DOCS / name)
                 context.close()

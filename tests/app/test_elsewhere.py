@@ -97,7 +97,7 @@ def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> Non
     app = open_page("thresholds", data="pendulum")
     module = sys.modules["_elsewhere"]
     monkeypatch.setattr(module, "UNASKED", 1_000)
-    monkeypatch.setattr(module, "RESULTS", type(module.RESULTS)(None))
+    module.RESULTS.clear()
     app = open_page("thresholds", data="pendulum")
     app.button(key="elsewhere").click().run()
     until(app, "mined without it, they are right in")
