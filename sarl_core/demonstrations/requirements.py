@@ -147,7 +147,8 @@ def is_whole(values: NDArray[Any]) -> bool:
     """
     if values.dtype.kind == "b":
         return True
-    return bool(np.all(np.isfinite(values) & (values >= 0) & (values == np.floor(values))))
+    with np.errstate(invalid="ignore"):  # of a signalling NaN
+        return bool(np.all(np.isfinite(values) & (values >= 0) & (values == np.floor(values))))
 
 
 def counts_up(values: NDArray[Any], together: NDArray[np.bool_] | None = None) -> bool:
@@ -202,7 +203,7 @@ def counts_steps(values: NDArray[Any], together: NDArray[np.bool_], *, least: in
     Returns:
         False also where there are too few episodes to tell a position from a number.
     """
-    if values.dtype.kind == "b":
+    if values.dtype.kind == "b" or not len(values):
         return False
     starts = values[np.append(True, ~together)]
     changes = np.diff(values.astype(np.float64))[together]
