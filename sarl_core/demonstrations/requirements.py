@@ -147,8 +147,13 @@ def is_whole(values: NDArray[Any]) -> bool:
     """
     if values.dtype.kind == "b":
         return True
-    with np.errstate(invalid="ignore"):  # of a signalling NaN
-        return bool(np.all(np.isfinite(values) & (values >= 0) & (values == np.floor(values))))
+    return bool(np.all(np.isfinite(values) & (values >= 0) & without_fraction(values)))
+
+
+def without_fraction(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which numbers are whole, of the same shape; NaN is not."""
+    with np.errstate(invalid="ignore"):  # a NaN of a file may signal
+        return np.asarray(values == np.floor(values))
 
 
 def counts_up(values: NDArray[Any], together: NDArray[np.bool_] | None = None) -> bool:
@@ -210,7 +215,7 @@ def counts_steps(values: NDArray[Any], together: NDArray[np.bool_], *, least: in
     if len(starts) < _SEVERAL or len(changes) < least or abs(changes[0]) != 1:
         return False
     alike = np.all(starts == starts[0]) and np.all(changes == changes[0])
-    return bool(alike and starts[0] == np.floor(starts[0]))
+    return bool(alike and without_fraction(starts[:1])[0])
 
 
 def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -272,7 +277,7 @@ def told_of_whole_numbers(
     Returns:
         None where most are no whole numbers.
     """
-    broken = values != np.floor(values)
+    broken = ~without_fraction(values)
     count = int(np.count_nonzero(broken))
     if count > _MOST_BROKEN * len(values):
         return None
@@ -358,7 +363,7 @@ def whole_numbers(
     values = column_of_numbers(given, n, column, rows)
     wrong = (values < 0) | (values > _EXACT)
     if values.dtype.kind == "f":
-        wrong |= values != np.floor(values)
+        wrong |= ~without_fraction(values)
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(

@@ -17,6 +17,7 @@ from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.parquet_file import column_from_arrow
 from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
+from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
 
@@ -316,7 +317,7 @@ def write_csv(demonstrations: Demonstrations, out: BinaryIO) -> None:
 def _decimals(values: Any) -> Any:
     import pyarrow as pa
 
-    whole = bool(np.all(values == np.floor(values)))
+    whole = bool(without_fraction(values).all())
     return pa.array([repr(value) for value in values.tolist()]) if whole else values
 
 

@@ -29,6 +29,7 @@ from sarl_core.demonstrations.requirements import (
     require_within,
     told_of_whole_numbers,
     whole_numbers,
+    without_fraction,
 )
 from sarl_core.errors import InputError
 
@@ -308,7 +309,7 @@ def _is_discrete(
     told = (
         told_of_whole_numbers(column, name, recording.rows)
         for name, column in zip(recording.action_columns, columns, strict=True)
-        if single or np.any(column != np.floor(column))
+        if single or not without_fraction(column).all()
     )
     return False, next((note for note in told if note is not None), None)
 
@@ -362,7 +363,7 @@ def _labels(
     if columns.dtype.kind == "f":
         require_finite(columns, recording.action_columns, recording.rows)
         # Beyond 2**53 a float64 cannot say which whole number is meant.
-        wrong = (columns != np.floor(columns)) | (np.abs(columns) > 2**53)
+        wrong = ~without_fraction(columns) | (np.abs(columns) > 2**53)
         if wrong.any():
             row, i = (int(index[0]) for index in np.nonzero(wrong))
             number = row if recording.rows is None else int(recording.rows[row])
