@@ -100,7 +100,7 @@ def export(quick: bool) -> Iterable[Row]:
             quick,
             Control(
                 f"Export, another format, {rules}",
-                f"carry?{query}",
+                f"export?{query}",
                 partial(_pill, names=formats),
                 ("[data-testid=stCode]",),
                 warm=len(formats),

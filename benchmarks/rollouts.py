@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks import data
 from benchmarks.measure import Row, duration, side_by_side
 from sarl_core import Shield, rollout
-from sarl_core.rollouts.ablating import ablate
-from sarl_core.rollouts.ablation import Ablation
+from sarl_core.studies.ablation import Ablation
+from sarl_core.studies.ablation_run import ablate
 
 
 def episodes(quick: bool) -> Iterable[Row]:
@@ -55,7 +55,7 @@ def gif(quick: bool) -> Iterable[Row]:
     """A GIF of 200 frames, against imageio's default."""
     import imageio
 
-    from sarl_core.rollouts.rendering import encode_gif
+    from sarl_core.rendering.replay import encode_gif
 
     frames = _frames(50 if quick else 200)
     with tempfile.TemporaryDirectory() as folder:
@@ -102,7 +102,7 @@ def ablation(quick: bool) -> Iterable[Row]:
 
 def _frames(count: int) -> list[np.ndarray]:
     """What the expert's episodes look like."""
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.agents.agent import make_agent
 
     agent, env = (
         make_agent("expert", data.ENV_ID),

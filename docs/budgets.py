@@ -18,9 +18,9 @@ sys.path.insert(0, str(FOLDER))
 
 from sarl_core.demonstrations.formats import load_demonstrations  # noqa: E402
 from sarl_core.files import whole_file  # noqa: E402
-from sarl_core.rollouts.aggregation import aggregate  # noqa: E402
-from sarl_core.rollouts.aggregation_files import aggregation_card  # noqa: E402
-from sarl_core.rollouts.aggregation_plan import Plan  # noqa: E402
+from sarl_core.improving.aggregation import aggregate  # noqa: E402
+from sarl_core.improving.aggregation_files import aggregation_card  # noqa: E402
+from sarl_core.improving.plan import Plan  # noqa: E402
 
 OUT = FOLDER / "data" / "rules" / "budgets.json"
 PLANS = {

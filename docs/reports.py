@@ -11,10 +11,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from sarl_core import RuleSet  # noqa: E402  # found by the line above
-from sarl_core.cli import main  # noqa: E402
+from sarl_core.cli.app import main  # noqa: E402
 from sarl_core.files import whole_file  # noqa: E402
-from sarl_core.rollouts.comparison import Arm, compare  # noqa: E402
 from sarl_core.rollouts.seeds import FRESH  # noqa: E402
+from sarl_core.studies.comparison import Arm, compare  # noqa: E402
 
 EPISODES = 100
 

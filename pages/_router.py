@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import streamlit as st
 
-# Pages are run as scripts; the house and the shared state are found from here.
-for folder in (Path(__file__).parents[1], Path(__file__).parent):
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
-
-import _state as state  # noqa: E402  # found by the lines above
-from _sidebar import sidebar  # noqa: E402
-from _url import absurd_parameters, say_left_out, show_left_out, without  # noqa: E402
+from sarl_dashboard.components.sidebar import sidebar
+from sarl_dashboard.session import settle
+from sarl_dashboard.state.url import absurd_parameters, say_left_out, show_left_out, without
 
 st.set_page_config(
     page_title="SARL Explorer",
@@ -67,7 +61,7 @@ PAGES = [
         icon=":material/difference:",
     ),
     st.Page(
-        "carry.py",
+        "export.py",
         title="Export",
         icon=":material/ios_share:",
     ),
@@ -107,13 +101,16 @@ PAGES = [
         icon=":material/article:",
     ),
 ]
-# Who knows the other addresses guesses this one.
-GUESSED = st.Page(
-    lambda: None, title="Demonstrations", url_path="demonstrations", visibility="hidden"
-)
-page = st.navigation([*PAGES, GUESSED], expanded=True)
-if page == GUESSED:
-    st.switch_page(PAGES[0], query_params=st.query_params.to_dict())
+# Other addresses of a page: one that is guessed by who knows the rest, and one that it once had.
+ALIASES = {"demonstrations": "Demonstrations", "carry": "Export"}
+aliases = [
+    st.Page(lambda: None, title=title, url_path=path, visibility="hidden")
+    for path, title in ALIASES.items()
+]
+page = st.navigation([*PAGES, *aliases], expanded=True)
+if page in aliases:
+    meant = next(other for other in PAGES if other.title == page.title)
+    st.switch_page(meant, query_params=st.query_params.to_dict())
 if absurd := absurd_parameters():
     # Widgets take their values from the address before anything here could mend them.
     say_left_out(absurd, page.title)
@@ -121,4 +118,4 @@ if absurd := absurd_parameters():
 show_left_out(page.title)
 sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()
-state.settle(page.title)
+settle(page.title)

@@ -9,27 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import streamlit as st
-from _ablation_view import show
-from _ablations import Ablating, Wanted
-from _choices import (
-    AGENTS,
-    CHOSEN,
-    COMPACT,
-    EDITED,
-    FRESH_SEED,
-    OWN_FILE,
-    PAPERS,
-    PROJECTIONS,
-    agent_for,
-    continuous,
-    demonstrated,
-    environment_of,
-    policy_upload,
-    rules_for,
-)
-from _compact import THRESHOLDS
-from _comparisons import row_key
-from _settings import (
+
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import InputError, SarlError
+from sarl_core.mining.language import counted
+from sarl_core.rollouts.player import check_environment
+from sarl_core.shielding.shield import Shield
+from sarl_core.studies.ablation import MOST_RULES
+from sarl_core.studies.ablation_run import LEAST_EPISODES
+from sarl_dashboard.components.settings import (
     environment_choice,
     no_boxes_notice,
     notes_notice,
@@ -37,15 +25,15 @@ from _settings import (
     outside_choice,
     projection_choice,
 )
-from _words import in_full
-
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.errors import InputError, SarlError
-from sarl_core.explaining.language import counted
-from sarl_core.rollouts.ablating import LEAST_EPISODES
-from sarl_core.rollouts.ablation import MOST_RULES
-from sarl_core.rollouts.player import check_environment
-from sarl_core.shielding.shield import Shield
+from sarl_dashboard.jobs.ablation import Ablating, Wanted
+from sarl_dashboard.jobs.episodes import row_key
+from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
+from sarl_dashboard.state.compact_set import THRESHOLDS
+from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.ablation.table import show
 
 MOST_EPISODES = 500
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)

@@ -5,15 +5,11 @@ from __future__ import annotations
 import html
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-import _hold_out
-import _state as state
 import plotly.graph_objects as go
 import streamlit as st
-from _cache import cached
-from _upload import upload_section
-from _words import escaped, in_full
 
 from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.checks import find_warnings
@@ -21,21 +17,27 @@ from sarl_core.demonstrations.dataset import Demonstrations, Summary
 from sarl_core.demonstrations.formats import (
     save_demonstrations,
 )
-from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.demonstration_figures import (
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.figures.demonstrations import (
     action_figure,
     episode_figure,
     feature_figure,
 )
-from sarl_core.explaining.distributions import (
+from sarl_core.explaining.figures.distributions import (
     FeatureRow,
     episode_series,
     feature_rows,
     histogram_by_label,
     interval_histogram,
 )
-from sarl_core.explaining.language import label_text
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
+from sarl_core.mining.language import label_text
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.hold_out import leave_out_choice, told
+from sarl_dashboard.state.data import all_demonstrations, chosen_demonstrations
+from sarl_dashboard.state.thresholds import chosen_divider
+from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.views.demonstrations.upload import upload_section
 
 FIGURES_AT_FIRST = 12
 RETURN_COLOUR, LENGTH_COLOUR = "#0b6e99", "#7A8AA0"
@@ -310,7 +312,7 @@ def downloads(demonstrations: Demonstrations) -> None:
         ):
             st.download_button(
                 label,
-                lambda extension=extension: as_file(demonstrations, extension),
+                partial(as_file, demonstrations, extension),
                 file_name=f"{name}{extension}",
                 mime=mime,
                 on_click="ignore",
@@ -321,12 +323,12 @@ def downloads(demonstrations: Demonstrations) -> None:
 
 def episodes_section() -> None:
     """Leave episodes out; what is then shown is what remains."""
-    whole = state.all_demonstrations()
+    whole = all_demonstrations()
     if whole is None or whole.n_episodes < 2:
         return
-    lines = _hold_out.told(whole)
+    lines = told(whole)
     with st.expander("Leave episodes out", icon=":material/playlist_remove:"):
-        _hold_out.leave_out_choice(whole)
+        leave_out_choice(whole)
         st.caption(
             "Rules are mined without them, on every page; the file stays as it is. The page "
             "Evidence says which episodes contradict the others."
@@ -340,7 +342,7 @@ st.caption(
     "What the expert did: at every step a state, and the action taken in it. Rules are "
     "mined from these pairs."
 )
-chosen = state.chosen_demonstrations()
+chosen = chosen_demonstrations()
 upload_section(expanded=chosen is None)
 if chosen is None:
     st.info(
@@ -350,7 +352,7 @@ if chosen is None:
     )
     st.stop()
 numbers = contents(chosen.digest, chosen)
-intervals = state.chosen_divider()
+intervals = chosen_divider()
 overview(chosen, numbers)
 columns_section(chosen)
 episodes_section()

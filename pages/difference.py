@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
-import _edits
-import _state as state
 import streamlit as st
-from _cache import cached
-from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, rules_for
-from _rule_table import action_column, table_height
-from _settings import offered_rule_sets
-from _words import escaped, in_full, together
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.confusion_table import confusion_html
-from sarl_core.explaining.difference_tables import KINDS, example_rows, rule_rows
-from sarl_core.explaining.difference_words import decided_text, rows_text
-from sarl_core.explaining.language import counted
-from sarl_core.mining.difference import comparable
+from sarl_core.explaining.html.confusion import confusion_html
+from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
+from sarl_core.explaining.words.difference import decided_text, rows_text
+from sarl_core.mining.editing.difference import comparable
+from sarl_core.mining.language import counted
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.settings import offered_rule_sets
+from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.text import escaped, in_full, together
 
 UNEDITED = "before the edits"
 EVERY = "all"
@@ -49,7 +50,7 @@ def side(key: str, label: str, default: str) -> tuple[RuleSet, str, str]:
     if choice == OWN_FILE:
         file = st.file_uploader("Rule file (.json)", key=f"{key}_file")
     if choice == UNEDITED:
-        of = _edits.base()
+        of = edits.base()
         return of.rule_set, of.digest, choice
     rule_set, digest = rules_for(choice, file)
     assert rule_set is not None
@@ -230,7 +231,7 @@ def comparison() -> None:
     (one, one_digest, one_name), (other, other_digest, other_name) = sides
     if one_name == other_name:
         one_name, other_name = f"{one_name} (first)", f"{other_name} (second)"
-    chosen = state.chosen_demonstrations()
+    chosen = chosen_demonstrations()
     if chosen is not None and not (fits(one, chosen) and fits(other, chosen)):
         chosen = None
     told_by = (one_digest, other_digest, chosen.digest if chosen is not None else "")

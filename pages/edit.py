@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import _edits
-import _manual_form
 import streamlit as st
-from _choices import OWN_FILE
-from _conflicts_view import conflicts
-from _edit_view import bar, chosen_rule, numbers, table
-from _edits import Base
-from _words import escaped, in_full
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.language import counted
+from sarl_core.mining.language import counted
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state.rule_files import OWN_FILE
+from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.views.edit import form
+from sarl_dashboard.views.edit.conflicts import conflicts
+from sarl_dashboard.views.edit.table import bar, chosen_rule, numbers, table
 
 
 def take_file() -> None:
@@ -21,7 +21,7 @@ def take_file() -> None:
     if file is None:
         return
     try:
-        _edits.take_file(file.getvalue(), file.name)
+        edits.take_file(file.getvalue(), file.name)
     except SarlError as error:
         st.session_state["_edit_error"] = str(error)
 
@@ -30,15 +30,15 @@ def choose() -> None:
     """Which rules are edited: what the visitor clicked."""
     chosen = st.session_state["_edit_base"]
     if chosen:
-        _edits.choose_kind(chosen)
+        edits.choose_kind(chosen)
 
 
 @st.fragment
 def editing(of: Base) -> None:
     """The edits and all that follows from them; nothing else on the page does."""
     try:
-        before = _edits.verdicts_of(of, ())
-        after = _edits.verdicts_of(of, _edits.history(of).edits)
+        before = edits.verdicts_of(of, ())
+        after = edits.verdicts_of(of, edits.history(of).edits)
     except SarlError as problem:
         st.error(in_full(str(problem)), icon=":material/error:")
         return
@@ -49,14 +49,14 @@ def editing(of: Base) -> None:
         if rule is not None:
             wish = chosen_rule(of, rule, after)
             if wish:
-                _manual_form.begin(of, rule, changing=wish == "change")
+                form.begin(of, rule, changing=wish == "change")
     else:
         st.info(
             "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "
             "add a rule by hand.",
             icon=":material/filter_alt_off:",
         )
-    _manual_form.form(of, after)
+    form.form(of, after)
     conflicts(of, after)
 
 
@@ -65,20 +65,20 @@ st.caption(
     "Switch rules off, pin them, move them, add your own. Edits lie on top of the rules in force, "
     "stay while the thresholds move, and last as long as this session: the rule file keeps them."
 )
-st.session_state["_edit_base"] = _edits.chosen_kind()
+st.session_state["_edit_base"] = edits.chosen_kind()
 st.segmented_control(
     "Rules to edit",
-    _edits.kinds(),
+    edits.kinds(),
     key="_edit_base",
     on_change=choose,
     required=True,
     help="Those at the thresholds in the sidebar, the compact ones where there are some, or those "
     "of a rule file.",
 )
-if _edits.chosen_kind() == OWN_FILE:
+if edits.chosen_kind() == OWN_FILE:
     st.file_uploader("Rule file (.json)", key="edit_rule_file", on_change=take_file)
 try:
-    of = _edits.base()
+    of = edits.base()
 except SarlError as problem:
     error = st.session_state.pop("_edit_error", None)
     if error:
@@ -87,7 +87,7 @@ except SarlError as problem:
     st.stop()
 if of.name:
     st.caption(f"The rules of {escaped(of.name)}, {len(of.rule_set):,} of them.")
-others = _edits.waiting(of)
+others = edits.waiting(of)
 if others:
     st.caption(
         f":material/schedule: The edits of {counted(others, 'other rule set')} wait until "

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import _compact
-import _elsewhere
-import _hold_out
-import _state as state
 import streamlit as st
-from _contradictions_view import show_contradictions
-from _evidence_view import (
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.html.headings import note
+from sarl_core.explaining.words.cross_fit import influence_sentences
+from sarl_core.mining.language import counted
+from sarl_dashboard.components.hold_out import leave_out_choice
+from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import compact_set, hold_out
+from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.evidence.contradictions import show_contradictions
+from sarl_dashboard.views.evidence.sections import (
     Evidence,
     show_curve,
     show_enough,
     show_overview,
     show_stability,
 )
-from _words import in_full
-
-from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.cross_fit_words import influence_sentences
-from sarl_core.explaining.language import counted
-from sarl_core.explaining.prose import note
 
 ENOUGH, CURVE, STABILITY = "Enough demonstrations?", "Learning curve", "Stability"
 CONTRADICTIONS, LEFT_OUT = "Contradictions", "Leave episodes out"
@@ -28,12 +28,12 @@ CONTRADICTIONS, LEFT_OUT = "Contradictions", "Leave episodes out"
 
 def share_text(share: str) -> str:
     """A share on the slider."""
-    return "nothing" if share == _hold_out.NOTHING else f"{100 * float(share):.0f} %"
+    return "nothing" if share == hold_out.NOTHING else f"{100 * float(share):.0f} %"
 
 
 def hold_out_choice(whole: Demonstrations) -> None:
     """How many episodes are held out, and which."""
-    choice, parts = _hold_out.chosen(), _hold_out.parted(whole)
+    choice, parts = hold_out.chosen(), hold_out.parted(whole)
     # The widgets follow the URL, so a link and the browser's "back" both reach them. Only where
     # they differ: a value that is set takes back what a hand is moving just then.
     for key, value in (
@@ -45,10 +45,10 @@ def hold_out_choice(whole: Demonstrations) -> None:
     with st.container(horizontal=True, vertical_alignment="bottom", gap="medium"):
         st.select_slider(
             "Share of the episodes held out",
-            _hold_out.SHARES,
+            hold_out.SHARES,
             format_func=share_text,
             key="_holdout_choice",
-            on_change=lambda: _hold_out.choose_share(st.session_state["_holdout_choice"]),
+            on_change=lambda: hold_out.choose_share(st.session_state["_holdout_choice"]),
             width=380,
             help="Rules are mined from the other episodes and tried on these. Whole episodes, "
             "because the steps within one are alike.",
@@ -56,9 +56,9 @@ def hold_out_choice(whole: Demonstrations) -> None:
         st.number_input(
             "Seed",
             0,
-            _hold_out.MOST_SEED,
+            hold_out.MOST_SEED,
             key="_holdout_seed_choice",
-            on_change=lambda: _hold_out.choose_seed(
+            on_change=lambda: hold_out.choose_seed(
                 int(st.session_state["_holdout_seed_choice"] or 0)
             ),
             width=120,
@@ -85,11 +85,11 @@ st.caption(
     "How sure each rule is: how often it was right, and in how many episodes that it was not mined "
     "from. Each episode counts once, because its steps are alike."
 )
-state.require_demonstrations()
-demonstrations = state.all_demonstrations()
+require_demonstrations()
+demonstrations = all_demonstrations()
 assert demonstrations is not None
 hold_out_choice(demonstrations)
-if _compact.in_force():
+if compact_set.in_force():
     st.info(
         "The compact rules were built from other states, the held-out ones perhaps among them, so "
         "they cannot be tried here. This page is about the rules at the thresholds.",
@@ -105,7 +105,7 @@ if not evidence.rule_set.rules:
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
 else:
     show_overview(evidence)
-    _elsewhere.told(
+    cross_fitting.told(
         evidence.thresholds,
         evidence.rule_set.fidelity,
         lambda judged: "".join(map(note, influence_sentences(judged))),
@@ -131,8 +131,8 @@ elif left_out.open:
             "Episodes that are left out are there for nothing: rules are neither mined from them "
             "nor tried on them, on any page. The file stays as it is."
         )
-        _hold_out.leave_out_choice(demonstrations)
+        leave_out_choice(demonstrations)
 elif evidence.rule_set.rules:
     with enough:
         show_enough(evidence)
-_elsewhere.make_ready()
+cross_fitting.make_ready()

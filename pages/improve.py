@@ -9,32 +9,28 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
-import _state as state
 import streamlit as st
-from _choices import (
-    OWN_FILE,
-    PolicyFile,
-    agent_for,
-    digest_of,
-    environment_of,
-    has_expert,
-    policy_upload,
-)
-from _improve_view import show_outcome, show_shipped
-from _improving import Order, Outcome, Working, kept_outcomes
-from _settings import environment_choice, notes_notice
-from _words import in_full
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.demonstrations.names import in_order_of
+from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError, SarlError
-from sarl_core.explaining.language import counted
-from sarl_core.mining.budget import MIN_RULES
+from sarl_core.improving.plan import Plan
+from sarl_core.improving.refinement import generation_cost
+from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.mining.language import counted
 from sarl_core.mining.rules import Thresholds
-from sarl_core.rollouts.aggregation_plan import Plan
-from sarl_core.rollouts.refinement import generation_cost
 from sarl_core.rollouts.seeds import FRESH
+from sarl_dashboard.components.settings import environment_choice, notes_notice
+from sarl_dashboard.jobs.improving import Order, Outcome, Working, kept_outcomes
+from sarl_dashboard.state.agents import PolicyFile, agent_for, has_expert, policy_upload
+from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, require_demonstrations
+from sarl_dashboard.state.environments import environment_of
+from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.rule_files import OWN_FILE
+from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
+from sarl_dashboard.text import digest_of, in_full
+from sarl_dashboard.views.improve.outcome import show_outcome, show_shipped
 
 SHIPPED_EXPERT, NOBODY = "shipped", "nobody"
 EVERY_LEAF, AT_THRESHOLDS = "every leaf", "at the thresholds"
@@ -75,7 +71,7 @@ def settings(demonstrations: Demonstrations) -> Choices:
     expert = st.session_state.get("expert") or st.query_params.get("expert")
     asked = expert != NOBODY
     max_rules, cut, rounds, refinement, validation = MIN_RULES, EVERY_LEAF, 1, 0, 1
-    divider, policy_file = state.MIN_DIVIDER, None
+    divider, policy_file = MIN_DIVIDER, None
     with st.container(border=True):
         with st.grid(5, min_column_width=150, gap="small"):
             env = environment_choice()
@@ -146,10 +142,10 @@ def settings(demonstrations: Demonstrations) -> Choices:
             if not demonstrations.is_discrete:
                 divider = st.slider(
                     "Divider",
-                    state.MIN_DIVIDER,
-                    state.MAX_DIVIDER,
+                    MIN_DIVIDER,
+                    MAX_DIVIDER,
                     key="divider",
-                    value=state.MIN_DIVIDER,
+                    value=MIN_DIVIDER,
                     bind="query-params",
                     help="Number of equal intervals each continuous action is divided into.",
                 )
@@ -194,7 +190,7 @@ def make_order(choices: Choices, demonstrations: Demonstrations) -> Order:
         make, digest = agent_for("expert", None, env_id, choices.seed)
     thresholds = None
     if choices.cut == AT_THRESHOLDS:
-        in_force = state.chosen_thresholds()
+        in_force = chosen_thresholds()
         thresholds = Thresholds(in_force.support, in_force.confidence)
     plan = Plan(
         choices.max_rules,
@@ -213,7 +209,7 @@ def make_order(choices: Choices, demonstrations: Demonstrations) -> Order:
 
 def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) -> Order:
     """Which states need a demonstration, at the thresholds in force."""
-    rules = state.rule_set(state.trees(demonstrations, choices.divider))
+    rules = mined_rules(grown_trees(demonstrations, choices.divider))
     plan = Plan(
         MIN_RULES,
         rounds=1,
@@ -230,8 +226,8 @@ def command_for(
     choices: Choices, demonstrations: Demonstrations, env_id: str, thresholds: Thresholds | None
 ) -> str:
     """The same on the command line, for the card."""
-    name = state.chosen_dataset()
-    file = f"data/demonstrations/{name}.parquet" if name in state.SHIPPED else upload_name()
+    name = chosen_dataset()
+    file = f"data/demonstrations/{name}.parquet" if name in SHIPPED_SETS else upload_name()
     statistics = choices.policy_file.statistics if choices.policy_file else None
     words = ["python", "-m", "sarl_core", "aggregate", file]
     for option, value, usual in (
@@ -243,7 +239,7 @@ def command_for(
         ("--episodes", choices.episodes, None),
         ("--support", thresholds and thresholds.support, None),
         ("--confidence", thresholds and thresholds.confidence, None),
-        ("--divider", choices.divider, state.MIN_DIVIDER),
+        ("--divider", choices.divider, MIN_DIVIDER),
         ("--refine", choices.refinement, 0),
         ("--validation", choices.validation, None),
         ("--seed", choices.seed, 0),
@@ -329,7 +325,7 @@ st.caption(
     "what it would have done in the states they lead to, and few rules are made of all its "
     "answers. With nobody to ask, the page shows which states need a demonstration."
 )
-chosen = state.require_demonstrations()
+chosen = require_demonstrations()
 choices = settings(chosen)
 order: Order | None = None
 try:

@@ -11,32 +11,25 @@ from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
-import _learning as learning
-import _state as state
 import streamlit as st
-from _choices import (
-    CHOSEN,
-    COMPACT,
-    OWN_FILE,
-    PROJECTIONS,
-    RULES_FOLDER,
-    compact_file,
-    environment_of,
-    rules_for,
-)
-from _environments import registered
-from _learning_view import archive, show_curves, show_study
-from _settings import notes_notice
-from _words import escaped, in_full
 
-from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError, SarlError
-from sarl_core.explaining.language import counted, threshold_text
+from sarl_core.learning.arms import ARMS
+from sarl_core.learning.run import rules_digest
+from sarl_core.learning.study import LearningPlan
+from sarl_core.learning.study_files import LearningStudy, load_study, policy_path
+from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import RuleSet
-from sarl_core.rollouts.learning import rules_digest
-from sarl_core.rollouts.learning_arms import ARMS
-from sarl_core.rollouts.learning_files import LearningStudy, load_study, policy_path
-from sarl_core.rollouts.learning_study import LearningPlan
+from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.jobs import learning
+from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
+from sarl_dashboard.state.environments import environment_of, registered
+from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, RULES_FOLDER, compact_file
+from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.views.learning.study import archive, show_curves, show_study
 
 SHIPPED, OWN = "The study", "Your own"
 MOST_STEPS, MOST_SEEDS = 500_000, 5
@@ -64,7 +57,7 @@ def shipped_studies() -> dict[str, LearningStudy]:
 
 def title_of(study: LearningStudy) -> str:
     """Environment and rules of a study, in a few words."""
-    names = {env_id: label for label, env_id in state.SHIPPED.values()}
+    names = {env_id: label for label, env_id in SHIPPED_SETS.values()}
     rules = study.settings.get("rules")
     by = f", {counted(int(rules['count']), 'rule')}" if isinstance(rules, dict) else ""
     return f"{names.get(study.env_id, study.env_id)}{by}"
@@ -79,7 +72,7 @@ def show_shipped() -> None:
             icon=":material/school:",
         )
         return
-    demonstrations = state.chosen_demonstrations()
+    demonstrations = chosen_demonstrations()
     env_id = demonstrations.env_id if demonstrations is not None else ""
     fitting = [name for name, study in studies.items() if study.env_id == env_id]
     name = st.segmented_control(
@@ -96,7 +89,7 @@ def show_shipped() -> None:
             f"For {escaped(env_id or 'these demonstrations')} no study is shipped; under “Your "
             "own” you can make one."
         )
-    study = studies[cast(str, name)]
+    study = studies[name]
     show_study(study, "shipped")
     with st.expander("Make it again", icon=":material/terminal:"):
         for command in commands(study):
@@ -111,7 +104,7 @@ def commands(study: LearningStudy) -> list[str]:
     if isinstance(rules, dict):
         shipped_file = shipped_rules().get(str(rules["digest"]))
         file = f" --rules {shipped_file or 'rules.json'}"
-        data = {env_id: data for data, (_, env_id) in state.SHIPPED.items()}.get(study.env_id, "")
+        data = {env_id: data for data, (_, env_id) in SHIPPED_SETS.items()}.get(study.env_id, "")
         if shipped_file is None:
             first = [
                 f"python -m sarl_core mine data/demonstrations/{data}.parquet --support "

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import _names
-import _state as state
 import streamlit as st
-from _words import escaped, file_name, in_full
 
 from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import save_demonstrations
 from sarl_core.demonstrations.names import Names, names_of
-from sarl_core.explaining.language import sentence
+from sarl_core.mining.language import sentence
+from sarl_dashboard.state import given_names
+from sarl_dashboard.state.data import all_demonstrations, raw_demonstrations, require_demonstrations
+from sarl_dashboard.state.mined import grown_trees, largest_rules
+from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
+from sarl_dashboard.text import escaped, file_name, in_full
 
 FEATURES, ACTIONS, LABELS = "Features", "Actions", "Labels"
 
@@ -82,8 +85,9 @@ def begin(table: str, raw: Demonstrations) -> Names:
     key = key_of(table, raw)
     begun = st.session_state.setdefault("_names_begun", {})
     if key not in st.session_state or key not in begun:
-        begun[key] = _names.draft(raw)
-    return begun[key]
+        begun[key] = given_names.draft(raw)
+    began: Names = begun[key]
+    return began
 
 
 def take(table: str, raw: Demonstrations) -> None:
@@ -93,13 +97,13 @@ def take(table: str, raw: Demonstrations) -> None:
         return
     rows = st.session_state[key]["edited_rows"]
     began = changed(table, begun[key], rows)
-    now = _names.draft(raw)
-    parts = {
+    now = given_names.draft(raw)
+    parts: dict[str, dict[str, Any]] = {
         FEATURES: {"features": began.features, "units": began.units},
         ACTIONS: {"actions": began.actions},
         LABELS: {"labels": began.labels},
     }
-    _names.give(raw, now._replace(**parts[table]))
+    given_names.give(raw, now._replace(**parts[table]))
 
 
 def editor(table: str, raw: Demonstrations) -> None:
@@ -108,7 +112,7 @@ def editor(table: str, raw: Demonstrations) -> None:
 
     began = begin(table, raw)
     frame = pd.DataFrame(columns_of(table, began, raw))
-    fixed = [name for name in frame if name not in ("Name", "Unit")]
+    fixed = [str(name) for name in frame if name not in ("Name", "Unit")]
     if table == LABELS and len(raw.action_dimensions) == 1:
         frame = frame.drop(columns="Of")
         fixed.remove("Of")
@@ -136,7 +140,7 @@ def editor(table: str, raw: Demonstrations) -> None:
 
 def forget(raw: Demonstrations) -> None:
     """Back to the names of the data."""
-    _names.reset(raw)
+    given_names.reset(raw)
     st.session_state["_names_reset"] = st.session_state.get("_names_reset", 0) + 1
 
 
@@ -150,8 +154,8 @@ def as_parquet(demonstrations: Demonstrations) -> bytes:
 
 def show_sentence(demonstrations: Demonstrations) -> None:
     """How a rule reads under these names."""
-    grown = state.trees(demonstrations, state.chosen_divider())
-    rules = state.largest_rules(grown, state.chosen_thresholds(), 5).part
+    grown = grown_trees(demonstrations, chosen_divider())
+    rules = largest_rules(grown, chosen_thresholds(), 5).part
     if not rules.rules:
         return
     longest = max(rules.rules, key=lambda rule: rule.merged_length)
@@ -166,12 +170,12 @@ st.caption(
     "rules stay the same. Names are kept while this page is open in your browser; the Parquet file "
     "takes them along."
 )
-state.require_demonstrations()
-data = state.raw_demonstrations()
+require_demonstrations()
+data = raw_demonstrations()
 assert data is not None
 for each in (FEATURES, ACTIONS, LABELS):
     take(each, data)
-refused = _names.problem(data)
+refused = given_names.problem(data)
 if refused:
     st.error(
         f"{in_full(refused)} Until then the names before this change are used.",
@@ -189,12 +193,12 @@ with right:
         editor(LABELS, data)
     else:
         st.caption("The labels are intervals of these actions, named by their bounds.")
-named = state.all_demonstrations()
+named = all_demonstrations()
 assert named is not None
 with st.container(horizontal=True):
     st.download_button(
         "Download as Parquet",
-        lambda: as_parquet(named),
+        partial(as_parquet, named),
         file_name=f"{file_name(named.env_id)}.parquet",
         mime="application/vnd.apache.parquet",
         on_click="ignore",
@@ -208,6 +212,6 @@ with st.container(horizontal=True):
         key="names_back",
         on_click=forget,
         args=(data,),
-        disabled=_names.given_names(data) is None and not refused,
+        disabled=given_names.given_names(data) is None and not refused,
     )
-show_sentence(state.require_demonstrations())
+show_sentence(require_demonstrations())

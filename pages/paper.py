@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 
-import _paper as paper
-import _state as state
 import streamlit as st
-from _words import in_full
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.language import counted
-from sarl_core.reproducing.chance import chance_text
-from sarl_core.reproducing.report import Entry, Report
-from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import FULL_MINUTES, replication
-from sarl_core.reproducing.verdicts import VERDICTS
+from sarl_core.mining.language import counted
+from sarl_core.paper.chance import chance_text
+from sarl_core.paper.report import REPORT, Entry, Report
+from sarl_core.paper.studies import STUDIES
+from sarl_core.paper.study import FULL_MINUTES, replication
+from sarl_core.paper.verdicts import VERDICTS
+from sarl_dashboard.session import is_dark
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.paper import studies
 
 CLAIMS = "Claims"
 ALL = "all"
@@ -25,11 +25,11 @@ PLAIN = {"displayModeBar": False}
 def load() -> Report:
     """The report; where there is none, say how to make it and stop the page."""
     try:
-        found = paper.report()
+        found = studies.report()
     except SarlError as error:
         st.error(in_full(str(error)), icon=":material/error:")
         st.caption("This makes it again:")
-        st.code(paper.COMMAND, language="sh")
+        st.code(studies.COMMAND, language="sh")
         st.stop()
     if found is None or not found.studies:
         st.info(
@@ -37,7 +37,7 @@ def load() -> Report:
             f"figure; it takes about {FULL_MINUTES} minutes on two cores.",
             icon=":material/terminal:",
         )
-        st.code(paper.COMMAND, language="sh")
+        st.code(studies.COMMAND, language="sh")
         st.stop()
     return found
 
@@ -69,7 +69,7 @@ def show_all_claims(found: Report) -> None:
         chosen = tuple(claim for claim in entry.claims if wanted in (ALL, claim.verdict))
         if chosen:
             st.markdown(f"**{entry.place}. {entry.title}**")
-            paper.show_claims(chosen, beside=False)
+            studies.show_claims(chosen, beside=False)
     st.caption(
         "Each verdict is decided by a rule, from the numbers alone: over several recordings of "
         "several experts, since one recording is one draw. Who has the demonstrations of another "
@@ -86,7 +86,7 @@ def show_study(name: str, entry: Entry | None) -> None:
             f"{study.place} has not been made yet. This command makes it:",
             icon=":material/terminal:",
         )
-        st.code(f"python -m sarl_core reproduce --figure {name} --out docs/paper", language="sh")
+        st.code(f"python -m sarl_core reproduce --figure {name} --out data/paper", language="sh")
         return
     st.caption(study.about)
     if entry.quick:
@@ -96,7 +96,7 @@ def show_study(name: str, entry: Entry | None) -> None:
             icon=":material/bolt:",
         )
     try:
-        frame = paper.table(name, entry)
+        frame = studies.table(name, entry)
         parts = study.parts(frame)
     except SarlError as error:
         st.error(in_full(str(error)), icon=":material/error:")
@@ -118,14 +118,14 @@ def show_study(name: str, entry: Entry | None) -> None:
         )
     left, right = st.columns([3, 2], gap="large")
     with left:
-        drawn = paper.drawings(name, entry, part, dark=state.is_dark())
+        drawn = studies.drawings(name, entry, part, dark=is_dark())
         for number, drawing in enumerate(drawn):
             st.markdown(f"**{drawing.title}**")
             st.plotly_chart(
                 drawing.figure, key=f"drawing_{name}_{number}", config=PLAIN, alt=drawing.alt
             )
     with right:
-        paper.show_claims(entry.claims, beside=True)
+        studies.show_claims(entry.claims, beside=True)
     how_made(entry)
     downloads(entry)
 
@@ -134,10 +134,10 @@ def downloads(entry: Entry) -> None:
     """The files of a study, and the report."""
     files = entry.files
     with st.container(horizontal=True):
-        if (paper.FOLDER / files["page"]).is_file():
+        if (studies.FOLDER / files["page"]).is_file():
             st.download_button(
                 "Page (HTML)",
-                lambda: paper.whole_page(entry),
+                lambda: studies.whole_page(entry),
                 files["page"],
                 "text/html",
                 key="page_file",
@@ -148,7 +148,7 @@ def downloads(entry: Entry) -> None:
             ("Picture (PNG)", "picture", "image/png"),
             ("Data (CSV)", "table", "text/csv"),
         ):
-            path = paper.FOLDER / files[kind]
+            path = studies.FOLDER / files[kind]
             if path.is_file():
                 st.download_button(
                     label,
@@ -166,8 +166,8 @@ def download_report() -> None:
     """The report as it is."""
     st.download_button(
         "All numbers (JSON)",
-        (paper.FOLDER / paper.REPORT).read_bytes(),
-        paper.REPORT,
+        (studies.FOLDER / REPORT).read_bytes(),
+        REPORT,
         "application/json",
         key="report_file",
         on_click="ignore",
@@ -182,7 +182,7 @@ def how_made(entry: Entry) -> None:
         st.markdown(
             f"On {entry.made}, within {max(1, round(entry.seconds / 60))} min, with {versions}."
         )
-        st.code(entry.command.replace("DIR", "docs/paper"), language="sh")
+        st.code(entry.command.replace("DIR", "data/paper"), language="sh")
         st.json({"settings": entry.settings, "inputs": entry.inputs}, expanded=2)
 
 

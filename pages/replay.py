@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
-import _state as state
 import streamlit as st
-from _choices import (
-    AGENTS,
-    CHOSEN,
-    COMPACT,
-    EDITED,
-    FRESH_SEED,
-    NO_RULES,
-    OWN_FILE,
-    PAPERS,
-    PROJECTIONS,
-    agent_for,
-    continuous,
-    demonstrated,
-    digest_of,
-    environment_of,
-    policy_upload,
-    rules_for,
+
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import SarlError
+from sarl_core.explaining.replay import named_description
+from sarl_core.mining.rules import UNFILTERED, RuleSet
+from sarl_core.rollouts.player import shield_for
+from sarl_core.shielding.shield import Shield
+from sarl_dashboard.components.settings import (
+    environment_choice,
+    no_boxes_notice,
+    notes_notice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
 )
-from _compact import THRESHOLDS
-from _over_view import comparison
-from _replay_view import numbers, step_by_step
-from _replays import (
+from sarl_dashboard.jobs.replays import (
     Order,
     Request,
     compared,
@@ -37,22 +31,15 @@ from _replays import (
     run,
     with_progress,
 )
-from _settings import (
-    environment_choice,
-    no_boxes_notice,
-    notes_notice,
-    offered_rule_sets,
-    outside_choice,
-    projection_choice,
-)
-from _words import escaped
-
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.errors import SarlError
-from sarl_core.explaining.replay import named_description
-from sarl_core.mining.rules import UNFILTERED, RuleSet
-from sarl_core.rollouts.player import shield_for
-from sarl_core.shielding.shield import Shield
+from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
+from sarl_dashboard.state.compact_set import THRESHOLDS
+from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, NO_RULES, OWN_FILE, PAPERS
+from sarl_dashboard.text import digest_of, escaped
+from sarl_dashboard.views.replay.episodes import comparison
+from sarl_dashboard.views.replay.steps import numbers, step_by_step
 
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
 
@@ -112,7 +99,7 @@ def settings() -> Callable[[], Order]:
             rule_set = shield_for(env_id, Shield(rule_set)).rule_set
         make, digest = agent_for(agent, policy_file, env_id, int(seed or 0))
         described = named_description(
-            describe_environment(env_id), rule_set, state.chosen_demonstrations()
+            describe_environment(env_id), rule_set, chosen_demonstrations()
         )
         return Order(
             Request(
@@ -226,7 +213,7 @@ with st.container(horizontal=True):
     )
     st.download_button(
         "Download MP4",
-        lambda: movie(replayed),
+        partial(movie, replayed),
         f"{name}.mp4",
         "video/mp4",
         key="mp4",

@@ -7,11 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import _state as state
 import streamlit as st
-from _choices import CHOSEN, COMPACT, EDITED, OWN_FILE, PAPERS, compact_file, rules_for
-from _edits import offered as edits_offered
-from _reporting import (
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError, SarlError
+from sarl_core.explaining.report.comparison import Result, results_from_text
+from sarl_core.explaining.report.provenance import command_line, mining_command
+from sarl_core.explaining.report.report import Report, Wishes
+from sarl_core.explaining.report.tally import report_rules
+from sarl_core.explaining.report.thresholds import read_card
+from sarl_core.mining.language import counted
+from sarl_core.mining.rules import RuleSet
+from sarl_dashboard.jobs.report import (
     Order,
     Reporting,
     as_results,
@@ -19,18 +27,18 @@ from _reporting import (
     kept_report,
     order_key,
 )
-from _words import escaped, in_full
-from streamlit.runtime.uploaded_file_manager import UploadedFile
-
-from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError, SarlError
-from sarl_core.explaining.language import counted
-from sarl_core.explaining.report import Report, Wishes
-from sarl_core.explaining.report_again import command_line, mining_command
-from sarl_core.explaining.report_comparison import Result, results_from_text
-from sarl_core.explaining.report_counts import report_rules
-from sarl_core.explaining.report_thresholds import read_card
-from sarl_core.mining.rules import RuleSet
+from sarl_dashboard.state.data import (
+    UPLOAD,
+    chosen_dataset,
+    data_key,
+    raw_demonstrations,
+    require_demonstrations,
+)
+from sarl_dashboard.state.edits import offered as edits_offered
+from sarl_dashboard.state.mined import grown_trees
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS, compact_file
+from sarl_dashboard.text import escaped, in_full
 
 JOB = "_job_report"
 PREVIEW = 900  # pixels
@@ -138,8 +146,8 @@ def order(choices: Choices, demonstrations: Demonstrations) -> Order:
     )
     grown = None
     if rule_set.cut == "thresholds":
-        grown = state.trees(demonstrations, rule_set.divider)
-    key = order_key(f"{digest} {state.data_key()}", demonstrations, wishes, results)
+        grown = grown_trees(demonstrations, rule_set.divider)
+    key = order_key(f"{digest} {data_key()}", demonstrations, wishes, results)
     return Order(key, rule_set, demonstrations, wishes, card, results, grown)
 
 
@@ -170,9 +178,9 @@ def chosen_card(choices: Choices) -> Mapping[str, Any] | None:
 
 def file_names(choices: Choices) -> tuple[str, str]:
     """Of the rules and of the demonstrations, as the command line would name them."""
-    name = state.chosen_dataset()
+    name = chosen_dataset()
     data = f"data/demonstrations/{name}.parquet"
-    if name == state.UPLOAD:
+    if name == UPLOAD:
         data = str(st.session_state.get("_upload_name") or "demonstrations.parquet")
     rules = "rules.json"
     if choices.rules == COMPACT:
@@ -191,7 +199,7 @@ def commands(
     result_names: tuple[str, ...],
 ) -> tuple[str, ...]:
     """How the report is made again; () where a file alone does not hold what it is made of."""
-    raw = state.raw_demonstrations()
+    raw = raw_demonstrations()
     if raw is None or raw.digest != demonstrations.digest:
         return ()  # episodes are held out or left out, or things have other names
     mined = None
@@ -298,7 +306,7 @@ st.caption(
     "The rules in one file for people who know only the task: what was demonstrated, every rule in "
     "words with its evidence and pictures, what the rules do not reach, and what nobody promises."
 )
-data = state.require_demonstrations()
+data = require_demonstrations()
 session_comparison, _ = comparison_of_session(data.env_id)
 chosen = settings(session_comparison is not None)
 if chosen.rules == OWN_FILE and chosen.rule_file is None:
@@ -320,7 +328,7 @@ def outcome() -> None:
     made = kept_report(asked_for.key)
     bar(asked_for, made=made is not None)
     if made is not None and not at_work:
-        show(made, state.chosen_dataset().replace("_", "-"))
+        show(made, chosen_dataset().replace("_", "-"))
     elif not at_work and not asked_for.comparison:
         st.markdown(
             ":material/info: :gray[A report says more with results in it: run agents with the "

@@ -6,32 +6,35 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import _compact
-import _edits
-import _elsewhere
-import _state as state
 import streamlit as st
-from _cache import cached
-from _rule_table import column_config, frame, table_height
-from _rule_view import Behind, make_ready, show_rule
-from _words import in_full
 
-from sarl_core.explaining.evidence_words import remedy_text, shortfall_text
-from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import action_text, conditions_text, threshold_text
-from sarl_core.mining.holding_out import lower_bound, shortfall, with_lower_bound
+from sarl_core.explaining.exports.export import rules_to_csv, rules_to_text
+from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
+from sarl_core.mining.language import action_text, conditions_text, threshold_text
 from sarl_core.mining.rule_files import rules_to_json
 from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.edits_notice import notice
+from sarl_dashboard.components.tables import column_config, frame, table_height
+from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.data import data_parts, held_out_digest, require_demonstrations
+from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
+from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.rules.rule import Behind, make_ready, show_rule
 
 TABLE_ROWS = 8
 EVERY = "every action"
 
 st.title("Rules")
-_edits.notice()
-demonstrations = state.require_demonstrations()
-compact = _compact.chosen_compact(demonstrations)
-thresholds = state.chosen_thresholds()
-grown = state.trees(demonstrations, state.chosen_divider()) if compact is None else compact.trees
+notice()
+demonstrations = require_demonstrations()
+compact = compact_set.chosen_compact(demonstrations)
+thresholds = chosen_thresholds()
+grown = grown_trees(demonstrations, chosen_divider()) if compact is None else compact.trees
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +105,7 @@ def pick(shown: list[int], rules: tuple[Rule, ...]) -> None:
     """Choose the rule whose row was selected."""
     rows = st.session_state["rule_table"]["selection"]["rows"]
     if rows and rows[0] < len(shown):
-        state.set_url_choice("rule", rules[shown[rows[0]]].id)
+        set_url_choice("rule", rules[shown[rows[0]]].id)
 
 
 def select_row(place: int | None) -> None:
@@ -127,7 +130,7 @@ def walk(shown: list[int], rules: tuple[Rule, ...], place: int | None) -> None:
                 name,
                 icon=icon,
                 key=name.split()[0].lower(),
-                on_click=state.set_url_choice,
+                on_click=set_url_choice,
                 args=("rule", rule_id),
                 disabled=rule_id is None,
             )
@@ -160,7 +163,7 @@ def matching(listed: Listed, rule_set: RuleSet) -> list[int]:
             width=220,
             label_visibility="collapsed",
         )
-        least = lower_bound_choice() if compact is None and state.held_out_digest() else 0.0
+        least = lower_bound_choice() if compact is None and held_out_digest() else 0.0
         sure = [at for at, low in enumerate(listed.lower) if low >= least]
         if compact is not None:
             downloads(len(compact.shipped), lambda: compact.shipped)
@@ -199,7 +202,7 @@ def lower_bound_choice() -> float:
 
 def why_left_out(listed: Listed, least: float) -> None:
     """Why rules do not reach the lower bound, and where none does, what to do."""
-    parts = state.parts()
+    parts = data_parts()
     assert parts is not None
     assert parts.held_out is not None
     found = shortfall(listed.rules, least, parts.held_out.n_episodes)
@@ -212,7 +215,7 @@ def why_left_out(listed: Listed, least: float) -> None:
 def search_and_rules(rule_set: RuleSet) -> None:
     """What is searched for, and the rules that match."""
     key = (
-        (rule_set.source.digest, rule_set.divider, thresholds, state.held_out_digest())
+        (rule_set.source.digest, rule_set.divider, thresholds, held_out_digest())
         if compact is None
         else (compact.digest,)
     )
@@ -221,7 +224,7 @@ def search_and_rules(rule_set: RuleSet) -> None:
     if shown:
         table_and_rule(listed, shown, rule_set)
     else:
-        state.url_choice("rule", [rule.id for rule in listed.rules], listed.rules[0].id)
+        url_choice("rule", [rule.id for rule in listed.rules], listed.rules[0].id)
         st.info(
             "No rule matches the search; clear it, and the lower bound, to see all.",
             icon=":material/search_off:",
@@ -232,7 +235,7 @@ def search_and_rules(rule_set: RuleSet) -> None:
 def table_and_rule(listed: Listed, shown: list[int], rule_set: RuleSet) -> None:
     """The table of rules, and the chosen one: another choice runs this part alone."""
     rules = listed.rules
-    chosen_id = state.url_choice("rule", [rule.id for rule in rules], rules[0].id)
+    chosen_id = url_choice("rule", [rule.id for rule in rules], rules[0].id)
     place = next((row for row, at in enumerate(shown) if rules[at].id == chosen_id), None)
     behind = Behind(demonstrations, grown, thresholds, compact)
     above, below = st.container(), st.container()
@@ -246,9 +249,9 @@ def table_and_rule(listed: Listed, shown: list[int], rule_set: RuleSet) -> None:
     with above:
         rule_rows(listed, shown, rule_set, place)
     # What the buttons lead to is made while nobody waits for it.
-    for other in (1, -1) if place is not None else ():
-        if 0 <= place + other < len(shown):
-            make_ready(rules[shown[place + other]], behind)
+    for other in () if place is None else (place + 1, place - 1):
+        if 0 <= other < len(shown):
+            make_ready(rules[shown[other]], behind)
 
 
 def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | None) -> None:
@@ -276,10 +279,10 @@ def rule_rows(listed: Listed, shown: list[int], rule_set: RuleSet, place: int | 
 
 
 with st.spinner("Mining the rules …"):
-    in_force = state.rule_set(grown, thresholds) if compact is None else compact.counted
+    in_force = mined_rules(grown, thresholds) if compact is None else compact.counted
 if not in_force.rules:
     nothing_in_force()
 else:
-    _elsewhere.told(thresholds, in_force.fidelity)
+    cross_fitting.told(thresholds, in_force.fidelity)
     search_and_rules(in_force)
-_elsewhere.make_ready()
+cross_fitting.make_ready()

@@ -10,43 +10,37 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import streamlit as st
-from _choices import (
-    AGENTS,
-    CHOSEN,
-    COMPACT,
-    EDITED,
-    FRESH_SEED,
-    OWN_FILE,
-    PAPERS,
-    PROJECTIONS,
-    PolicyFile,
-    agent_for,
-    continuous,
-    demonstrated,
-    environment_of,
-    policy_uploads,
-    rules_for,
-)
-from _comparisons import Row, row_key
-from _run_bar import known, run_bar, working
-from _settings import (
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.agents.agent import Agent
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import SarlError
+from sarl_core.explaining.figures.comparison import arm_style
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_core.studies.comparison import Arm
+from sarl_dashboard.components.run_bar import run_bar
+from sarl_dashboard.components.settings import (
     environment_choice,
     no_boxes_notice,
     offered_rule_sets,
     outside_choice,
     projection_choice,
 )
-from _shield_view import Line, show
-from _words import in_full
-from streamlit.runtime.uploaded_file_manager import UploadedFile
-
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.errors import SarlError
-from sarl_core.explaining.comparison_figures import arm_style
-from sarl_core.mining.rules import RuleSet
-from sarl_core.rollouts.agents import Agent
-from sarl_core.rollouts.comparison import Arm
-from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.jobs.episodes import Row, known, row_key, working
+from sarl_dashboard.state.agents import (
+    AGENTS,
+    FRESH_SEED,
+    PROJECTIONS,
+    PolicyFile,
+    agent_for,
+    policy_uploads,
+)
+from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.shield.table import Line, show
 
 NO_SHIELD = "no shield"
 # Their places give them their colours, the paper's where it has them.

@@ -7,14 +7,42 @@ it in a place of its own, since every further fragment would cost a run of its o
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Literal
 
-import _compact
-import _elsewhere
-import _state as state
 import streamlit as st
-from _divider_view import show_divider
-from _threshold_view import (
+from streamlit.delta_generator import DeltaGenerator
+
+from sarl_core.explaining.figures import thresholds as figures
+from sarl_core.explaining.words.cross_fit import elsewhere_text
+from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
+from sarl_core.mining.language import share_text, threshold_text
+from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+from sarl_core.mining.threshold_steps import (
+    CONFIDENCE_STEPS,
+    FINE_CONFIDENCES,
+    FINE_SUPPORTS,
+    SUPPORT_STEPS,
+    neat_jumps,
+    with_step,
+)
+from sarl_core.mining.validation.cross_fitting import Judged
+from sarl_core.mining.validation.evidence import HeldOut
+from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
+from sarl_dashboard.state.mined import grown_trees, mined_landscape
+from sarl_dashboard.state.thresholds import (
+    MAX_DEPTH,
+    MAX_DIVIDER,
+    MAX_LIFT,
+    MIN_DIVIDER,
+    choose_thresholds,
+    chosen_divider,
+    chosen_thresholds,
+)
+from sarl_dashboard.views.thresholds.divider import show_divider
+from sarl_dashboard.views.thresholds.maps import (
     DIVIDER,
     LARGEST,
     MAPS,
@@ -31,23 +59,6 @@ from _threshold_view import (
     show_surfaces,
     show_trade_offs,
 )
-from streamlit.delta_generator import DeltaGenerator
-
-from sarl_core.explaining import threshold_figures as figures
-from sarl_core.explaining.cross_fit_words import elsewhere_text
-from sarl_core.explaining.language import share_text, threshold_text
-from sarl_core.explaining.steps import (
-    CONFIDENCE_STEPS,
-    FINE_CONFIDENCES,
-    FINE_SUPPORTS,
-    SUPPORT_STEPS,
-    neat_jumps,
-    with_step,
-)
-from sarl_core.mining.cross_fitting import Judged
-from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
-from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 
 SIZE, QUALITY, HELD_OUT = "Rules and length", "Coverage and fidelity", "Held out"
 LAYERS: dict[str, tuple[figures.Layer, figures.Layer]] = {
@@ -59,9 +70,9 @@ FINE, PAPER = "Fine grid", "Paper's grid"
 WHOLE = "All actions"
 
 st.title("Thresholds")
-demonstrations = state.require_demonstrations()
-grown = state.trees(demonstrations, state.chosen_divider())
-compact = _compact.chosen_compact(demonstrations)
+demonstrations = require_demonstrations()
+grown = grown_trees(demonstrations, chosen_divider())
+compact = compact_set.chosen_compact(demonstrations)
 
 
 # --- what widgets do ---------------------------------------------------------------------------
@@ -80,14 +91,14 @@ def jump(name: str, value: float) -> None:
 
 def use(setting: Thresholds) -> None:
     """Put a named setting in force."""
-    state.choose_thresholds(setting)
-    _compact.choose(False)
+    choose_thresholds(setting)
+    compact_set.choose(False)
     st.rerun()  # lift and depth, which it resets, are part of the maps
 
 
 def use_compact() -> None:
     """Put the compact rules in force."""
-    _compact.choose(True)
+    compact_set.choose(True)
     st.rerun()  # the maps lose their ring
 
 
@@ -129,10 +140,12 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
         table: Where the table of rules goes; None where it is not looked at.
     """
     take_over()
-    thresholds = state.chosen_thresholds()
+    thresholds = chosen_thresholds()
     # A callback that asks for more than this fragment costs a run; most moves need none.
     alone = table is not None and st.session_state.get("view") != SURFACES
-    moved = leave_compact if compact is not None else "rerun" if alone else follow
+    moved: Callable[[], None] | Literal["rerun"] = (
+        leave_compact if compact is not None else "rerun" if alone else follow
+    )
     jumps = neat_jumps(grown, thresholds)
     left, middle, right = st.columns([4, 4, 3])
     with left:
@@ -163,10 +176,10 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
         if not demonstrations.is_discrete:
             st.slider(
                 "Divider",
-                state.MIN_DIVIDER,
-                state.MAX_DIVIDER,
+                MIN_DIVIDER,
+                MAX_DIVIDER,
                 key="divider",
-                value=state.MIN_DIVIDER,
+                value=MIN_DIVIDER,
                 bind="query-params",
                 on_change=leave_compact,
                 help="Number of equal intervals each continuous action is divided into.",
@@ -175,10 +188,10 @@ def controls(dimension: int | None, grid: Landscape, table: DeltaGenerator | Non
     point = (
         here(grown, thresholds, dimension) if compact is None else compact_point(compact, dimension)
     )
-    other = _elsewhere.judged(thresholds) if dimension is None else None
+    other = cross_fitting.judged(thresholds) if dimension is None else None
     metrics(point, other)
     if dimension is None:
-        _elsewhere.told(thresholds, float(point.fidelity[0, 0]))
+        cross_fitting.told(thresholds, float(point.fidelity[0, 0]))
     across, down = figures.mark_place(grid, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
     if compact is not None:
@@ -204,7 +217,7 @@ def named_settings(thresholds: Thresholds) -> None:
                 help=f"The paper's setting: support {setting.support:g}, "
                 f"confidence {setting.confidence:g}",
             )
-        if _compact.offered():
+        if compact_set.offered():
             st.button(
                 "Compact",
                 key="compact",
@@ -238,14 +251,14 @@ def metrics(point: Landscape, other: Judged | None) -> None:
             share_text(float(point.coverage[0, 0]), decimals=1),
             help="Share of the demonstrated states in which some rule applies; elsewhere: of the "
             "states of an episode that the rules were not mined from, on average",
-            **elsewhere(other and other.coverage),
+            **elsewhere(None if other is None else other.coverage),
         )
         st.metric(
             "Fidelity",
             share_text(float(point.fidelity[0, 0]), decimals=1),
             help="Share of those in which the expert did what the rule says; elsewhere: in an "
             "episode that the rules were not mined from, on average",
-            **elsewhere(other and other.fidelity),
+            **elsewhere(None if other is None else other.fidelity),
         )
         if point.held_out_fidelity is not None:
             st.metric(
@@ -262,12 +275,12 @@ def more() -> None:
         st.slider(
             "Minimum lift",
             0.0,
-            state.MAX_LIFT,
+            MAX_LIFT,
             value=0.0,
             step=0.1,
             key="lift",
             bind="query-params",
-            on_change=_compact.choose,
+            on_change=compact_set.choose,
             args=(False,),
             help="How many times more often than over all states the expert must have done what "
             "the rule says. 0: no limit.",
@@ -275,11 +288,11 @@ def more() -> None:
         st.slider(
             "Maximum depth",
             0,
-            state.MAX_DEPTH,
+            MAX_DEPTH,
             value=0,
             key="depth",
             bind="query-params",
-            on_change=_compact.choose,
+            on_change=compact_set.choose,
             args=(False,),
             help="Most conditions of a rule. 0: no limit.",
         )
@@ -333,7 +346,7 @@ st.caption(
 )
 top = st.container()
 with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
-    pairs = [SIZE, QUALITY] if state.held_out() is None else [SIZE, QUALITY, HELD_OUT]
+    pairs = [SIZE, QUALITY] if held_out_demonstrations() is None else [SIZE, QUALITY, HELD_OUT]
     shown = switch("Show", "layer", pairs, "What the two figures show")
     view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
     axes = switch(
@@ -344,8 +357,8 @@ with st.container(horizontal=True, gap="medium", vertical_alignment="center", ke
     )
     more()
     dimension = chosen_dimension()
-in_force = state.chosen_thresholds()
-whole = state.landscape(
+in_force = chosen_thresholds()
+whole = mined_landscape(
     grown,
     *((PAPER_SUPPORTS, PAPER_CONFIDENCES) if axes == PAPER else (FINE_SUPPORTS, FINE_CONFIDENCES)),
     lift=in_force.lift,
@@ -374,4 +387,4 @@ with top:
 st.page_link(
     "rules.py", label="All rules, with the evidence behind each", icon=":material/arrow_forward:"
 )
-_elsewhere.make_ready()
+cross_fitting.make_ready()

@@ -4,29 +4,35 @@ from __future__ import annotations
 
 from typing import Any
 
-import _compact
-import _edits
-import _state as state
 import numpy as np
 import streamlit as st
-from _cache import cached
-from _choices import PROJECTIONS
-from _replays import kept_replays
-from _settings import no_boxes_notice, notes_notice, outside_choice, projection_choice
-from _what_if_view import show
-from _words import escaped
 from numpy.typing import NDArray
 
 from sarl_core.decimals import digits_telling
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.language import label_text
-from sarl_core.explaining.lit_path import PathFinder
-from sarl_core.explaining.what_if import by_use
+from sarl_core.explaining.html.lit_path import PathFinder
+from sarl_core.explaining.words.what_if import by_use
+from sarl_core.mining.language import label_text
 from sarl_core.mining.rule_order import fits, rules_for
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
 from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.settings import (
+    no_boxes_notice,
+    notes_notice,
+    outside_choice,
+    projection_choice,
+)
+from sarl_dashboard.jobs.replays import kept_replays
+from sarl_dashboard.state import compact_set, edits
+from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.data import data_key, require_demonstrations
+from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.thresholds import chosen_divider
+from sarl_dashboard.text import escaped
+from sarl_dashboard.views.what_if.answer import show
 
 MEDIAN = "the median of every feature"
 DEMONSTRATED = "a demonstrated state"
@@ -238,9 +244,9 @@ def chosen_rules() -> tuple[RuleSet, str]:
     if compact is not None:
         found, key = compact.counted, compact.digest
     else:
-        found = state.rule_set(grown)
-        key = repr((state.data_key(), found.source.digest, found.thresholds, found.divider))
-    if _edits.offered() and (
+        found = mined_rules(grown)
+        key = repr((data_key(), found.source.digest, found.thresholds, found.divider))
+    if edits.offered() and (
         st.segmented_control(
             "Rules",
             [IN_FORCE, EDITED],
@@ -251,7 +257,7 @@ def chosen_rules() -> tuple[RuleSet, str]:
         )
         == EDITED
     ):
-        edited, digest = _edits.edited_rules()
+        edited, digest = edits.edited_rules()
         if fits(edited, demonstrations):
             edited, notes = rules_for(edited, demonstrations)
             notes_notice(notes)
@@ -296,9 +302,9 @@ st.caption(
     "One state, and what the shield would do in it: the rule that applies, the rules that nearly "
     "do, and the least change that makes it decide otherwise."
 )
-demonstrations = state.require_demonstrations()
-compact = _compact.chosen_compact(demonstrations)
-grown = state.trees(demonstrations, state.chosen_divider()) if compact is None else compact.trees
+demonstrations = require_demonstrations()
+compact = compact_set.chosen_compact(demonstrations)
+grown = grown_trees(demonstrations, chosen_divider()) if compact is None else compact.trees
 rule_set, rules_key = chosen_rules()
 if not rule_set.rules:
     st.info(

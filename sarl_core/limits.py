@@ -1,4 +1,4 @@
-"""How much memory reading a file may take: one limit for every reader, and a setting."""
+"""How much is read: one limit of memory for every reader, which is a setting, and of features."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from sarl_core.errors import InputError, quoted
 
 READ_LIMIT = "SARL_READ_LIMIT_GIB"  # environment variable: for the command line and the dashboard
+MAX_FEATURES = 4096  # more than rules that a person reads can speak of
 _DEFAULT = 1.0  # a million steps of a hundred features and their file take about as much
 _A_ROW = 40  # bytes: two numbers that are kept, and some for a moment
 _CHUNK = 2**20

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations
+from tests.toys import TOYS
 
 
 @pytest.fixture(scope="session")
@@ -17,3 +18,8 @@ def lander_like() -> Demonstrations:
     noisy = rng.random(2000) < 0.1
     labels = np.where(noisy, rng.integers(0, 4, 2000), labels)
     return Demonstrations(observations, labels, np.repeat(np.arange(20), 100))
+
+
+@pytest.fixture(params=sorted(TOYS))
+def toy_id(request: pytest.FixtureRequest) -> str:
+    return str(request.param)

@@ -50,7 +50,9 @@ def test_importing_the_package_loads_nothing_heavy():
 
 
 def test_help_loads_nothing_heavy():
-    assert not loaded_after("from sarl_core.cli import main\nassert main(['--help']) == 0") & HEAVY
+    assert (
+        not loaded_after("from sarl_core.cli.app import main\nassert main(['--help']) == 0") & HEAVY
+    )
 
 
 @pytest.mark.parametrize(
@@ -61,7 +63,7 @@ def test_help_loads_nothing_heavy():
     ],
 )
 def test_work_without_a_learner_loads_none(call):
-    assert not loaded_after(f"from sarl_core.cli import main\nassert {call} == 0") & LEARNERS
+    assert not loaded_after(f"from sarl_core.cli.app import main\nassert {call} == 0") & LEARNERS
 
 
 def test_mining_and_shielding_load_no_learner():

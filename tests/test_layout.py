@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ("sarl_core", "pages", "tests", "benchmarks")
+PACKAGES = ("sarl_core", "sarl_dashboard")
+FOLDERS = (*PACKAGES, "pages", "tests", "benchmarks")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
 TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
@@ -122,7 +123,7 @@ def test_imports_go_one_way():
 def test_the_contract_would_notice_a_dashboard_in_the_library(tmp_path):
     """The line is drawn where the design draws it: a copy that crosses it is refused."""
     (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
-    for path in (ROOT / "sarl_core").rglob("*.py"):
+    for path in [path for name in PACKAGES for path in (ROOT / name).rglob("*.py")]:
         copy = tmp_path / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text())
@@ -134,3 +135,13 @@ def test_the_contract_would_notice_a_dashboard_in_the_library(tmp_path):
     )
     assert done.returncode != 0
     assert "sarl_core.errors -> streamlit" in done.stdout
+
+
+def test_no_folder_holds_more_files_than_one_finds_something_in():
+    counts = {
+        folder.relative_to(ROOT).as_posix(): sum(path.suffix == ".py" for path in folder.iterdir())
+        for name in PACKAGES
+        for folder in [ROOT / name, *(ROOT / name).rglob("*/")]
+    }
+    assert len(counts) > 20
+    assert {name: count for name, count in counts.items() if count > 22} == {}

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from sarl_core import RuleSet
-from sarl_core.cli import app
+from sarl_core.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

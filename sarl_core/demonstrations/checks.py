@@ -27,11 +27,11 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers,
 )
 from sarl_core.errors import InputError, quoted
+from sarl_core.limits import MAX_FEATURES
 
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
 
-MAX_FEATURES = 4096
 MAX_LABELS = 10_000  # of one action dimension whose space is not known
 MAX_ALL_LABELS = 100_000  # of all action dimensions together
 _SHOWN_WARNINGS = 5  # of one kind; the rest is counted

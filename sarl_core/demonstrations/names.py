@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.environments import EnvironmentDescription
-from sarl_core.demonstrations.feature_order import Named, line_up
+from sarl_core.environments.description import EnvironmentDescription
+from sarl_core.environments.feature_order import Named, line_up
 from sarl_core.errors import InputError, quoted
 
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
+from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
-from sarl_core.explaining.colours import OUTSIDE_COLOUR
-from sarl_core.explaining.language import done_text, number_text, sentence
-from sarl_core.explaining.markup import plain
-from sarl_core.explaining.replay_figures import Track
+from sarl_core.explaining.figures.colours import OUTSIDE_COLOUR
+from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.figures.replay import Track
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import done_text, number_text, sentence
 from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.written import value_text
 from sarl_core.rollouts.steps import StepTable

@@ -20,10 +20,10 @@ from sarl_core.documents import LARGEST_WHOLE, DocumentReader, is_number, parse_
 from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
 from sarl_core.limits import limited_bytes
-from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.evidence import DataBox, HeldOut
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)

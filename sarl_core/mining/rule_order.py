@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.feature_order import Named, Order, line_up
+from sarl_core.environments.feature_order import Named, Order, line_up
 from sarl_core.errors import InputError
-from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet
+from sarl_core.mining.validation.evidence import DataBox
 
 
 class Fitted(NamedTuple):

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
-from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
 

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from typing import Any, TypeVar
 
 from sarl_core.errors import WorkError
-from sarl_core.mining.progress import CancelledError, Progress, report
+from sarl_core.progress import CancelledError, Progress, report
 
 _AHEAD = 8  # pieces on their way at once: each carries its demonstrations along
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it

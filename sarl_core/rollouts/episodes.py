@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.environments.failures import failed, failure_known
 from sarl_core.errors import InputError
-from sarl_core.rollouts.agents import Agent, make_agent
-from sarl_core.rollouts.failures import failed, failure_known
+from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import Outcome, play
-from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.statistics import Interval, Rate, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 from sarl_core.rollouts.workers import parallel

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.environments import describe_environment, make_environment
+from sarl_core.environments.description import describe_environment, make_environment
 
 _STEPS = 100  # where an environment does not say how fast it runs
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.environments import describe_environment, make_environment
-from sarl_core.rollouts.agents import Agent, order_notes
-from sarl_core.rollouts.spaces import Actions, SpaceAdapter, adapt
+from sarl_core.agents.agent import Agent, order_notes
+from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
+from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.rollouts.steps import StepTable
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections import defaultdict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from threading import Lock
@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.agents.agent import Agent
 from sarl_core.errors import InputError, SarlError, WorkError
-from sarl_core.rollouts.agents import Agent
 from sarl_core.rollouts.episodes import Episodes, run_seeds
 from sarl_core.rollouts.packed_shield import PackedShield, pack, unpack
 from sarl_core.rollouts.workers import beginning
@@ -138,7 +138,7 @@ class WorkerPool:
         self._lock = Lock()
         self._processes: Any = None
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Found]:
+    def run(self, tasks: Sequence[Task]) -> Generator[Found, None, None]:
         """Run the episodes of several tasks, in their order.
 
         Ending the iteration early calls off the pieces that no process has begun.
@@ -212,7 +212,9 @@ class WorkerPool:
             )
             return self._processes.submit(*work)
 
-    def _collect(self, running: dict[Any, _Piece], progress: list[_Progress]) -> Iterator[Found]:
+    def _collect(
+        self, running: dict[Any, _Piece], progress: list[_Progress]
+    ) -> Generator[Found, None, None]:
         """Wait for a piece, and hand over what can be."""
         from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, wait
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.policy_files import write_card
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
-from sarl_core.rollouts.agents import Agent, make_agent
-from sarl_core.rollouts.files import write_card
+from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import Outcome, play
-from sarl_core.rollouts.progress import Progress, report
 from sarl_core.rollouts.seeds import DEMONSTRATED
 from sarl_core.rollouts.steps import concatenate
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.rollouts.spaces import Actions
+from sarl_core.agents.spaces import Actions
 
 if TYPE_CHECKING:
     import pandas as pd

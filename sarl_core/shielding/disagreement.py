@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.difference import Difference, comparable, rule_difference
+from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
 from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.deciding import Ground, deciding, ground_of, labels_at, regions
 

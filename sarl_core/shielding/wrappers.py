@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, SupportsFloat
 import gymnasium
 import numpy as np
 
-from sarl_core.demonstrations.environments import catalogued
-from sarl_core.demonstrations.feature_order import Named
+from sarl_core.environments.description import catalogued
+from sarl_core.environments.feature_order import Named
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import fitted_rules
 from sarl_core.shielding.observed import Observed, observed

@@ -7,7 +7,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Shield, load_demonstrations, mine_rules
-from sarl_core.rollouts.ablating import ablate
+from sarl_core.studies.ablation_run import ablate
 from tests.app.screens import errors, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"

@@ -5,21 +5,17 @@ from __future__ import annotations
 import sys
 import threading
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
+from sarl_dashboard.byte_cache import Kept, size_of
+from sarl_dashboard.cache import cached
 from tests.app.screens import open_page
 from tests.app.test_demonstrations_page import upload
 from tests.bad_inputs import ROWS, csv_bytes
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "pages"))
-
-import _cache  # found by the line above
-from _kept import Kept, size_of
 
 MEGABYTE = 2**20
 
@@ -73,7 +69,7 @@ def test_a_function_works_once_for_all_who_ask_at_once() -> None:
     made = []
     begun, go_on = threading.Event(), threading.Event()
 
-    @_cache.cached()
+    @cached()
     def slow(number: int, _rest: object) -> np.ndarray:
         made.append(number)
         begun.set()
@@ -97,7 +93,7 @@ def test_a_function_works_once_for_all_who_ask_at_once() -> None:
 def test_what_fails_is_not_kept_and_none_is() -> None:
     calls = []
 
-    @_cache.cached()
+    @cached()
     def odd(number: int) -> None:
         calls.append(number)
         if len(calls) == 1:
@@ -112,7 +108,7 @@ def test_what_fails_is_not_kept_and_none_is() -> None:
 
 def owners() -> set[str]:
     """Whose the entries are that the dashboard keeps."""
-    entries = sys.modules["_cache"].RESULTS._entries.values()
+    entries = sys.modules["sarl_dashboard.cache"].RESULTS._entries.values()
     return {entry.owner for entry in entries}
 
 
@@ -123,7 +119,7 @@ def uploaded(content: bytes) -> tuple[AppTest, str]:
 
 
 def test_what_a_visitor_uploaded_goes_when_the_last_who_holds_it_has_gone() -> None:
-    cache = sys.modules["_cache"]
+    cache = sys.modules["sarl_dashboard.cache"]
     _app, digest = uploaded(csv_bytes(*ROWS))
     assert digest in owners()
     mine = cache.Visit()
@@ -149,7 +145,7 @@ def test_a_second_upload_takes_the_place_of_the_first() -> None:
 
 
 def test_what_is_made_after_the_last_has_gone_is_not_kept() -> None:
-    cache = sys.modules["_cache"]
+    cache = sys.modules["sarl_dashboard.cache"]
     visit = cache.Visit()
     cache._VISITS.add(visit)
     visit.bring("a digest")

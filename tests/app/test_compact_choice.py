@@ -10,8 +10,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.language import sentence, share_text
-from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.language import sentence, share_text
 from sarl_core.mining.rule_tree import recount
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
@@ -42,7 +42,7 @@ def compact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuleSet:
     walking = leaf_rules(grow_budgeted_trees(WALKER, max_rules=6, divider=3))
     walking.save(tmp_path / "bipedal_walker_compact.json")
     open_page("demonstrations", data="cartpole")  # finds the modules of the pages
-    monkeypatch.setattr("_choices.RULES_FOLDER", tmp_path)
+    monkeypatch.setattr("sarl_dashboard.state.rule_files.RULES_FOLDER", tmp_path)
     return RuleSet.load(tmp_path / "cartpole_compact.json")
 
 

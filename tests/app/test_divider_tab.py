@@ -11,7 +11,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, record, save_demonstrations
 from sarl_core.mining.quantisation import quantise
-from sarl_core.rollouts.divider_study import study_divider
+from sarl_core.studies.divider import study_divider
 from tests.app.screens import errors, open_page, texts
 
 PENDULUM = load_demonstrations(

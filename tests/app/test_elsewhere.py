@@ -10,9 +10,9 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations, load_demonstrations
-from sarl_core.explaining.cross_fit_words import elsewhere_text, judged_sentence
-from sarl_core.mining.cross_fitting import Judged, cross_fit
+from sarl_core.explaining.words.cross_fit import elsewhere_text, judged_sentence
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+from sarl_core.mining.validation.cross_fitting import Judged, cross_fit
 from tests.app.screens import ROUTER, html, metrics, open_page
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
@@ -67,7 +67,7 @@ def test_random_labels_end_with_a_warning(episodes: int) -> None:
         np.arange(3_000) * episodes // 3_000,
     )
     open_page("thresholds", data="cartpole")
-    cache = sys.modules["_cache"]
+    cache = sys.modules["sarl_dashboard.cache"]
     visit = cache.Visit()
     cache._VISITS.add(visit)
     visit.bring(noise.digest)
@@ -95,7 +95,7 @@ def test_compact_rules_are_not_mined_again() -> None:
 
 def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     app = open_page("thresholds", data="pendulum")
-    module = sys.modules["_elsewhere"]
+    module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
     monkeypatch.setattr(module, "UNASKED", 1_000)
     module.RESULTS.clear()
     app = open_page("thresholds", data="pendulum")

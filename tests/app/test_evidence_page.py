@@ -8,8 +8,8 @@ from functools import cache
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.cross_fit_words import judged_sentence
-from sarl_core.explaining.evidence_words import (
+from sarl_core.explaining.words.cross_fit import judged_sentence
+from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
     held_out_text,
     mined_text,
@@ -17,11 +17,11 @@ from sarl_core.explaining.evidence_words import (
     told_by_episodes,
     verdict_counts,
 )
-from sarl_core.explaining.language import share_text
-from sarl_core.mining.contradictions import by_episode, find_contradictions
-from sarl_core.mining.cross_fitting import judge
-from sarl_core.mining.episode_counts import count_rules
-from sarl_core.mining.holding_out import (
+from sarl_core.mining.language import share_text
+from sarl_core.mining.validation.contradictions import by_episode, find_contradictions
+from sarl_core.mining.validation.cross_fitting import judge
+from sarl_core.mining.validation.episode_counts import count_rules
+from sarl_core.mining.validation.holding_out import (
     Split,
     hold_out,
     lower_bound,

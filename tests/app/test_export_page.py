@@ -5,8 +5,8 @@ from typing import Any
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.code_c import rules_to_c
-from sarl_core.mining.rounding import merged_rules, rounded_rules
+from sarl_core.explaining.exports.code_c import rules_to_c
+from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
 from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
@@ -28,7 +28,7 @@ def labels(app: AppTest) -> list[str]:
 
 
 def test_the_rules_in_force_are_rounded_and_no_decision_changes() -> None:
-    app = open_page("carry", data="cartpole")
+    app = open_page("export", data="cartpole")
     rules = filtered("cartpole")
     found = metrics(app)
     assert found["Decisions changed"] == "0"
@@ -40,19 +40,19 @@ def test_the_rules_in_force_are_rounded_and_no_decision_changes() -> None:
 
 
 def test_c_is_shown_as_it_is_downloaded() -> None:
-    app = open_page("carry", data="cartpole", format="C", merged="true")
+    app = open_page("export", data="cartpole", format="C", merged="true")
     assert code(app).strip() == rules_to_c(merged_rules(filtered("cartpole"))).strip()
 
 
 def test_a_model_says_what_goes_in_and_out() -> None:
-    app = open_page("carry", data="pendulum", format="ONNX", projection="clip")
+    app = open_page("export", data="pendulum", format="ONNX", projection="clip")
     assert "`proposed` (B, 1) float32" in texts(app)
     assert app.selectbox(key="projection").value == "clip"
 
 
 def test_rules_by_features_are_drawn_a_page_at_a_time() -> None:
     app = open_page(
-        "carry", data="cartpole", support="0", confidence="1", carry_view="Rules by features"
+        "export", data="cartpole", support="0", confidence="1", carry_view="Rules by features"
     )
     assert html(app).count('<td class="a"') == 50
     assert labels(app) == ["HTML, all rules", "PNG, this page"]
@@ -66,14 +66,14 @@ def test_rules_by_features_are_drawn_a_page_at_a_time() -> None:
 
 
 def test_an_empty_set_is_refused_in_one_sentence() -> None:
-    app = open_page("carry", data="cartpole", support="0.9", confidence="1")
+    app = open_page("export", data="cartpole", support="0.9", confidence="1")
     (error,) = errors(app)
     assert error.startswith("The rule set has no rules, so there is nothing to export;")
     assert not app.get("download_button")
 
 
 def test_rules_of_other_features_are_refused_and_go_without_rounding() -> None:
-    app = open_page("carry", data="cartpole", carry="own file")
+    app = open_page("export", data="cartpole", carry="own file")
     assert "Upload a rule file" in texts(app)
     content = rules_to_json(filtered("pendulum")).encode()
     upload: Any = app.get("file_uploader")[0]

@@ -12,8 +12,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
+from sarl_core.rendering.forking import fork
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.forking import fork
 from tests.app.screens import errors, html, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"

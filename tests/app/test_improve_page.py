@@ -12,12 +12,12 @@ from gymnasium.envs.classic_control import CartPoleEnv
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
-from sarl_core.explaining.language import share_text
+from sarl_core.improving.aggregation import Aggregation, aggregate
+from sarl_core.improving.aggregation_files import save_aggregation
+from sarl_core.improving.gaps import find_gaps
+from sarl_core.improving.plan import Plan
+from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Thresholds
-from sarl_core.rollouts.aggregation import Aggregation, aggregate
-from sarl_core.rollouts.aggregation_files import save_aggregation
-from sarl_core.rollouts.aggregation_plan import Plan
-from sarl_core.rollouts.gaps import find_gaps
 from tests.app.screens import errors, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"
@@ -36,7 +36,8 @@ def expected() -> Aggregation:
 def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of shipped rules, empty at first."""
     open_page("demonstrations", data="cartpole")  # finds the modules of the pages
-    monkeypatch.setattr("_choices.RULES_FOLDER", tmp_path)
+    monkeypatch.setattr("sarl_dashboard.state.rule_files.RULES_FOLDER", tmp_path)
+    monkeypatch.setattr("sarl_dashboard.views.improve.outcome.RULES_FOLDER", tmp_path)
     return tmp_path
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,9 +14,10 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import WorkError, load_demonstrations, mine_rules
-from sarl_core.rollouts.learning_arms import ARMS, arms_named
-from sarl_core.rollouts.learning_curves import LearningCurve, Trial
-from sarl_core.rollouts.learning_files import (
+from sarl_core.learning.arms import ARMS, arms_named
+from sarl_core.learning.curves import LearningCurve, Trial
+from sarl_core.learning.study import LearningPlan
+from sarl_core.learning.study_files import (
     LearningRun,
     LearningStudy,
     load_run,
@@ -28,13 +28,10 @@ from sarl_core.rollouts.learning_files import (
     save_tables,
     write_json,
 )
-from sarl_core.rollouts.learning_study import LearningPlan
+from sarl_dashboard.jobs import learning
 from tests.app.screens import errors, open_page, texts
 
 ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "pages"))  # where the pages find their own modules
-
-import _learning as learning  # noqa: E402  # found by the line above
 
 
 @pytest.fixture(autouse=True)

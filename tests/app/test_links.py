@@ -15,7 +15,9 @@ NINES = "9" * 400
 
 def parameters() -> list[str]:
     """Every name that may stand in an address: keys of widgets, and choices without one."""
-    source = "\n".join(path.read_text(encoding="utf-8") for path in ROUTER.parent.rglob("*.py"))
+    folders = (ROUTER.parent, ROUTER.parents[1] / "sarl_dashboard")
+    files = [path for folder in folders for path in folder.rglob("*.py")]
+    source = "\n".join(path.read_text(encoding="utf-8") for path in files)
     keyed = re.findall(r'\bkey=f?"([a-z_]\w*)', source)
     chosen = re.findall(r'(?:url_choice|url_text|_number|with_own)\([^"()]*"(\w+)"', source)
     return sorted({*keyed, *chosen, "a0", "a1"})

@@ -7,7 +7,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.language import sentence
+from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import ROUTER, errors, html, open_page, texts
 
@@ -50,7 +50,7 @@ def test_new_names_are_used_everywhere_and_change_no_rule() -> None:
     assert "<b>*of*" not in html(app)
     assert table["States"].tolist() == sorted((r.samples for r in mined.rules), reverse=True)
 
-    app.switch_page("carry.py").run()
+    app.switch_page("export.py").run()
     assert not app.exception
     app.button_group(key="format").set_value("C").run()
     assert "/* R1: shove west */" in str(app.get("code")[0].value)
@@ -131,6 +131,6 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
 
 def kept(app: AppTest) -> Any:
     """The replay on screen."""
-    from _replays import kept_replays  # found once a page was opened
+    from sarl_dashboard.jobs.replays import kept_replays
 
     return kept_replays().get(app.session_state["_replay"].request)

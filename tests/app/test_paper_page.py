@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,21 +9,22 @@ import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core.reproducing.chance import with_chance
-from sarl_core.reproducing.dividing import continuous
-from sarl_core.reproducing.replicates import environments, fingerprints
-from sarl_core.reproducing.report import Report, write_report
-from sarl_core.reproducing.studies import STUDIES
-from sarl_core.reproducing.study import FULL, FULL_MINUTES, experts_in
-from sarl_core.reproducing.tables import write_table
-from sarl_core.reproducing.verdicts import enough
-from tests.app.screens import ROUTER, errors, open_page, texts
-from tests.reproducing.frames import landscapes, learning
-from tests.reproducing.test_dividing import table
-from tests.reproducing.test_landscapes import AS_THE_PAPER, SMALL
-from tests.reproducing.test_learning import A_LITTLE, DOWN
-from tests.reproducing.test_report import ENTRY
-from tests.reproducing.test_shields import cart, walker
+from sarl_core.paper.chance import with_chance
+from sarl_core.paper.dividing import continuous
+from sarl_core.paper.replicates import environments, fingerprints
+from sarl_core.paper.report import Report, write_report
+from sarl_core.paper.studies import STUDIES
+from sarl_core.paper.study import FULL, FULL_MINUTES, experts_in
+from sarl_core.paper.tables import write_table
+from sarl_core.paper.verdicts import enough
+from sarl_dashboard.views.paper import studies as paper
+from tests.app.screens import errors, open_page, texts
+from tests.paper.frames import landscapes, learning
+from tests.paper.test_dividing import table
+from tests.paper.test_landscapes import AS_THE_PAPER, SMALL
+from tests.paper.test_learning import A_LITTLE, DOWN
+from tests.paper.test_report import ENTRY
+from tests.paper.test_shields import cart, walker
 
 DIVIDED = table({0: 285, 2: -35, 3: 180}, {0: -150, 2: -400, 3: -150})
 FRAMES = {
@@ -60,10 +60,7 @@ def fill(folder: Path, frames: dict[str, pd.DataFrame]) -> None:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder, where the page looks for results."""
-    monkeypatch.syspath_prepend(str(ROUTER.parent))
-    import _paper
-
-    monkeypatch.setattr(_paper, "FOLDER", tmp_path)
+    monkeypatch.setattr(paper, "FOLDER", tmp_path)
     return tmp_path
 
 
@@ -83,7 +80,7 @@ def test_before_anything_is_reproduced_the_page_says_how(folder: Path) -> None:
     app = open_page("paper")
     assert "Nothing has been reproduced yet" in texts(app)
     assert f"takes about {FULL_MINUTES} minutes" in texts(app)
-    assert [code.value for code in app.code] == ["python -m sarl_core reproduce --out docs/paper"]
+    assert [code.value for code in app.code] == ["python -m sarl_core reproduce --out data/paper"]
     assert not charts(app)
 
 
@@ -158,7 +155,7 @@ def test_a_figure_that_was_not_made_says_how(folder: Path) -> None:
     fill(folder, {"2": FRAMES["2"]})
     app = open_page("paper", figure="Figure 6")
     assert "Figure 6 has not been made yet" in texts(app)
-    assert "--figure 6 --out docs/paper" in app.code[0].value
+    assert "--figure 6 --out data/paper" in app.code[0].value
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"format": "sarl-paper", "version": 9}'])
@@ -209,13 +206,6 @@ def test_text_of_a_report_is_text(folder: Path) -> None:
 
 def test_the_committed_results_are_whole() -> None:
     """Every figure that this version knows was made in full, and is shown."""
-    import importlib
-
-    sys.path.insert(0, str(ROUTER.parent))
-    try:
-        paper = importlib.import_module("_paper")
-    finally:
-        sys.path.pop(0)
     report = paper.report()
     assert list(report.studies) == list(STUDIES)
     for name, entry in report.studies.items():

@@ -9,9 +9,9 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.language import sentence
-from sarl_core.explaining.rule_examples import examples_html
-from sarl_core.explaining.rule_place import place_html
+from sarl_core.explaining.html.rule_examples import examples_html
+from sarl_core.explaining.html.tree import place_html
+from sarl_core.mining.language import sentence
 from sarl_core.mining.rules import Rule
 from tests.app.screens import ROUTER, html, open_page, texts
 
@@ -139,9 +139,9 @@ def test_what_the_buttons_lead_to_is_made_before_they_are_pressed(
         return examples_html(demonstrations, tree, rule)
 
     open_page("rules", data="cartpole")  # the page's modules are there from now on
-    monkeypatch.setattr(sys.modules["_tree_picture"], "place_html", place)
-    monkeypatch.setattr(sys.modules["_rule_view"], "examples_html", examples)
-    sys.modules["_cache"].RESULTS.clear()
+    monkeypatch.setattr(sys.modules["sarl_dashboard.components.tree_picture"], "place_html", place)
+    monkeypatch.setattr(sys.modules["sarl_dashboard.views.rules.rule"], "examples_html", examples)
+    sys.modules["sarl_dashboard.cache"].RESULTS.clear()
     rules = mined("cartpole", 0.005, 0.95)
     ordered = [rule.id for rule in sorted(rules.rules, key=lambda one: -one.samples)]
     app = open_page("rules", data="cartpole")

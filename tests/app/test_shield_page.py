@@ -14,9 +14,9 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
+from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.rollouts.comparison import Arm, compare
-from sarl_core.rollouts.policies import MlpPolicy
+from sarl_core.studies.comparison import Arm, compare
 from tests.app.screens import errors, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"
@@ -312,7 +312,7 @@ def test_compact_rules_are_offered_where_there_are_some(
 ) -> None:
     query = {"data": "cartpole", "episodes": "2", "first_seed": "7000", "agents": "novice"}
     open_page("shield", **query)
-    monkeypatch.setattr("_choices.RULES_FOLDER", tmp_path)
+    monkeypatch.setattr("sarl_dashboard.state.rule_files.RULES_FOLDER", tmp_path)
     assert "compact" not in open_page("shield", **query).pills(key="shields").options
     mine_rules(CARTPOLE, supp_min=0.1, conf_min=0.5).save(tmp_path / "cartpole_compact.json")
     app = run(open_page("shield", **query, shields="compact"))

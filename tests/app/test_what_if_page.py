@@ -12,7 +12,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules
-from sarl_core.explaining.language import sentence
+from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_files import rules_to_json
 from tests.app.screens import ROUTER, html, open_page, texts
 

@@ -19,3 +19,11 @@ def test_demonstrations_are_found_at_both_addresses(screen: Page, path: str) -> 
     expect(screen.get_by_role("dialog")).to_have_count(0)
     expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(16)
     no_trace(screen)
+
+
+def test_the_page_export_is_found_at_the_address_it_once_had(screen: Page) -> None:
+    visit(screen, "/carry?data=cartpole&carry=compact", "Export")
+    assert urlsplit(screen.url).path == "/export"
+    assert parameters(screen) == {"data": "cartpole", "carry": "compact"}
+    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(16)
+    no_trace(screen)

@@ -8,10 +8,10 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 from plotly.offline import get_plotlyjs
 
-from sarl_core.reproducing.sheets import SCRIPT
+from sarl_core.paper.sheets import SCRIPT
 from tests.browser.walking import no_trace, parameters, settle, visit
 
-PAPER = Path(__file__).parents[2] / "docs" / "paper"
+PAPER = Path(__file__).parents[2] / "data" / "paper"
 
 
 def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.explaining.language import number_text
+from sarl_core.mining.language import number_text
 from tests.browser.test_replay_steps import SEED, cells, press_row, replay
 from tests.browser.walking import PATIENCE, metric, no_trace, parameters, settle
 

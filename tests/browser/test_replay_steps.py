@@ -13,7 +13,7 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.explaining.language import number_text
+from sarl_core.mining.language import number_text
 from sarl_core.rollouts.steps import StepTable
 from tests.browser.walking import metric, no_trace, parameters, settle, visit
 

@@ -15,7 +15,7 @@ from sarl_core import (
     save_demonstrations,
 )
 from sarl_core.demonstrations.names import Names, digest_of_pairs, names_of, renamed, tidy
-from sarl_core.mining.rule_names import renamed_rules, renamed_trees
+from sarl_core.mining.editing.renaming import renamed_rules, renamed_trees
 
 HOSTILE = ("<b>*bold*</b>", 'a "quoted" | name', "=cmd()", "\u202eright to left", "obs_0")
 

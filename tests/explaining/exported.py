@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core import RuleSet, Shield
-from sarl_core.explaining.code_c import rules_to_c
-from sarl_core.explaining.code_python import rules_to_python
-from sarl_core.explaining.onnx_export import rules_to_onnx
+from sarl_core.explaining.exports.code_c import rules_to_c
+from sarl_core.explaining.exports.code_python import rules_to_python
+from sarl_core.explaining.exports.onnx_model import rules_to_onnx
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid
 

@@ -7,7 +7,7 @@ import pytest
 
 from sarl_core import InputError
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.aggregation_figures import (
+from sarl_core.explaining.figures.aggregation import (
     RoundPoint,
     budget_figure,
     budget_points,
@@ -15,9 +15,9 @@ from sarl_core.explaining.aggregation_figures import (
     points_of,
     rounds_figure,
 )
-from sarl_core.explaining.gap_figures import gap_figure, gap_histograms
-from sarl_core.rollouts.aggregation import Round
-from sarl_core.rollouts.gaps import Gaps, join_gaps
+from sarl_core.explaining.figures.gaps import gap_figure, gap_histograms
+from sarl_core.improving.aggregation import Round
+from sarl_core.improving.gaps import Gaps, join_gaps
 
 
 def rounds() -> tuple[Round, ...]:

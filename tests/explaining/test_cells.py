@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from sarl_core import PolicyTree, mine_rules
-from sarl_core.explaining.cells import safe_cell, safe_cells
-from sarl_core.explaining.exports import rules_to_csv
+from sarl_core.explaining.exports.export import rules_to_csv
+from sarl_core.explaining.tables.spreadsheet_cells import safe_cell, safe_cells
 
 
 @pytest.mark.parametrize("text", ["-1", "+2.5", "-1e-05", "-1 to 0.5", "-2 to -1", "push left", ""])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sarl_core.explaining.comparison_figures import (
+from sarl_core.explaining.figures.comparison import (
     arm_style,
     arm_styles,
     returns_figure,
@@ -13,10 +13,10 @@ from sarl_core.explaining.comparison_figures import (
 )
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.rules import RuleSet
-from sarl_core.rollouts.comparison import Arm, Comparison
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.statistics import summarise
+from sarl_core.studies.comparison import Arm, Comparison
 
 
 def episodes(returns: list[float], seed: int = 40) -> Episodes:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sarl_core.explaining.comparison_text import verdict, verdict_on_all
+from sarl_core.explaining.words.comparison import verdict, verdict_on_all
 from sarl_core.rollouts.episodes import Episodes, rollout
 
 

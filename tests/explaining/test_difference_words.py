@@ -10,10 +10,10 @@ import pytest
 
 from sarl_core import RuleSet, mine_rules
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.colours import LAYER_SCALE
-from sarl_core.explaining.confusion_table import confusion_html
-from sarl_core.explaining.difference_tables import example_rows, rule_rows
-from sarl_core.explaining.difference_words import (
+from sarl_core.explaining.figures.colours import LAYER_SCALE
+from sarl_core.explaining.html.confusion import confusion_html
+from sarl_core.explaining.tables.difference import example_rows, rule_rows
+from sarl_core.explaining.words.difference import (
     decided_text,
     difference_document,
     kinds_text,
@@ -21,11 +21,11 @@ from sarl_core.explaining.difference_words import (
     said_text,
     what_text,
 )
-from sarl_core.explaining.edit_words import change_text, conflict_text, edit_text, state_text
+from sarl_core.explaining.words.edits import change_text, conflict_text, edit_text, state_text
 from sarl_core.mining.applying import labels_of
-from sarl_core.mining.editing import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
+from sarl_core.mining.editing.edits import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
+from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.manual_rules import Ask, manual_rule
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from sarl_core import Demonstrations
-from sarl_core.explaining.distributions import (
+from sarl_core.explaining.figures.distributions import (
     episode_series,
     feature_rows,
     histogram_by_label,

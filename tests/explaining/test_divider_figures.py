@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.divider_figures import (
+from sarl_core.explaining.figures.divider import (
     error_figure,
     occupancy_figure,
     snapped_figure,
     study_figure,
 )
 from sarl_core.mining.quantisation import Quantisation, quantise
-from sarl_core.rollouts.divider_study import DividerStudy, study_divider
 from sarl_core.rollouts.recording import record
+from sarl_core.studies.divider import DividerStudy, study_divider
 
 
 @pytest.fixture(scope="module")

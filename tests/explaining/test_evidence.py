@@ -9,14 +9,14 @@ import pytest
 
 from sarl_core import mine_rules
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining import evidence_figures as figures
-from sarl_core.explaining.evidence_tables import (
+from sarl_core.explaining.figures import evidence as figures
+from sarl_core.explaining.tables.evidence import (
     enough_columns,
     held_out_columns,
     pair_columns,
     stability_columns,
 )
-from sarl_core.explaining.evidence_words import (
+from sarl_core.explaining.words.evidence import (
     band_text,
     evidence_bar,
     evidence_text,
@@ -32,13 +32,18 @@ from sarl_core.explaining.evidence_words import (
     told_by_episodes,
     verdict_counts,
 )
-from sarl_core.mining.contradictions import EpisodeContradictions, find_contradictions
-from sarl_core.mining.episode_counts import Influence
-from sarl_core.mining.evidence import HeldOut, Interval
-from sarl_core.mining.holding_out import Shortfall, hold_out, more_episodes, with_held_out
-from sarl_core.mining.learning_curve import LearningCurve
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.stability import Band, RuleStability, Stability
+from sarl_core.mining.validation.contradictions import EpisodeContradictions, find_contradictions
+from sarl_core.mining.validation.episode_counts import Influence
+from sarl_core.mining.validation.evidence import HeldOut, Interval
+from sarl_core.mining.validation.holding_out import (
+    Shortfall,
+    hold_out,
+    more_episodes,
+    with_held_out,
+)
+from sarl_core.mining.validation.learning_curve import LearningCurve
+from sarl_core.mining.validation.stability import Band, RuleStability, Stability
 
 
 def rule_of(samples, correct, held=None, name="0.1"):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, RuleSet, mine_rules
-from sarl_core.explaining.evidence_plots import enough_plot, overview_plot
-from sarl_core.explaining.html_plot import Axis, Scale, area, plot, round_ticks, tick_text
-from sarl_core.mining.holding_out import hold_out, with_held_out
+from sarl_core.explaining.html.evidence import enough_plot, overview_plot
+from sarl_core.explaining.html.plot import Axis, Scale, area, plot, round_ticks, tick_text
 from sarl_core.mining.rules import Rule
+from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 
 
 @pytest.fixture(scope="module")

@@ -23,12 +23,12 @@ from sarl_core import (
     load_demonstrations,
     mine_rules,
 )
-from sarl_core.explaining.code_c import rules_to_c
-from sarl_core.explaining.code_python import rules_to_python
-from sarl_core.explaining.export_program import largest_float32
-from sarl_core.explaining.onnx_export import rules_to_onnx
-from sarl_core.explaining.test_vectors import make_vectors, proposed_actions, vectors_to_csv
-from sarl_core.mining.rounding import merged_rules
+from sarl_core.explaining.exports.code_c import rules_to_c
+from sarl_core.explaining.exports.code_python import rules_to_python
+from sarl_core.explaining.exports.onnx_model import rules_to_onnx
+from sarl_core.explaining.exports.program import largest_float32
+from sarl_core.explaining.exports.vectors import make_vectors, proposed_actions, vectors_to_csv
+from sarl_core.mining.editing.rounding import merged_rules
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.exports import CSV_COLUMNS, rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.export import CSV_COLUMNS, rules_to_csv, rules_to_text
 from sarl_core.mining.rules import Condition
 
 

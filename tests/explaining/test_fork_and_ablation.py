@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.explaining.ablation_figures import (
+from sarl_core.explaining.figures.ablation import (
     VERDICT_COLOURS,
     ablation_columns,
     ablation_figure,
@@ -15,10 +15,10 @@ from sarl_core.explaining.ablation_figures import (
     left_out_text,
     signed,
 )
-from sarl_core.explaining.fork_text import ending_text, fork_text
-from sarl_core.rollouts.ablating import ablate
-from sarl_core.rollouts.ablation import Ablation
-from sarl_core.rollouts.forking import fork
+from sarl_core.explaining.words.fork import ending_text, fork_text
+from sarl_core.rendering.forking import fork
+from sarl_core.studies.ablation import Ablation
+from sarl_core.studies.ablation_run import ablate
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 

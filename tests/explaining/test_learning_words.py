@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sarl_core.explaining.learning_figures import (
+from sarl_core.explaining.figures.learning import (
     afterwards_figure,
     arm_colour,
     curves_figure,
     outcome_figure,
 )
-from sarl_core.explaining.learning_words import HEADINGS, finding, table_rows, value_text, verdict
-from sarl_core.rollouts.learning_arms import ARMS
-from sarl_core.rollouts.learning_curves import LearningCurve, Trial
-from sarl_core.rollouts.learning_files import LearningRun, LearningStudy
-from sarl_core.rollouts.learning_summary import summarise_study
+from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, value_text, verdict
+from sarl_core.learning.arms import ARMS
+from sarl_core.learning.curves import LearningCurve, Trial
+from sarl_core.learning.study_files import LearningRun, LearningStudy
+from sarl_core.learning.summary import summarise_study
 
 RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
 
@@ -230,7 +230,7 @@ def test_figures_of_a_study_without_rules_and_without_a_finished_run() -> None:
 
 
 def test_pictures_are_written(study: LearningStudy, tmp_path: Path) -> None:
-    from sarl_core.explaining.learning_figures import save_learning_figures
+    from sarl_core.explaining.figures.learning import save_learning_figures
 
     save_learning_figures(study, tmp_path)
     for name in ("outcome", "curves", "afterwards"):

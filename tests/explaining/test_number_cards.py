@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from sarl_core.explaining.number_cards import Number, number_cards
-from sarl_core.explaining.prose import heading, note
+from sarl_core.explaining.html.headings import heading, note
+from sarl_core.explaining.html.number_cards import Number, number_cards
 
 
 def test_numbers_stand_under_their_names_with_what_they_were() -> None:

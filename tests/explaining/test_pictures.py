@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from sarl_core import WorkError
-from sarl_core.explaining.pictures import drawing_pictures, sheet
+from sarl_core.explaining.figures.png import drawing_pictures, sheet
 
 
 def opened(content: bytes) -> Image.Image:

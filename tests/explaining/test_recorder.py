@@ -12,21 +12,21 @@ import pyarrow.parquet as pq
 import pytest
 
 from sarl_core import InputError, RuleSet, Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.explaining.lit_path import PathFinder, lit_path_table, lit_paths_html
-from sarl_core.explaining.recorder import (
+from sarl_core.environments.description import describe_environment
+from sarl_core.explaining.exports.steps import (
+    StepRecord,
+    save_steps,
+    steps_to_csv,
+    steps_to_parquet,
+)
+from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table, lit_paths_html
+from sarl_core.explaining.replay import environment_dimensions
+from sarl_core.explaining.tables.recorder import (
     PAGE,
     filter_text,
     page_count,
     place_of,
     recorder_columns,
-)
-from sarl_core.explaining.replay import environment_dimensions
-from sarl_core.explaining.step_files import (
-    StepRecord,
-    save_steps,
-    steps_to_csv,
-    steps_to_parquet,
 )
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sarl_core.explaining.recording_figures import recordings_figure
+from sarl_core.explaining.figures.recording import recordings_figure
 from sarl_core.rollouts.statistics import MeanInterval
 
 EXPERTS = ("a", "b", "c", "a", "b", "c")

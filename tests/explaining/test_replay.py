@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.demonstrations.environments import describe_environment
 from sarl_core.demonstrations.names import names_of, renamed
-from sarl_core.explaining.replay import (
-    environment_dimensions,
-    margin_text,
-    named_description,
-    step_texts,
-    step_view,
-    tracks,
-)
-from sarl_core.explaining.replay_figures import (
+from sarl_core.environments.description import describe_environment
+from sarl_core.explaining.figures.replay import (
     ReturnLine,
     ReturnRow,
     Timeline,
@@ -26,6 +18,14 @@ from sarl_core.explaining.replay_figures import (
     intervention_strip,
     return_figure,
     shortened,
+)
+from sarl_core.explaining.replay import (
+    environment_dimensions,
+    margin_text,
+    named_description,
+    step_texts,
+    step_view,
+    tracks,
 )
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.steps import StepTable

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.cross_fit_words import judged_sentence, parting_text
-from sarl_core.explaining.language import share_text
-from sarl_core.explaining.report import Wishes, make_report
-from sarl_core.explaining.report_again import digest_of, mining_command
-from sarl_core.explaining.report_comparison import Result
-from sarl_core.explaining.report_counts import Share, tally
-from sarl_core.explaining.report_thresholds import read_card
-from sarl_core.mining.cross_fitting import cross_fit
-from sarl_core.mining.holding_out import hold_out, with_held_out
-from sarl_core.mining.rounding import merged_rules, rounded_rules
+from sarl_core.explaining.report.comparison import Result
+from sarl_core.explaining.report.provenance import digest_of, mining_command
+from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.report.tally import Share, tally
+from sarl_core.explaining.report.thresholds import read_card
+from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
+from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
+from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import UNFILTERED
+from sarl_core.mining.validation.cross_fitting import cross_fit
+from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 
 DATA = Path(__file__).parents[2] / "data"
 PLAIN = Wishes(frames=0)

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from sarl_core import InputError, load_demonstrations, mine_rules
-from sarl_core.explaining.report_comparison import (
+from sarl_core.explaining.report.comparison import (
     compared,
     read_results,
     results_from_text,
     results_of,
 )
-from sarl_core.rollouts.comparison import Arm, Comparison, compare
+from sarl_core.studies.comparison import Arm, Comparison, compare
 
 DATA = Path(__file__).parents[2] / "data"
 HEADER = "arm,episodes,mean,std,iqm,iqm_low,iqm_high"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.report import Wishes, make_report
-from sarl_core.explaining.report_counts import tally
-from sarl_core.mining.holding_out import hold_out, with_held_out
+from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.report.tally import tally
 from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 
 DATA = Path(__file__).parents[2] / "data"
 PLAIN = Wishes(frames=0)

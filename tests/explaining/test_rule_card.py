@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, RuleSet, mine_rules
-from sarl_core.explaining.evidence_words import VERDICT_COLOURS
-from sarl_core.explaining.rule_card import rule_card
-from sarl_core.mining.evidence import HeldOut
+from sarl_core.explaining.html.rule_card import rule_card
+from sarl_core.explaining.words.evidence import VERDICT_COLOURS
+from sarl_core.mining.validation.evidence import HeldOut
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from sarl_core import Demonstrations, grow_policy_trees, mine_rules
-from sarl_core.explaining.rule_examples import examples_html
+from sarl_core.explaining.html.rule_examples import examples_html
 
 
 def test_each_example_is_a_state_of_the_rule_and_names_are_no_markup() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.evidence import FeatureEvidence
-from sarl_core.explaining.html_plot import round_ticks
-from sarl_core.explaining.rule_features import MOST, features_html
+from sarl_core.explaining.html.plot import round_ticks
+from sarl_core.explaining.html.rule_features import MOST, features_html
+from sarl_core.explaining.rule_evidence import FeatureEvidence
 from sarl_core.mining.rules import Bounds
 
 

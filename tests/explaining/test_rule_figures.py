@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
-from sarl_core.explaining import rule_figures as figures
-from sarl_core.explaining.evidence import (
+from sarl_core.explaining.figures import tree as figures
+from sarl_core.explaining.html.path import path_table
+from sarl_core.explaining.rule_evidence import (
     example_columns,
     example_rows,
     feature_evidence,
     path_steps,
 )
-from sarl_core.explaining.path_table import path_table
-from sarl_core.explaining.tables import rule_columns, top_rules
+from sarl_core.explaining.tables.rules import rule_columns, top_rules
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.rules import Thresholds, node_of
 

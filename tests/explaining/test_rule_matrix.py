@@ -8,9 +8,10 @@ import numpy as np
 from PIL import Image
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.markdown import markdown_text, rules_to_markdown
-from sarl_core.explaining.rule_matrix import (
+from sarl_core.explaining.exports.markdown import markdown_text, rules_to_markdown
+from sarl_core.explaining.exports.rule_matrix_png import matrix_png
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.html.rule_matrix import (
     OFF_LEGEND,
     PAGE_ROWS,
     PLACED_LEGEND,
@@ -18,7 +19,6 @@ from sarl_core.explaining.rule_matrix import (
     matrix_html,
     rule_matrix,
 )
-from sarl_core.explaining.rule_matrix_picture import matrix_png
 from sarl_core.mining.rules import Condition
 
 HOSTILE = '<img src=x onerror="alert(1)">|`*_\n# & "\'</td>'

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.html.step_card import picture, step_card, swatch
 from sarl_core.explaining.replay import ActionView, StepView
-from sarl_core.explaining.step_card import picture, step_card, swatch
 
 ACTION = ActionView(
     "engine", "left", "right", 0, 1, True, "If the angle > 0, then right.", "7", "R8"

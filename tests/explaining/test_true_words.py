@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Rule, RuleSet, grow_policy_trees, mine_rules
 from sarl_core.decimals import digits_across, digits_telling
-from sarl_core.explaining.evidence import example_columns
-from sarl_core.explaining.exports import rules_to_csv, rules_to_text
-from sarl_core.explaining.language import conditions_text, number_text, sentence
-from sarl_core.explaining.lit_path import PathFinder, lit_path_table
-from sarl_core.explaining.markdown import rules_to_markdown
-from sarl_core.explaining.report import Wishes, make_report
-from sarl_core.explaining.rule_figures import path_queries
-from sarl_core.explaining.what_if import condition_views
-from sarl_core.mining.budget import grow_budgeted_trees, leaf_rules
+from sarl_core.explaining.exports.export import rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.markdown import rules_to_markdown
+from sarl_core.explaining.figures.tree import path_queries
+from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table
+from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.rule_evidence import example_columns
+from sarl_core.explaining.words.what_if import condition_views
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_splits
+from sarl_core.mining.language import conditions_text, number_text, sentence
 from sarl_core.mining.rule_files import rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import node_of
-from sarl_core.rollouts.rendering import plain_descriptions
+from sarl_core.rendering.replay import plain_descriptions
 
 # --- what a reader understands -----------------------------------------------------------------
 

@@ -10,8 +10,9 @@ import pytest
 
 from sarl_core import grow_policy_trees, mine_rules
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.colours import faded, label_colour
-from sarl_core.explaining.what_if import (
+from sarl_core.explaining.figures.colours import faded, label_colour
+from sarl_core.explaining.html.what_if_bars import lines_html, stretches
+from sarl_core.explaining.words.what_if import (
     by_use,
     change_text,
     condition_views,
@@ -21,11 +22,10 @@ from sarl_core.explaining.what_if import (
     node_of_way,
     outside_texts,
 )
-from sarl_core.explaining.what_if_figures import lines_html, stretches
-from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.evidence import DataBox
 from sarl_core.shielding.near import Change, Neighbourhood
 from sarl_core.shielding.shield import Shield
 

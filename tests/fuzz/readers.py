@@ -15,15 +15,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from sarl_core.agents.mlp_policy import MlpPolicy
+from sarl_core.agents.sb3_zip import load_sb3_zip
 from sarl_core.demonstrations.checks import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations, table_columns
 from sarl_core.errors import InputError
-from sarl_core.explaining.language import sentence
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_files import rules_from_json, rules_to_json
-from sarl_core.rollouts.policies import MlpPolicy
-from sarl_core.rollouts.sb3_zip import load_sb3_zip
 from sarl_core.shielding.shield import Shield
 from tests.bad_inputs import BAD_INPUTS, ROWS, csv_bytes, good_arrays, npz_bytes, parquet_bytes
 from tests.fuzz.mutations import Bytes, of_archive, of_json, of_parquet, of_table

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError
-from sarl_core.mining.contradictions import (
+from sarl_core.mining.validation.contradictions import (
     by_episode,
     find_contradictions,
     identical_contradictions,

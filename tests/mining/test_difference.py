@@ -7,7 +7,7 @@ import pytest
 
 from sarl_core import InputError, RuleSet
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.mining.difference import comparable, rule_difference
+from sarl_core.mining.editing.difference import comparable, rule_difference
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
-from sarl_core.mining.editing import (
+from sarl_core.mining.editing.edits import (
     Add,
     Change,
     History,
@@ -19,7 +19,7 @@ from sarl_core.mining.editing import (
     check_edit,
     next_manual_id,
 )
-from sarl_core.mining.manual_rules import Ask, asks_of, manual_rule
+from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
 
 
 def walk(n: int = 400) -> Demonstrations:

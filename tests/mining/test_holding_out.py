@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules, threshold_landscape
-from sarl_core.mining.episode_counts import count_rules
-from sarl_core.mining.evidence import HeldOut, held_out_of
-from sarl_core.mining.holding_out import (
+from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.validation.episode_counts import count_rules
+from sarl_core.mining.validation.evidence import HeldOut, held_out_of
+from sarl_core.mining.validation.holding_out import (
     count_held_out,
     episodes_needed,
     hold_out,
@@ -27,8 +29,6 @@ from sarl_core.mining.holding_out import (
     with_lower_bound,
     with_untried_held_out,
 )
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
-from sarl_core.mining.rules import Condition, Rule
 from tests.mining.strategies import labelled_states
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, InputError, mine_rules
-from sarl_core.mining.holding_out import hold_out
-from sarl_core.mining.learning_curve import learning_curve
-from sarl_core.mining.progress import CancelledError
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.stability import rule_stability
+from sarl_core.mining.validation.holding_out import hold_out
+from sarl_core.mining.validation.learning_curve import learning_curve
+from sarl_core.mining.validation.stability import rule_stability
+from sarl_core.progress import CancelledError
 
 THRESHOLDS = Thresholds(0.01, 0.85)
 

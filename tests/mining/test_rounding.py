@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
-from sarl_core.mining.rounding import (
+from sarl_core.mining.editing.rounding import (
     EMPTIED,
     ONE_SIDED,
     SHORTEST,

@@ -7,13 +7,13 @@ import pytest
 
 from sarl_core import Demonstrations, Shield, mine_rules
 from sarl_core.errors import InputError
-from sarl_core.explaining.exports import prepare
-from sarl_core.explaining.report_counts import tally
-from sarl_core.mining.difference import comparable
+from sarl_core.explaining.exports.export import prepare
+from sarl_core.explaining.report.tally import tally
+from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.holding_out import with_held_out, with_untried_held_out
 from sarl_core.mining.rule_order import fits, rules_for
-from sarl_core.mining.stability import rule_stability
+from sarl_core.mining.validation.holding_out import with_held_out, with_untried_held_out
+from sarl_core.mining.validation.stability import rule_stability
 from sarl_core.shielding.disagreement import disagreement
 
 NAMES = ("height", "speed", "tilt", "load")

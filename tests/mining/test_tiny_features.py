@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Shield, grow_policy_trees, mine_rules
-from sarl_core.mining.budget import grow_budgeted_trees
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees
 from sarl_core.mining.tree import PolicyTree
 
 N = 200

@@ -4,12 +4,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sarl_core.agents.agent import make_agent
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.progress import CancelledError
 from sarl_core.rollouts import episodes as episodes_module
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
-from sarl_core.rollouts.progress import CancelledError
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Shield
@@ -139,7 +139,7 @@ def test_equals_a_plain_loop_through_the_wrapper(env_id: str, shields: dict[str,
     [("CartPole-v1", 500.0), ("LunarLander-v3", 240.0), ("Pendulum-v1", -250.0)],
 )
 def test_the_shipped_experts_are_as_good_as_their_cards(env_id: str, least: float) -> None:
-    from sarl_core.rollouts.agents import shipped_experts
+    from sarl_core.agents.agent import shipped_experts
 
     card = json.loads(shipped_experts()[env_id].with_suffix(".json").read_text())
     reported = card["returns_deterministic"]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
+from sarl_core.rendering.replay import render_episode
 from sarl_core.rollouts.episodes import join
 from sarl_core.rollouts.flips import Pace, count_flips, pace_of
-from sarl_core.rollouts.rendering import render_episode
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules, rollout
-from sarl_core.cli import main
-from sarl_core.demonstrations.environments import describe_environment
-from sarl_core.explaining.recorder import recorder_columns
+from sarl_core.cli.app import main
+from sarl_core.environments.description import describe_environment
+from sarl_core.explaining.html.step_card import step_card
 from sarl_core.explaining.replay import environment_dimensions, step_texts, step_view
-from sarl_core.explaining.step_card import step_card
-from sarl_core.rollouts.rendering import render_episode
+from sarl_core.explaining.tables.recorder import recorder_columns
+from sarl_core.rendering.replay import render_episode
 
 FAILS, STEPS = 5, 12
 

@@ -11,12 +11,12 @@ import pytest
 from gymnasium import spaces
 from scipy.stats import binomtest
 
-from sarl_core.cli import main
+from sarl_core.cli.app import main
 from sarl_core.errors import InputError
-from sarl_core.explaining.report_comparison import compared, results_from_text
+from sarl_core.explaining.report.comparison import compared, results_from_text
+from sarl_core.rendering.replay import render_episode
 from sarl_core.rollouts.episodes import join, rollout
-from sarl_core.rollouts.rendering import render_episode
-from sarl_core.rollouts.shield_effect import shield_effect
+from sarl_core.studies.shield_effect import shield_effect
 
 
 class Endless(gymnasium.Env):

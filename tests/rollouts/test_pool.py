@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.rollouts.agents import Agent, make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.pool import Task, WorkerPool
 from sarl_core.rollouts.recording import record

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from sarl_core import InputError, RuleSet, Shield, ShieldedEnv, ShieldedVecEnv, mine_rules
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.code_python import rules_to_python
+from sarl_core.explaining.exports.code_python import rules_to_python
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import Source

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
 from sarl_core.mining.applying import labels_of
-from sarl_core.mining.editing import Add, Move, Pin, Switch, apply
-from sarl_core.mining.manual_rules import Ask, manual_rule
+from sarl_core.mining.editing.edits import Add, Move, Pin, Switch, apply
+from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.deciding import deciding, ground_of, labels_at, regions
 from sarl_core.shielding.disagreement import disagreement, sampled_states

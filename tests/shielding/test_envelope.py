@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import InputError, Shield, ShieldedEnv, mine_rules
-from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
 from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.evidence import DataBox
 
 D = 3
 VALUES = np.array([-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 1.5], dtype=np.float32)
@@ -210,9 +210,9 @@ def cart():
 @pytest.mark.parametrize("outside", ["act", "abstain"])
 def test_the_records_of_all_ways_to_play_agree(cart, outside):
     from sarl_core import rollout
-    from sarl_core.rollouts.agents import make_agent
-    from sarl_core.rollouts.film import Film, Palette
-    from sarl_core.rollouts.filming import film_episode
+    from sarl_core.agents.agent import make_agent
+    from sarl_core.rendering.film import Film, Palette
+    from sarl_core.rendering.filming import film_episode
 
     shield = Shield(cart, outside=outside)
     played = rollout("CartPole-v1", "novice", shield=shield, episodes=3, seed=5)

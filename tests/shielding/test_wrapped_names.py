@@ -23,7 +23,7 @@ from sarl_core import (
     load_demonstrations,
     mine_rules,
 )
-from tests.commandline.conftest import CART
+from tests.cli.conftest import CART
 
 ORDER = (2, 3, 0, 1)
 SHOWN = load_demonstrations(CART)

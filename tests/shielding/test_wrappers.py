@@ -24,7 +24,7 @@ from sarl_core import (
     load_demonstrations,
     mine_rules,
 )
-from sarl_core.demonstrations.environments import describe_environment
+from sarl_core.environments.description import describe_environment
 
 
 class Watched(gymnasium.Wrapper):
@@ -104,7 +104,12 @@ def test_in_vectorised_learning_nothing_gets_past(cartpole):
 
 def test_our_own_code_never_steps_around_a_wrapper():
     """No file of ours asks an environment for what lies below its wrappers."""
-    for path in [*Path("sarl_core").rglob("*.py"), *Path("pages").glob("*.py"), Path("app.py")]:
+    for path in [
+        *Path("sarl_core").rglob("*.py"),
+        *Path("sarl_dashboard").rglob("*.py"),
+        *Path("pages").glob("*.py"),
+        Path("app.py"),
+    ]:
         for node in ast.walk(ast.parse(path.read_text())):
             below = isinstance(node, ast.Attribute) and node.attr == "unwrapped"
             assert not below, f"{path}:{node.lineno}"

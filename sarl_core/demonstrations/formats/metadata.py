@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.demonstrations.feature_order import Order
 from sarl_core.documents import parse_json
+from sarl_core.environments.feature_order import Order
 from sarl_core.errors import InputError, quoted
 
 KEY = "sarl"

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.demonstrations.formats.column_values import (
     counters,
     numbers_episodes,
@@ -44,6 +43,7 @@ from sarl_core.demonstrations.formats.tables import (
     told_coarse,
 )
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
+from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
 
 _OBSERVATIONS = ("obs", "observations", "observation", "states")

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.checks import MAX_LABELS
 from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
-from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
-from sarl_core.demonstrations.feature_order import Named, line_up, numbered, only_counts
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
@@ -31,6 +29,8 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers,
     without_fraction,
 )
+from sarl_core.environments.description import EnvironmentDescription, describe_environment
+from sarl_core.environments.feature_order import Named, line_up, numbered, only_counts
 from sarl_core.errors import InputError
 
 _LARGEST_CODE = 2**31  # a label that is larger is a slip

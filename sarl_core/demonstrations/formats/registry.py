@@ -8,7 +8,6 @@ from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.environments import EnvironmentDescription, describe_environment
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.csv_file import open_csv, write_csv
 from sarl_core.demonstrations.formats.naming import naming, naming_both
@@ -26,6 +25,7 @@ from sarl_core.demonstrations.formats.pair import (
 from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, write_parquet
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.tables import Table, recording_from_table
+from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
 from sarl_core.limits import limited_bytes

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.environments import EnvironmentDescription
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
@@ -28,6 +27,7 @@ from sarl_core.demonstrations.formats.columns import (
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
+from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
 MAX_COLUMNS = 4096

@@ -1,0 +1,156 @@
+"""The command that says what each rule of a shield is worth."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent, read_shield
+from sarl_core.cli.options import (
+    AgentName,
+    Env,
+    Json,
+    MaxSteps,
+    Normalise,
+    OnInvalidName,
+    OutsideName,
+    ProjectionName,
+    Seed,
+    Stochastic,
+)
+from sarl_core.files import whole_file
+
+if TYPE_CHECKING:
+    from sarl_core.studies.ablation import Ablation
+
+
+def ablate(
+    env: Env,
+    agent: AgentName,
+    rules: Annotated[
+        Path,
+        typer.Option(
+            "--rules", metavar="RULES.json", show_default=False, help="The rules of the shield."
+        ),
+    ],
+    normalise: Normalise = None,
+    episodes: Annotated[
+        int,
+        typer.Option("--episodes", help="With every rule taken out, and with none; at least 2."),
+    ] = 50,
+    most: Annotated[
+        int,
+        typer.Option(
+            "--most", help="Rules to take out at most: those that change the most actions."
+        ),
+    ] = 200,
+    seed: Seed = 0,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            min=1,
+            show_default=False,
+            help="Processes; as many as there are processors where not given. The result is the "
+            "same.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE.csv", show_default=False, help="Write the table to this file."
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Take the rules out one by one, and say what becomes of the same episodes without each.
+
+    Each rule is load-bearing, harmful, or makes no difference that can be seen. Only episodes in
+    which a rule changed an action are run without it: the others are the same.
+
+    Example: `python -m sarl_core ablate --env LunarLander-v3 --agent novice --rules rules.json
+    --episodes 100 --seed 100000 --out ablation.csv`
+    """
+    if out is not None:
+        terminal.check_output(out, (".csv",))
+    with terminal.working("Taking rules out") as advance:
+        from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
+        from sarl_core.studies.ablation_run import ablate as run
+
+        shield = read_shield(rules, projection, outside, on_invalid)
+        assert shield is not None
+        found = run(
+            env,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
+            shield,
+            episodes=episodes,
+            seed=seed,
+            most=most,
+            jobs=jobs or os.cpu_count() or 1,
+            max_steps=max_steps,
+            progress=lambda done, total: advance(done, total),
+        )
+        if out is not None:
+            with whole_file(out) as unfinished:
+                safe_cells(found.to_frame()).to_csv(unfinished, index=False)
+    if as_json:
+        terminal.print_json(_document(found))
+    else:
+        _print(found, out)
+
+
+def _document(found: Ablation) -> dict[str, Any]:
+    rules = found.shield.rule_set.rules
+    return {
+        "env_id": found.base.env_id,
+        "agent": found.base.agent,
+        "episodes": len(found.base),
+        "seed": int(found.base.seeds[0]),
+        "mean_return": float(found.base.returns.mean()),
+        "failures": found.base_failures if found.failures_known else None,
+        "rules": found.to_frame().to_dict("records"),
+        "without_difference": [rules[index].id for index in found.unused],
+        "left_out": [rules[index].id for index in found.left_out],
+        "episodes_run": found.played,
+        "notes": list(found.remarks),
+    }
+
+
+def _print(found: Ablation, out: Path | None) -> None:
+    from sarl_core.cli.answers import print_notes
+    from sarl_core.explaining.figures.ablation import (
+        ablation_text,
+        interval_text,
+        left_out_text,
+        signed,
+    )
+
+    rule_set, known = found.shield.rule_set, found.failures_known
+    if found.rules:
+        terminal.print_table(
+            ("rule", "verdict", "return without it", "95 % interval", "failures", "changed"),
+            [
+                (
+                    rule_set.name_of(rule_set.rules[effect.rule]),
+                    effect.verdict,
+                    signed(effect.difference.mean),
+                    interval_text(effect),
+                    f"{effect.failures} (with it {found.base_failures})" if known else "–",
+                    f"{effect.changed:,}",
+                )
+                for effect in found.effects
+            ],
+        )
+    terminal.print_lines([*ablation_text(found), *filter(None, [left_out_text(found)])])
+    print_notes(found.remarks)
+    if out is not None:
+        terminal.print_lines([f"Wrote {out}."])

@@ -1,0 +1,330 @@
+"""The command that finds out where demonstrations are missing, and asks for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.options import (
+    AgentName,
+    Divider,
+    EnvOfFile,
+    File,
+    Json,
+    MaxSteps,
+    Normalise,
+    ProjectionName,
+    Seed,
+)
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.agents.agent import Agent
+    from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.improving.aggregation import Aggregation
+    from sarl_core.improving.gaps import Gaps
+    from sarl_core.improving.plan import Plan
+    from sarl_core.mining.rules import Thresholds
+
+_NOBODY = "none"
+
+
+def aggregate(
+    context: typer.Context,
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="The rule file (.json) to write, its card beside it; with --expert none, the "
+            "states that need a demonstration (.csv).",
+        ),
+    ],
+    max_rules: Annotated[
+        int, typer.Option("--max-rules", help="Most rules of each action dimension.")
+    ] = 48,
+    env: EnvOfFile = None,
+    agent: AgentName = "novice",
+    expert: Annotated[
+        str,
+        typer.Option(
+            "--expert",
+            metavar="AGENT",
+            help="Who is asked: expert (the shipped one), the path of a trained policy, or none.",
+        ),
+    ] = "expert",
+    normalise: Normalise = None,
+    rounds: Annotated[
+        int, typer.Option("--rounds", help="How often the rules act and the expert answers.")
+    ] = 20,
+    episodes: Annotated[int, typer.Option("--episodes", help="Episodes a round.")] = 40,
+    support: Annotated[
+        float | None,
+        typer.Option(
+            "--support",
+            help="With --confidence: cut the trees at these thresholds.",
+            show_default="every leaf is a rule",
+        ),
+    ] = None,
+    confidence: Annotated[
+        float | None, typer.Option("--confidence", help="See --support.", show_default=False)
+    ] = None,
+    divider: Divider = 2,
+    projection: ProjectionName = "centre",
+    refine: Annotated[
+        int,
+        typer.Option(
+            "--refine",
+            help="Steps of moving thresholds and actions to where they achieve more; 0 for none.",
+        ),
+    ] = 0,
+    validation: Annotated[
+        int, typer.Option("--validation", help="Episodes by which the best is chosen.")
+    ] = 256,
+    seed: Seed = 0,
+    max_steps: MaxSteps = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
+    as_json: Json = False,
+) -> None:
+    """Ask the expert where the rules lead, and mine few rules that do as much as possible.
+
+    Each round the rules shield the agent, the expert says what it would have done in the states
+    they lead to, and rules are mined again from all answers, at most so many for each action
+    dimension. The best round is found on episodes of its own and reported on others.
+
+    Example: `python -m sarl_core aggregate data/demonstrations/cartpole.parquet --max-rules 4
+    --rounds 5 --out compact.json`
+    """
+    nobody = expert == _NOBODY
+    terminal.check_output(out, (".csv",) if nobody else (".json",))
+    with terminal.working("Starting"):
+        from sarl_core.demonstrations.names import in_order_of
+        from sarl_core.environments.description import describe_environment
+        from sarl_core.improving.plan import Plan
+
+        plan = Plan(
+            max_rules=max_rules,
+            rounds=rounds,
+            episodes=episodes,
+            thresholds=_thresholds(support, confidence),
+            divider=divider,
+            projection=projection,
+            generations=refine,
+            validation=validation,
+            seed=seed,
+            max_steps=max_steps,
+        )
+        shown = read_demonstrations(file, env)
+        agents = _agents(agent, expert, env or shown.env_id, normalise)
+        read = shown.notes
+        shown, notes = in_order_of(shown, describe_environment(env or shown.env_id))
+        notes = tuple(dict.fromkeys((*read, *notes)))
+    if nobody:
+        _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json, notes)
+        return
+    with terminal.working("Asking the expert") as advance:
+        from sarl_core.improving.aggregation import aggregate as run
+        from sarl_core.improving.aggregation_files import save_aggregation
+
+        found = run(
+            shown,
+            plan,
+            env_id=env,
+            agent=agents[0],
+            expert=agents[1],
+            jobs=jobs,
+            progress=advance,
+        )
+    written, card = save_aggregation(found, out, command=_command(context))
+    if not found.is_finished:
+        raise terminal.StoppedError(_what_is_left(found, written, out))
+    notes = tuple(dict.fromkeys((*notes, *found.remarks)))
+    if as_json:
+        terminal.print_json({**card, "notes": list(notes)})
+        return
+    from sarl_core.mining.language import share_text
+
+    terminal.print_table(
+        ("Round", "Demonstrations", "Rules", "Mean return", "Coverage", "Expert disagrees"),
+        [
+            (
+                str(one.number),
+                f"{one.pairs:,}",
+                str(one.rules),
+                f"{one.mean_return:.1f}",
+                share_text(one.coverage, decimals=1),
+                share_text(one.disagreement, decimals=1),
+            )
+            for one in found.rounds
+        ],
+    )
+    reported = card["reported"]
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {card['rules']} rules of round {found.chosen}"
+            f"{', refined' if found.refined else ''}.",
+            f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
+            f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
+            *_beside(reported, card["env_id"]),
+            *(f"note: {note}" for note in notes),
+        ]
+    )
+
+
+def _beside(reported: dict[str, Any], env_id: str) -> list[str]:
+    """How often these episodes failed, and what the rules left to choose from."""
+    from sarl_core.cli.answers import failures_text, freedom_text
+
+    return [
+        f"Failures: {failures_text(reported, reported['episodes'], env_id)}.",
+        f"Freedom: {freedom_text(reported)}.",
+    ]
+
+
+def _agents(
+    agent: str, expert: str, env_id: str, normalise: str | None
+) -> tuple[Agent, Agent | str]:
+    """Who is shielded and who is asked; `normalise` is of the one that is a .zip."""
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    zipped = [name.lower().endswith(".zip") for name in (agent, expert)]
+    if normalise is not None and all(zipped):
+        raise InputError(
+            "--normalise is of one .zip, and both agent and expert are one; leave it out, and lay "
+            "the statistics of each beside it, as NAME_vecnormalize.pkl"
+        )
+    return (
+        read_agent(agent, env_id, None if zipped[1] else normalise),
+        expert
+        if expert == _NOBODY
+        else read_agent(expert, env_id, normalise if zipped[1] else None),
+    )
+
+
+def _what_is_left(found: Aggregation, written: Path, out: Path) -> str:
+    """In one line, what a stopped run leaves behind."""
+    from sarl_core.improving.aggregation_files import chosen_by
+
+    beside = "" if written == out else f" ({out} stays as it was)"
+    return (
+        f"stopped after {len(found.rounds)} of {found.plan.rounds} rounds; the best "
+        f"rules so far are in {written}{beside}, chosen by {chosen_by(found)}; no "
+        "fresh episode has tried them"
+    )
+
+
+def _thresholds(support: float | None, confidence: float | None) -> Thresholds | None:
+    from sarl_core.mining.rules import Thresholds
+
+    if support is None and confidence is None:
+        return None
+    if support is None or confidence is None:
+        raise InputError("--support and --confidence belong together; give both or neither")
+    return Thresholds(support, confidence)
+
+
+def _gaps(
+    shown: Demonstrations,
+    plan: Plan,
+    env_id: str,
+    agent: Agent,
+    out: Path,
+    jobs: int,
+    as_json: bool,
+    notes: tuple[str, ...],
+) -> None:
+    """Without an expert: which states need a demonstration."""
+    if plan.thresholds is None:
+        raise InputError(
+            "without thresholds every state is covered; give --support and --confidence"
+        )
+    found: Gaps | None = None
+    with terminal.working("Looking for gaps") as advance:
+        from sarl_core.improving.gaps import gaps_so_far
+        from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
+
+        at = plan.thresholds
+        rules = mine_rules(shown, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
+        try:
+            for so_far in gaps_so_far(
+                env_id,
+                rules,
+                agent=agent,
+                episodes=plan.episodes,
+                seed=plan.seed,
+                projection=plan.projection,
+                jobs=jobs,
+                max_steps=plan.max_steps,
+                progress=advance,
+            ):
+                found = so_far
+        except KeyboardInterrupt:
+            if found is None:
+                raise
+    assert found is not None
+    if found.episodes < plan.episodes:
+        raise terminal.StoppedError(_keep_gaps(found, out, plan.episodes))
+    _write_gaps(found, out)
+    if found.cut:
+        steps = plan.max_steps or MAX_STEPS
+        notes = (*notes, cut_text(env_id, found.cut, found.episodes, steps))
+    notes = tuple(dict.fromkeys((*notes, *found.notes)))
+    document: dict[str, Any] = {
+        "file": str(out),
+        "rules": len(rules),
+        "met": found.met,
+        "without_a_rule": len(found),
+        "share": found.share,
+        "notes": list(notes),
+    }
+    if as_json:
+        terminal.print_json(document)
+        return
+    from sarl_core.mining.language import share_text
+
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
+            f"({share_text(found.share, decimals=1)}) have no rule and need a demonstration.",
+            *(f"note: {note}" for note in notes),
+        ]
+    )
+
+
+def _write_gaps(found: Gaps, path: Path) -> None:
+    from sarl_core.files import whole_file
+
+    with whole_file(path) as unfinished:
+        found.to_frame().to_csv(unfinished, index=False)
+
+
+def _keep_gaps(found: Gaps, out: Path, planned: int) -> str:
+    """Write what a stopped search has found, and say so in one line."""
+    from sarl_core.improving.aggregation_files import stopped_path
+
+    written = stopped_path(out)
+    _write_gaps(found, written)
+    beside = "" if written == out else f" ({out} stays as it was)"
+    return (
+        f"stopped after {found.episodes} of {planned} episodes; the {len(found):,} "
+        f"states without a rule that they met are in {written}{beside}"
+    )
+
+
+def _command(context: typer.Context) -> str:
+    """The command as it can be typed again, defaults left out."""
+    words = ["python -m sarl_core aggregate"]
+    for parameter in context.command.params:
+        value = context.params.get(parameter.name or "")
+        if parameter.name in ("as_json", "jobs") or value is None or value == parameter.default:
+            continue
+        option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
+        words += [*option, str(value)]
+    return " ".join(words)

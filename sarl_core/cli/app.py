@@ -1,0 +1,77 @@
+"""The command line, put together; each command stands in a file beside it.
+
+What is heavy is imported where it is used, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.ablate import ablate
+from sarl_core.cli.aggregate import aggregate
+from sarl_core.cli.diff import diff
+from sarl_core.cli.evaluate_and_render import evaluate, render, train_expert
+from sarl_core.cli.export import export
+from sarl_core.cli.learn import learn
+from sarl_core.cli.mine_and_landscape import landscape, mine
+from sarl_core.cli.record_and_check import check, record
+from sarl_core.cli.report import report
+from sarl_core.cli.reproduce import reproduce
+
+app = typer.Typer(
+    name="sarl_core",
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    help="Readable safety rules from expert demonstrations, and a shield made of them.",
+)
+
+# In the order of the work, which is the order of ``--help``.
+for command in (
+    record,
+    check,
+    mine,
+    landscape,
+    diff,
+    evaluate,
+    render,
+    ablate,
+    report,
+    export,
+    aggregate,
+    learn,
+    train_expert,
+    reproduce,
+):
+    app.command(command.__name__.replace("_", "-"))(command)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: Without the program's name.
+
+    Returns:
+        The exit code.
+    """
+    return terminal.run(app, arguments)
+
+
+@app.callback(invoke_without_command=True)
+def _start(
+    context: typer.Context,
+    debug: Annotated[
+        bool,
+        typer.Option(
+            "--debug",
+            help="After an error, show where it came from. Also after a command.",
+        ),
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        terminal.print_lines([context.get_help()])

@@ -1,0 +1,187 @@
+"""Commands that run agents in environments, shielded or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent, read_shield
+from sarl_core.cli.options import (
+    AgentName,
+    Env,
+    Json,
+    MaxSteps,
+    Normalise,
+    OnInvalidName,
+    OutsideName,
+    ProjectionName,
+    Rules,
+    Seed,
+    Stochastic,
+)
+from sarl_core.errors import InputError
+
+
+def evaluate(
+    env: Env,
+    agent: AgentName,
+    normalise: Normalise = None,
+    rules: Rules = None,
+    episodes: Annotated[int, typer.Option("--episodes", min=1, help="How many.")] = 10,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Episode i uses this seed + i.",
+        ),
+    ] = 0,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
+    as_json: Json = False,
+) -> None:
+    """Run episodes, shielded or not: returns, failures, interventions, coverage, freedom.
+
+    Example: `python -m sarl_core evaluate --env LunarLander-v3 --agent novice --rules rules.json
+    --episodes 50 --seed 1 --json`
+    """
+    with terminal.working("Running episodes") as advance:
+        from sarl_core.rollouts.episodes import rollout
+
+        shield = read_shield(rules, projection, outside, on_invalid)
+        found = rollout(
+            env,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
+            shield=shield,
+            episodes=episodes,
+            seed=seed,
+            keep_steps=False,
+            max_steps=max_steps,
+            progress=advance,
+        )
+        document = found.to_dict()
+    if as_json:
+        terminal.print_json(document)
+        return
+    from sarl_core.cli.answers import print_episodes
+
+    shielded = "unshielded" if rules is None else f"shielded by {rules}"
+    print_episodes(document, env, f"{found.agent} in {env}, {shielded}", shield)
+
+
+def render(
+    env: Env,
+    agent: AgentName,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .gif or .mp4 file.",
+        ),
+    ],
+    normalise: Normalise = None,
+    rules: Rules = None,
+    seed: Seed = 0,
+    both: Annotated[
+        bool,
+        typer.Option(
+            "--side-by-side",
+            help="With the shield and without it, on the same seed.",
+        ),
+    ] = False,
+    stochastic: Stochastic = False,
+    projection: ProjectionName = "centre",
+    outside: OutsideName = "act",
+    on_invalid: OnInvalidName = "raise",
+    max_steps: MaxSteps = None,
+    as_json: Json = False,
+) -> None:
+    """Play one episode and save it as a moving picture, in real time.
+
+    Example: `python -m sarl_core render --env LunarLander-v3 --agent novice --rules rules.json
+    --seed 1 --side-by-side --out replay.gif`
+    """
+    terminal.check_output(out, (".gif", ".mp4"))
+    shield = read_shield(rules, projection, outside, on_invalid)
+    if both and shield is None:
+        raise InputError("--side-by-side compares with a shield; give --rules, or leave it out")
+    with terminal.working("Playing") as advance:
+        from sarl_core.rendering.replay import render_episode, side_by_side
+
+        actor = read_agent(agent, env, normalise, stochastic=stochastic, seed=seed)
+        if both and shield is not None:
+            replay = side_by_side(
+                env, actor, shield, seed=seed, max_steps=max_steps, progress=advance
+            )
+        else:
+            replay = render_episode(
+                env, actor, shield=shield, seed=seed, max_steps=max_steps, progress=advance
+            )
+    with terminal.working("Writing") as advance:
+        replay.save(out, progress=advance)
+    from sarl_core.cli.answers import describe_replay, print_replay
+
+    document = describe_replay(replay, out, [shield is not None, False])
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_replay(document)
+
+
+def train_expert(
+    env: Env,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE.npz",
+            show_default=False,
+            help="The policy to write; its card stands beside it as .json.",
+        ),
+    ],
+    seed: Seed = 0,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Environment steps.",
+            show_default="the recipe's",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Train an expert as the shipped ones were, and write its weights and its card.
+
+    Example: `python -m sarl_core train-expert --env CartPole-v1 --seed 0 --out expert.npz`
+    """
+    terminal.check_output(out, (".npz",))
+    with terminal.working("Training") as advance:
+        from sarl_core.learning.experts import train_expert as train
+
+        card = train(
+            env,
+            out=out,
+            seed=seed,
+            steps=steps,
+            progress=lambda done, total, _: advance(done, total),
+        )
+    if as_json:
+        terminal.print_json(card)
+        return
+    returns = card["returns_deterministic"]
+    terminal.print_lines(
+        [
+            f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
+            f"({returns['min']:.1f} to {returns['max']:.1f}), after "
+            f"{card['kept_after_steps']:,} steps."
+        ]
+    )

@@ -1,0 +1,146 @@
+"""The command that carries rules away: into other programs, and onto paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.options import EnvOfFile, Json, OnInvalidName, ProjectionName
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.explaining.exports.export import Prepared
+    from sarl_core.mining.rules import RuleSet
+
+_ENDINGS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
+_SHOWN = 5
+
+
+def export(
+    rules: Annotated[
+        Path, typer.Argument(metavar="RULES.json", help="The rule file.", show_default=False)
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .json (rule file), .csv, .md, .py, .c or .onnx file; test vectors are written "
+            "beside it.",
+        ),
+    ],
+    merged: Annotated[
+        bool,
+        typer.Option("--merged", help="Make several conditions on one feature one interval."),
+    ] = False,
+    rounded: Annotated[
+        bool,
+        typer.Option(
+            "--rounded",
+            help="Round thresholds to the fewest digits that change no decision on "
+            "--demonstrations.",
+        ),
+    ] = False,
+    demonstrations: Annotated[
+        Path | None,
+        typer.Option(
+            "--demonstrations",
+            metavar="FILE",
+            show_default=False,
+            help="The data that --rounded may not decide differently.",
+        ),
+    ] = None,
+    env: EnvOfFile = None,
+    projection: ProjectionName = "centre",
+    on_invalid: OnInvalidName = "raise",
+    as_json: Json = False,
+) -> None:
+    """Write rules as code or for reading, with test vectors at every threshold.
+
+    Example: `python -m sarl_core export rules.json --out shield.c --rounded --demonstrations
+    data/demonstrations/lunar_lander.parquet`
+    """
+    terminal.check_output(out, _ENDINGS)
+    if rounded != (demonstrations is not None):
+        raise InputError(
+            "give --demonstrations, on which no decision may change, with --rounded"
+            if rounded
+            else "--demonstrations are for --rounded; give both, or neither"
+        )
+    with terminal.working("Exporting"):
+        from sarl_core.explaining.exports.export import prepare, save_export
+        from sarl_core.mining.rules import RuleSet
+
+        rule_set = RuleSet.load(rules)
+        given = None if demonstrations is None else read_demonstrations(demonstrations, env)
+        prepared = prepare(rule_set, merged=merged, demonstrations=given)
+        vectors = save_export(prepared.rule_set, out, projection, on_invalid)
+        notes = (*(given.notes if given is not None else ()), *prepared.notes)
+    if as_json:
+        terminal.print_json({**_document(prepared, out, vectors), "notes": list(notes)})
+    else:
+        from sarl_core.cli.answers import print_notes
+
+        terminal.print_lines(_lines(prepared, out, vectors))
+        print_notes(notes)
+
+
+def _document(prepared: Prepared, out: Path, vectors: Path) -> dict[str, Any]:
+    rounding = prepared.rounding
+    return {
+        "file": str(out),
+        "vectors": str(vectors),
+        "rules": len(prepared.rule_set),
+        "rounding": None
+        if rounding is None
+        else {
+            "decisions_changed": prepared.changed,
+            "rounded": rounding.rounded,
+            "kept": [
+                {
+                    "dimension": prepared.rule_set.actions[kept.dimension].name,
+                    "feature": prepared.rule_set.source.features[kept.feature].name,
+                    "threshold": kept.threshold,
+                    "rules": list(kept.rules),
+                    "why": kept.why,
+                }
+                for kept in rounding.kept
+            ],
+        },
+    }
+
+
+def _lines(prepared: Prepared, out: Path, vectors: Path) -> list[str]:
+    from sarl_core.mining.language import counted
+
+    lines = [
+        f"Wrote {out}: {counted(len(prepared.rule_set), 'rule')}.",
+        f"Wrote {vectors}: states at every threshold, and what the shield decides there.",
+    ]
+    rounding = prepared.rounding
+    if rounding is None:
+        return lines
+    lines.append(
+        f"{counted(rounding.rounded, 'threshold')} became shorter; on the demonstrations "
+        f"{counted(prepared.changed, 'decision')} changed."
+    )
+    if rounding.kept:
+        lines.append(f"{counted(len(rounding.kept), 'threshold')} stayed:")
+        lines += [f"  {_kept(one, prepared.rule_set)}" for one in rounding.kept[:_SHOWN]]
+        if len(rounding.kept) > _SHOWN:
+            lines.append(f"  and {len(rounding.kept) - _SHOWN:,} more; --json lists them all.")
+    return lines
+
+
+def _kept(kept: Any, rule_set: RuleSet) -> str:
+    from sarl_core.decimals import decimal_text
+    from sarl_core.demonstrations.splits import written_threshold
+
+    name = rule_set.source.features[kept.feature].name
+    # What tells all states apart as it does: as a double it may have digits that tell nothing.
+    return f"{name} {decimal_text(written_threshold(kept.threshold, None))} ({kept.why})"

@@ -1,0 +1,100 @@
+"""What the arguments of several commands name, read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from sarl_core.cli import terminal
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.agents.agent import Agent
+    from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.shielding.shield import Shield
+
+
+def read_agent(
+    agent: str,
+    env_id: str,
+    normalise: str | None,
+    *,
+    stochastic: bool = False,
+    seed: int = 0,
+) -> Agent:
+    """Make an agent, and say on standard error how its file was read.
+
+    Args:
+        agent: Of the option ``--agent``.
+        env_id: Where it acts.
+        normalise: Of the option ``--normalise``, or None.
+        stochastic: Whether a trained policy is sampled.
+        seed: Of the untrained weights.
+
+    Returns:
+        The agent.
+
+    Raises:
+        InputError: If there is no such agent, or it does not fit the environment.
+    """
+    from sarl_core.agents.agent import PolicyAgent, make_agent
+
+    made = make_agent(agent, env_id, stochastic=stochastic, seed=seed, normalise=normalise)
+    if isinstance(made, PolicyAgent):
+        terminal.print_notes(made.notes)
+    return made
+
+
+def read_demonstrations(file: Path, env_id: str | None) -> Demonstrations:
+    """Read a file of demonstrations.
+
+    Args:
+        file: As the argument names it.
+        env_id: Of the option ``--env``, or None.
+
+    Returns:
+        What is in it.
+
+    Raises:
+        InputError: If it cannot be read, or is wrong.
+    """
+    from sarl_core.demonstrations.formats import load_demonstrations
+
+    return load_demonstrations(file, env_id=env_id)
+
+
+def read_shield(
+    rules: Path | None,
+    projection: Literal["centre", "clip", "expert"],
+    outside: Literal["act", "abstain"] = "act",
+    on_invalid: Literal["raise", "pass"] = "raise",
+) -> Shield | None:
+    """Read a rule file into a shield.
+
+    Args:
+        rules: Of the option ``--rules``, or None.
+        projection: What becomes of a continuous action that breaks a rule.
+        outside: What a rule does in a state outside its data.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
+
+    Returns:
+        The shield, or None without rules.
+
+    Raises:
+        InputError: If the file cannot be read, is no rule file, or keeps no data boxes where
+            rules are to abstain outside them.
+    """
+    if rules is None:
+        return None
+    from sarl_core.mining.rules import RuleSet
+    from sarl_core.shielding.shield import Shield
+
+    shield = Shield(
+        RuleSet.load(rules), projection=projection, outside=outside, on_invalid=on_invalid
+    )
+    if outside == "abstain" and not shield.keeps_boxes:
+        raise InputError(
+            f"{rules}: this rule file keeps no data boxes, so --outside abstain would do nothing; "
+            "mine the rules again, or leave the option out"
+        )
+    return shield

@@ -1,0 +1,175 @@
+"""The command that lets agents learn under a shield."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.options import Env, Json, MaxSteps, ProjectionName, Rules, Seed
+
+if TYPE_CHECKING:
+    from sarl_core.learning.study_files import LearningStudy
+    from sarl_core.learning.summary import ArmSummary
+
+
+def learn(
+    env: Env,
+    steps: Annotated[
+        int, typer.Option("--steps", show_default=False, help="Environment steps of each run.")
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            show_default=False,
+            help="The folder for curves, results and policies; made if it is not there. A study "
+            "that was stopped in it goes on.",
+        ),
+    ],
+    rules: Rules = None,
+    arm: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--arm",
+            metavar="ARM",
+            help="all, none, override, penalty, executed, mask, imitate, handover, none-replay or "
+            "replay; may be given several times.",
+            show_default="handover",
+        ),
+    ] = None,
+    seed: Seed = 0,
+    seeds: Annotated[
+        int, typer.Option("--seeds", min=1, help="How many learners: seed, seed + 1 and so on.")
+    ] = 1,
+    projection: ProjectionName = "centre",
+    episodes: Annotated[
+        int,
+        typer.Option(
+            "--episodes",
+            min=1,
+            help="After learning, with the shield and without.",
+        ),
+    ] = 50,
+    max_steps: MaxSteps = None,
+    figures: Annotated[
+        bool, typer.Option("--figures", help="Also draw the study, as .png.")
+    ] = False,
+    watched: Annotated[bool, typer.Option("--stop-with-input", hidden=True)] = False,
+    as_json: Json = False,
+) -> None:
+    """Let agents learn, with a shield and without, and see what they are worth without it.
+
+    Writes every episode (curves.csv), what came of it (results.json, and finding.md in words) and
+    what was learned (policies, .npz, each an agent for the other commands). Ctrl-C stops; the same
+    command goes on.
+
+    Example: `python -m sarl_core learn --env LunarLander-v3 --rules rules.json --arm none --arm
+    handover --steps 120000 --seeds 3 --out learned`
+    """
+    with terminal.working("Starting"):
+        from sarl_core.environments.description import describe_environment
+        from sarl_core.explaining.words.learning import save_finding
+        from sarl_core.learning.arms import arms_named
+        from sarl_core.learning.study import LearningPlan, run_study
+        from sarl_core.learning.summary import summarise_study
+        from sarl_core.mining.rules import RuleSet
+        from sarl_core.progress import CancelledError
+
+        plan = LearningPlan(
+            env,
+            None if rules is None else RuleSet.load(rules),
+            arms_named(arm or ["handover"], discrete=describe_environment(env).is_discrete),
+            steps,
+            tuple(range(seed, seed + seeds)),
+            projection,
+            episodes,
+            max_steps,
+        )
+        notes = plan.notes
+    with terminal.working("Learning") as advance, _stopping(watched) as stopped:
+
+        def told(done: int, total: int) -> bool:
+            advance(done, total)
+            return not stopped()
+
+        try:
+            study = run_study(plan, out, progress=told)
+        except CancelledError as error:
+            raise terminal.StoppedError(str(error)) from error
+    summaries = summarise_study(study)
+    save_finding(study, summaries, out)
+    if figures:
+        with terminal.working("Drawing"):
+            from sarl_core.explaining.figures.learning import save_learning_figures
+
+            save_learning_figures(study, out)
+    if as_json:
+        terminal.print_json({**_document(study, summaries, out), "notes": list(notes)})
+        return
+    from sarl_core.cli.answers import print_notes
+
+    _print_study(study, summaries, out)
+    print_notes(notes)
+
+
+@contextmanager
+def _stopping(watched: bool) -> Iterator[Callable[[], bool]]:
+    """Let Ctrl-C, a request to terminate, or the end of the input stop the work in good order.
+
+    Args:
+        watched: Whether somebody holds the other end of standard input, and lets go of it, or
+            dies, when nobody waits for the work any more.
+
+    Yields:
+        Whether to stop.
+    """
+    asked = threading.Event()
+    before: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, lambda *_: asked.set())
+    if watched:
+
+        def wait() -> None:
+            sys.stdin.read()
+            asked.set()
+
+        threading.Thread(target=wait, daemon=True).start()
+    try:
+        yield asked.is_set
+    finally:
+        for restored, handler in before.items():
+            signal.signal(restored, handler)
+
+
+def _document(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path) -> dict[str, Any]:
+    from sarl_core.explaining.words.learning import finding
+    from sarl_core.learning.study_files import policy_path
+
+    return {
+        "folder": str(out),
+        "env_id": study.env_id,
+        "steps": study.steps,
+        "seeds": list(study.seeds),
+        "arms": [summary.to_dict() for summary in summaries],
+        "policies": [str(policy_path(out, run.arm, run.seed)) for run in study.finished],
+        "finding": finding(study, summaries),
+    }
+
+
+def _print_study(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path) -> None:
+    from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
+
+    terminal.print_table(HEADINGS, table_rows(summaries))
+    terminal.print_lines(
+        [*finding(study, summaries), f"Wrote {len(study.finished)} runs to {out}."]
+    )

@@ -1,0 +1,243 @@
+"""Commands that mine rules, and show what thresholds do to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.options import (
+    Divider,
+    EnvOfFile,
+    File,
+    Json,
+)
+from sarl_core.errors import InputError
+
+
+def mine(
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="RULES.json",
+            show_default=False,
+            help="The rule file to write.",
+        ),
+    ],
+    support: Annotated[
+        float | None,
+        typer.Option(
+            "--support",
+            show_default=False,
+            help="Minimum share of the states a rule applies to.",
+        ),
+    ] = None,
+    confidence: Annotated[
+        float | None,
+        typer.Option(
+            "--confidence",
+            show_default=False,
+            help="Minimum share of those in which the expert did what the rule says.",
+        ),
+    ] = None,
+    setting: Annotated[
+        Literal["filtered", "unfiltered"] | None,
+        typer.Option(
+            "--setting",
+            show_default=False,
+            help="The paper's two pairs of both: filtered is 0.005 and 0.95, unfiltered 0 and 1.",
+        ),
+    ] = None,
+    env: EnvOfFile = None,
+    lift: Annotated[float, typer.Option("--lift", help="Minimum lift.")] = 0.0,
+    divider: Divider = 2,
+    max_depth: Annotated[
+        int | None,
+        typer.Option(
+            "--max-depth",
+            min=0,
+            help="Most conditions a rule may have.",
+            show_default="no limit",
+        ),
+    ] = None,
+    hold_out: Annotated[
+        float | None,
+        typer.Option(
+            "--hold-out",
+            metavar="SHARE",
+            show_default=False,
+            help="Hold out this share of the episodes, and try every rule on them.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="Draws the episodes that are held out, and the parts for --cross-fit.",
+        ),
+    ] = 0,
+    lower_bound: Annotated[
+        float | None,
+        typer.Option(
+            "--lower-bound",
+            metavar="SHARE",
+            min=0.0,
+            max=1.0,
+            show_default=False,
+            help="Keep only rules whose 95 % interval of confidence, over the episodes held out, "
+            "lies at or above this; with --hold-out. Few episodes can show little: 12 at most "
+            "0.87, 30 at most 0.95, even of a rule that is never wrong.",
+        ),
+    ] = None,
+    cross_fit: Annotated[
+        bool,
+        typer.Option(
+            "--cross-fit",
+            help="Also say what the rules are worth elsewhere: judge every episode by rules mined "
+            "without it.",
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Mine a rule set and write it to a rule file.
+
+    Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
+    --confidence 0.95 --out rules.json`
+    """
+    terminal.check_output(out, (".json",))
+    given = [value is not None for value in (support, confidence, setting)]
+    if given not in ([True, True, False], [False, False, True]):
+        raise InputError("give both --support and --confidence, or --setting instead of them")
+    if lower_bound and hold_out is None:
+        raise InputError(
+            "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
+            "out; give --hold-out as well, as --hold-out 0.2"
+        )
+    from sarl_core.cli.answers import (
+        describe_oddities,
+        describe_rules,
+        print_oddities,
+        print_rules,
+    )
+
+    with terminal.working("Mining"):
+        from sarl_core.cli.evidence_answers import Tried
+        from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
+        from sarl_core.mining.validation import cross_fitting, holding_out
+        from sarl_core.mining.validation.episode_counts import count_rules
+
+        pair = (support or 0.0, confidence or 0.0)
+        if setting is not None:
+            pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
+        Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
+        demonstrations = read_demonstrations(file, env)
+        oddities = describe_oddities(demonstrations)
+        tried = split = None
+        if hold_out is not None:
+            split = holding_out.hold_out(demonstrations, hold_out, seed=seed)
+            demonstrations = split.mined
+        rule_set = mine_rules(
+            demonstrations,
+            supp_min=pair[0],
+            conf_min=pair[1],
+            lift_min=lift,
+            max_depth=max_depth,
+            divider=divider,
+        )
+        judged = None
+        if cross_fit:
+            fit = cross_fitting.cross_fit(demonstrations, divider=divider, seed=seed)
+            judged = fit.at(rule_set.thresholds)
+        if split is not None:
+            rule_set = holding_out.with_held_out(rule_set, split.held_out)
+        short = None
+        if lower_bound and split is not None:
+            episodes = split.held_out.n_episodes
+            short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
+            rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
+        if hold_out is not None and split is not None:
+            counts = count_rules(rule_set, split.held_out)
+            tried = Tried(hold_out, seed, split, cross_fitting.judge(rule_set, counts), short)
+        rule_set.save(out)
+    if as_json:
+        terminal.print_json(describe_rules(rule_set, out, tried, judged) | oddities)
+    else:
+        print_oddities(oddities)
+        print_rules(rule_set, out, tried, judged)
+
+
+def landscape(
+    file: File,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .json, .csv, .html or .png file.",
+        ),
+    ],
+    env: EnvOfFile = None,
+    divider: Divider = 2,
+    supports: Annotated[
+        str,
+        typer.Option(
+            "--supports",
+            metavar="A:B:STEP",
+            help="Minimum supports, from A to B.",
+        ),
+    ] = "0:0.5:0.05",
+    confidences: Annotated[
+        str,
+        typer.Option(
+            "--confidences",
+            metavar="A:B:STEP",
+            help="Minimum confidences, from A to B.",
+        ),
+    ] = "0:1:0.05",
+    as_json: Json = False,
+) -> None:
+    """Rule count, mean length, coverage and fidelity for every pair of thresholds of a grid.
+
+    Example: `python -m sarl_core landscape data/demonstrations/lunar_lander.parquet --out
+    landscape.html`
+    """
+    terminal.check_output(out, (".json", ".csv", ".html", ".png"))
+    with terminal.working("Drawing the landscape"):
+        from sarl_core.explaining.exports.landscape import (
+            landscape_document,
+            parse_grid,
+            save_landscape,
+        )
+        from sarl_core.mining.landscape import threshold_landscape
+        from sarl_core.mining.tree import grow_policy_trees
+
+        grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
+        shown = read_demonstrations(file, env)
+        trees = grow_policy_trees(shown, divider=divider)
+        found = threshold_landscape(trees, *grid)
+        names = [tree.dimension.name for tree in trees]
+        source = trees[0].source
+        title = f"{source.env_id or file.name}: {source.steps:,} steps"
+        save_landscape(found, names, out, title=title)
+    if as_json:
+        terminal.print_json({**landscape_document(found, names), "notes": list(shown.notes)})
+        return
+    from sarl_core.cli.answers import print_notes
+
+    cells = f"{found.rule_count.size:,} cells"
+    grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
+    terminal.print_lines(
+        [
+            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} "
+            f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
+        ]
+    )
+    print_notes(shown.notes)

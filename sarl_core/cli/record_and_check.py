@@ -1,0 +1,84 @@
+"""Commands that make demonstrations and look at them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.options import (
+    AgentName,
+    Env,
+    EnvOfFile,
+    File,
+    Json,
+    Normalise,
+    Seed,
+    Stochastic,
+)
+
+if TYPE_CHECKING:
+    from sarl_core.demonstrations.dataset import Demonstrations
+
+
+def record(
+    env: Env,
+    agent: AgentName,
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            show_default=False,
+            help="A .parquet, .csv or .npz file.",
+        ),
+    ],
+    normalise: Normalise = None,
+    steps: Annotated[int, typer.Option("--steps", min=1, help="How many to record.")] = 15_000,
+    seed: Seed = 0,
+    stochastic: Stochastic = False,
+    as_json: Json = False,
+) -> None:
+    """Run an agent and save what it saw and did as demonstrations.
+
+    Example: `python -m sarl_core record --env CartPole-v1 --agent expert --stochastic --steps 5000
+    --out cartpole.parquet`
+    """
+    terminal.check_output(out, (".parquet", ".csv", ".npz"))
+    with terminal.working("Recording") as advance:
+        from sarl_core.demonstrations.formats import save_demonstrations
+        from sarl_core.rollouts.recording import record as record_demonstrations
+
+        demonstrations = record_demonstrations(
+            env,
+            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
+            steps=steps,
+            seed=seed,
+            progress=advance,
+        )
+        save_demonstrations(demonstrations, out)
+    _tell_demonstrations(demonstrations, out, as_json)
+
+
+def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
+    """Read and check demonstrations, and print what is in them.
+
+    A file and what is read from it may take 1 GiB of memory, here and in every other command; the
+    environment variable `SARL_READ_LIMIT_GIB` sets another limit.
+
+    Example: `python -m sarl_core check data/demonstrations/lunar_lander.parquet`
+    """
+    _tell_demonstrations(read_demonstrations(file, env), file, as_json)
+
+
+def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:
+    from sarl_core.cli.answers import describe_demonstrations, print_demonstrations
+
+    document = describe_demonstrations(demonstrations, path)
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_demonstrations(document)

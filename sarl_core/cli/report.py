@@ -1,0 +1,180 @@
+"""The command that writes a report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.options import Json, MaxSteps, Normalise
+
+if TYPE_CHECKING:
+    from sarl_core.agents.agent import Agent
+
+# Those of `Wishes`, which is not loaded for --help.
+_IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
+
+
+def report(
+    rules: Annotated[
+        Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
+    ],
+    demonstrations: Annotated[
+        Path,
+        typer.Option(
+            "--demonstrations",
+            metavar="FILE",
+            show_default=False,
+            help="The demonstrations they are about.",
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="FILE.html", show_default=False, help="The file to write."),
+    ],
+    comparison: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--comparison",
+            metavar="FILE",
+            show_default=False,
+            help="Results to show: the CSV file of the page Shield, or what `evaluate --json` "
+            "printed. May be given several times.",
+        ),
+    ] = None,
+    in_full: Annotated[
+        int,
+        typer.Option(
+            "--in-full", min=0, help="So many rules with pictures; the others in a table."
+        ),
+    ] = _IN_FULL,
+    frames: Annotated[
+        int, typer.Option("--frames", min=0, help="Pictures a rule; 0 for none.")
+    ] = _FRAMES,
+    env: Annotated[
+        str | None,
+        typer.Option(
+            "--env",
+            metavar="ENV",
+            show_default="that of the demonstrations",
+            help="Where the pictures are played; also gives names and bounds that the "
+            "demonstrations lack.",
+        ),
+    ] = None,
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            show_default="the shipped expert",
+            help="Who plays for the pictures: novice, untrained, expert, or the path of a policy. "
+            "Rules that do not come up are shown by a novice that the rules shield.",
+        ),
+    ] = None,
+    normalise: Normalise = None,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Of the first episode for the pictures.")
+    ] = _SEED,
+    episodes: Annotated[
+        int, typer.Option("--episodes", min=1, help="Played for the pictures.")
+    ] = _EPISODES,
+    max_steps: MaxSteps = None,
+    as_json: Json = False,
+) -> None:
+    """Write a report of rules: one HTML file for people who know only the task.
+
+    Example: `python -m sarl_core report data/rules/lunar_lander_compact.json --demonstrations
+    data/demonstrations/lunar_lander.parquet --out report.html`
+    """
+    terminal.check_output(out, (".html",))
+    with terminal.working("Making the report") as advance:
+        from sarl_core.explaining.report.comparison import read_results
+        from sarl_core.explaining.report.provenance import command_line, mining_command
+        from sarl_core.explaining.report.report import Wishes, make_report
+        from sarl_core.explaining.report.thresholds import read_card
+        from sarl_core.files import whole_file
+        from sarl_core.mining.rules import RuleSet
+
+        rule_set = RuleSet.load(rules)
+        given = read_demonstrations(demonstrations, env)
+        card = read_card(rules)
+        results = [one for path in comparison or () for one in read_results(path)]
+        asked: dict[str, object] = {
+            "--demonstrations": demonstrations,
+            "--comparison": comparison,
+            "--in-full": None if in_full == _IN_FULL else in_full,
+            "--frames": None if frames == _FRAMES else frames,
+            "--env": env,
+            "--agent": agent,
+            "--normalise": normalise,
+            "--seed": None if seed == _SEED else seed,
+            "--episodes": None if episodes == _EPISODES else episodes,
+            "--max-steps": max_steps,
+            "--out": out,
+        }
+        mined = mining_command(rule_set, rules, demonstrations, given, env=env)
+        wishes = Wishes(
+            in_full=in_full,
+            frames=frames,
+            env_id=env or "",
+            agent=_player(agent, env or given.env_id, normalise),
+            seed=seed,
+            episodes=episodes,
+            max_steps=max_steps,
+            commands=(
+                *([mined] if mined else []),
+                command_line("report", rules, asked),
+            ),
+            rules_name=rules.name,
+            demonstrations_name=demonstrations.name,
+        )
+        found = make_report(
+            rule_set,
+            given,
+            wishes,
+            card=card,
+            comparison=results,
+            progress=advance,
+        )
+        with whole_file(out) as unfinished:
+            unfinished.write_text(found.html, encoding="utf-8", newline="\n")
+    size = len(found.html.encode())
+    if as_json:
+        terminal.print_json(
+            {
+                "out": str(out),
+                "rules": found.rules,
+                "in_full": found.in_full,
+                "pictures": found.pictures,
+                "without_pictures": found.without or None,
+                "bytes": size,
+                "notes": list(found.notes),
+            }
+        )
+        return
+    lines = [
+        f"Wrote {out}: {found.rules:,} rules, {found.in_full:,} of them in full, "
+        f"{found.pictures:,} pictures, {size / 1e6:.1f} MB."
+    ]
+    if found.without:
+        lines.append(f"There are no pictures: {found.without}.")
+    from sarl_core.cli.answers import print_notes
+
+    terminal.print_lines(lines)
+    print_notes(found.notes)
+
+
+def _player(agent: str | None, env_id: str, normalise: str | None) -> Agent | str | None:
+    """Who plays for the pictures: sampled, if it can be, and so comes by more states."""
+    from sarl_core.agents.agent import PolicyAgent
+
+    if agent is None or not env_id:
+        return agent
+    made = read_agent(agent, env_id, normalise)
+    if isinstance(made, PolicyAgent):
+        return replace(made, stochastic=not made.policy.noise_by_state)
+    return made

@@ -1,0 +1,296 @@
+"""What the entries of an environment's observations and actions are called.
+
+Names and units are facts from Gymnasium's documentation of each environment
+(https://gymnasium.farama.org/environments/, version 1.4); spaces and bounds come from the
+environment itself.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from sarl_core.environments.feature_order import numbered
+from sarl_core.errors import InputError
+from sarl_core.limits import MAX_FEATURES
+
+
+@dataclass(frozen=True)
+class EnvironmentDescription:
+    """Spaces and names of an environment.
+
+    Attributes:
+        env_id: As given to ``gymnasium.make``.
+        feature_names: d names.
+        feature_units: d units, "" where there is none.
+        action_names: m names, one an action dimension.
+        label_names: For each dimension the names of its labels; () if continuous.
+        label_first: The action that label 0 stands for, for each dimension.
+        action_low: m lower bounds of continuous actions, else None.
+        action_high: m upper bounds, else None.
+        action_shape: Shape of one action; () for a single discrete one.
+        max_steps: Steps after which an episode is cut off, None if never.
+    """
+
+    env_id: str
+    feature_names: tuple[str, ...]
+    feature_units: tuple[str, ...]
+    action_names: tuple[str, ...]
+    label_names: tuple[tuple[str, ...], ...]
+    label_first: tuple[int, ...]
+    action_low: tuple[float, ...] | None
+    action_high: tuple[float, ...] | None
+    action_shape: tuple[int, ...]
+    max_steps: int | None = None
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether the actions are labels."""
+        return self.action_low is None
+
+
+@dataclass(frozen=True)
+class EnvironmentNames:
+    """Names of features with their units, of action dimensions and of their labels."""
+
+    features: tuple[tuple[str, str], ...]
+    actions: tuple[str, ...]
+    labels: tuple[tuple[str, ...], ...] = ()
+
+
+_LUNAR_LANDER_FEATURES = (
+    ("horizontal position", ""),
+    ("vertical position", ""),
+    ("horizontal velocity", ""),
+    ("vertical velocity", ""),
+    ("angle", "rad"),
+    ("angular velocity", ""),
+    ("left leg contact", ""),
+    ("right leg contact", ""),
+)
+
+_CATALOGUE: dict[str, EnvironmentNames] = {
+    "CartPole": EnvironmentNames(
+        (
+            ("cart position", "m"),
+            ("cart velocity", "m/s"),
+            ("pole angle", "rad"),
+            ("pole angular velocity", "rad/s"),
+        ),
+        ("push",),
+        (("push left", "push right"),),
+    ),
+    "LunarLander": EnvironmentNames(
+        _LUNAR_LANDER_FEATURES,
+        ("engine",),
+        (("do nothing", "fire left engine", "fire main engine", "fire right engine"),),
+    ),
+    "LunarLanderContinuous": EnvironmentNames(
+        _LUNAR_LANDER_FEATURES, ("main engine", "lateral engines")
+    ),
+    "Pendulum": EnvironmentNames(
+        (("cosine of the angle", ""), ("sine of the angle", ""), ("angular velocity", "rad/s")),
+        ("torque",),
+    ),
+    "BipedalWalker": EnvironmentNames(
+        (
+            ("hull angle", "rad"),
+            ("hull angular velocity", ""),
+            ("horizontal velocity", ""),
+            ("vertical velocity", ""),
+            ("hip 1 angle", "rad"),
+            ("hip 1 speed", ""),
+            ("knee 1 angle", "rad"),
+            ("knee 1 speed", ""),
+            ("leg 1 ground contact", ""),
+            ("hip 2 angle", "rad"),
+            ("hip 2 speed", ""),
+            ("knee 2 angle", "rad"),
+            ("knee 2 speed", ""),
+            ("leg 2 ground contact", ""),
+            *((f"lidar {number}", "") for number in range(1, 11)),
+        ),
+        ("hip 1 torque", "knee 1 torque", "hip 2 torque", "knee 2 torque"),
+    ),
+    "MountainCar": EnvironmentNames(
+        (("car position", "m"), ("car velocity", "m/s")),
+        ("acceleration",),
+        (("accelerate left", "do not accelerate", "accelerate right"),),
+    ),
+    "MountainCarContinuous": EnvironmentNames(
+        (("car position", "m"), ("car velocity", "m/s")), ("force",)
+    ),
+    "Acrobot": EnvironmentNames(
+        (
+            ("cosine of angle 1", ""),
+            ("sine of angle 1", ""),
+            ("cosine of angle 2", ""),
+            ("sine of angle 2", ""),
+            ("angular velocity 1", "rad/s"),
+            ("angular velocity 2", "rad/s"),
+        ),
+        ("torque",),
+        (("torque -1 Nm", "no torque", "torque +1 Nm"),),
+    ),
+}
+
+
+def make_environment(env_id: str, **parameters: Any) -> Any:
+    """Make an environment as ``gymnasium.make`` does, with an error of one sentence.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes, ``module:Id`` included.
+        **parameters: Handed on, as ``render_mode``.
+
+    Returns:
+        A ``gymnasium.Env``.
+
+    Raises:
+        InputError: If there is no such environment or it cannot be made.
+    """
+    import gymnasium
+
+    try:
+        with warnings.catch_warnings():
+            # Of versions out of date, say; if it cannot be made, the error says so in one line.
+            warnings.simplefilter("ignore")
+            return gymnasium.make(env_id, disable_env_checker=True, **parameters)
+    except Exception as error:  # other people's code, which may raise anything
+        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        lacking = isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled))
+        if lacking and ":" not in env_id:  # else it may be the named module that does not exist
+            raise InputError(
+                f"the environment {env_id!r} needs a package that is not installed "
+                f"({reason.rstrip('.')}); install it, or choose another environment"
+            ) from error
+        raise InputError(
+            f"the environment {env_id!r} cannot be made ({reason}); "
+            "give an id that gymnasium.make knows, such as CartPole-v1"
+        ) from error
+
+
+@lru_cache(maxsize=64)
+def describe_environment(env_id: str) -> EnvironmentDescription:
+    """Spaces and names of an environment.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+
+    Returns:
+        Its description; names from Gymnasium's documentation where they are known.
+
+    Raises:
+        InputError: If there is no such environment, its observations are images, or its
+            actions cannot be mined.
+    """
+    env = make_environment(env_id)
+    try:
+        d = _feature_count(env_id, env.observation_space)
+        limit = env.spec.max_episode_steps if env.spec is not None else None
+        return replace(_describe(env_id, env.action_space, d), max_steps=limit)
+    finally:
+        env.close()
+
+
+def _feature_count(env_id: str, space: Any) -> int:
+    from gymnasium import spaces
+
+    if isinstance(space, spaces.Box) and len(space.shape) > 1:
+        raise InputError(
+            f"{env_id} gives observations of shape {space.shape}, as images do, which rules "
+            "cannot read; choose an environment with a vector of features"
+        )
+    try:
+        d = int(spaces.utils.flatdim(space))
+    except (NotImplementedError, ValueError) as error:
+        raise InputError(
+            f"{env_id} gives observations ({type(space).__name__}) that have no fixed length; "
+            "choose an environment with a vector of features"
+        ) from error
+    if d > MAX_FEATURES:
+        raise InputError(
+            f"{env_id} gives {d:,} features, more than the {MAX_FEATURES:,} that rules a person "
+            "reads could use; choose an environment with fewer"
+        )
+    return d
+
+
+def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
+    from gymnasium import spaces
+
+    low = high = None
+    first: tuple[int, ...] = ()
+    shape: tuple[int, ...] = ()
+    counts: tuple[int, ...] = ()
+    if isinstance(space, spaces.Discrete):
+        counts, first = (int(space.n),), (int(space.start),)
+    elif isinstance(space, (spaces.MultiDiscrete, spaces.MultiBinary)):
+        shape = tuple(int(size) for size in space.shape)
+        if isinstance(space, spaces.MultiDiscrete):
+            counts = tuple(int(n) for n in space.nvec.reshape(-1))
+            first = tuple(int(start) for start in np.asarray(space.start).reshape(-1))
+        else:
+            counts = (2,) * int(np.prod(shape))
+            first = (0,) * len(counts)
+    elif isinstance(space, spaces.Box):
+        shape = tuple(int(size) for size in space.shape)
+        low = tuple(float(value) for value in space.low.reshape(-1))
+        high = tuple(float(value) for value in space.high.reshape(-1))
+    else:
+        raise InputError(
+            f"{env_id} takes actions of the kind {type(space).__name__}, from which no rule can "
+            "be mined; choose an environment with discrete or continuous actions"
+        )
+    m = len(counts) if low is None else len(low)
+    names = catalogued(env_id, d, m, discrete=low is None)
+    return EnvironmentDescription(
+        env_id=env_id,
+        feature_names=tuple(name for name, _ in names.features),
+        feature_units=tuple(unit for _, unit in names.features),
+        action_names=names.actions,
+        label_names=tuple(
+            names.labels[i]
+            if i < len(names.labels) and len(names.labels[i]) == counts[i]
+            else tuple(str(first[i] + label) for label in range(counts[i]))
+            for i in range(m)
+        )
+        if low is None
+        else ((),) * m,
+        label_first=first if low is None else (0,) * m,
+        action_low=low,
+        action_high=high,
+        action_shape=shape,
+    )
+
+
+def catalogued(env_id: str, d: int, m: int, *, discrete: bool) -> EnvironmentNames:
+    """Names from the catalogue if they fit the spaces, else numbers.
+
+    Args:
+        env_id: Of an environment that need not be made.
+        d: Number of features.
+        m: Number of action dimensions.
+        discrete: Whether the actions are labels.
+
+    Returns:
+        d features and m actions.
+    """
+    name = env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1]
+    family = name.rsplit("-v", 1)[0].removesuffix("Hardcore")
+    for key in (family, f"{family}Continuous"):
+        names = _CATALOGUE.get(key)
+        if (
+            names is not None
+            and bool(names.labels) == discrete
+            and len(names.features) == d
+            and len(names.actions) == m
+        ):
+            return names
+    return EnvironmentNames(
+        tuple((name, "") for name in numbered(d)),
+        ("action",) if m == 1 else tuple(f"action {index}" for index in range(m)),
+    )

@@ -1,0 +1,1 @@
+"""Rules and results as files for other programs."""

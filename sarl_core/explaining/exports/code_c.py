@@ -1,0 +1,383 @@
+"""Rules as one C function: C99, nothing but the language and its own headers."""
+
+from __future__ import annotations
+
+import math
+
+from sarl_core.explaining.exports.program import (
+    Order,
+    Outcome,
+    Program,
+    Step,
+    one_line,
+    parts_of,
+    program_of,
+)
+from sarl_core.mining.language import action_text, conditions_text, counted
+from sarl_core.mining.rule_tree import NO_RULE
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
+
+_SIGNATURE = """\
+int shield_decide(const float state[SHIELD_FEATURES],
+                  const {kind} proposed[SHIELD_ACTIONS],
+                  {kind} executed[SHIELD_ACTIONS],
+                  int rule[SHIELD_ACTIONS])"""
+
+_HEAD = """\
+/* A shield of rules as one function, C99:
+ *
+{signature}
+ *
+ *   state     what the agent sees, {features}, each as listed below
+ *   proposed  the agent's action, {actions}
+ *   executed  the action to execute; may be the same array as proposed
+ *   rule      for each action the index of the rule in force, -1 where none applies
+ *
+ *   It returns 1 if an action was changed, 0 if not. An action that breaks no rule is
+ *   passed on as it is. It keeps nothing between calls and may run in several threads.
+ *   Where a number of the state {none}, it returns
+ *   SHIELD_INVALID, and no rule is in force: {invalid}.
+ *
+ * Made by `python -m sarl_core export`: {rules}{projection}.
+ * The rules were learned from examples and guarantee nothing.
+ */
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+/* Thresholds are doubles, compared with the state as it is. Where a compiler computes with
+ * other numbers, or takes for granted that all are finite, decisions may differ. */
+#if defined(__FAST_MATH__) || \\
+    (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 1)
+#error "compile without fast math, and with doubles computed as doubles (on x86: SSE2)"
+#endif
+"""
+
+
+_INVALID: dict[OnInvalid, str] = {
+    "raise": "nothing is written to executed, and\n *   nothing should be done (on_invalid: raise)",
+    "pass": "the action is passed on as it is, unchecked\n *   (on_invalid: pass)",
+}
+
+
+def rules_to_c(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> str:
+    """A rule set as C.
+
+    Args:
+        rule_set: The rules; those switched off are left out, and keep their index.
+        projection: What a continuous action that breaks a rule becomes.
+        on_invalid: Whether an action passes where it or the state is none, or nothing is given
+            to be executed; what is returned says so either way.
+
+    Returns:
+        A source file with the function `shield_decide`, which decides as a `Shield` does.
+
+    Raises:
+        InputError: As `program_of`.
+    """
+    program = program_of(rule_set, projection, on_invalid)
+    functions = [
+        part
+        for index, order in enumerate(program.orders)
+        for part in _finders(index, order, rule_set)
+    ]
+    return "\n".join(
+        [
+            _head(program),
+            _names(program),
+            _table(program),
+            *functions,
+            _valid(program),
+            _decide(program),
+        ]
+    )
+
+
+def comment(text: str) -> str:
+    """Text from outside for a C comment.
+
+    Args:
+        text: Any.
+
+    Returns:
+        One line that cannot end the comment, begin another or be taken for a trigraph.
+    """
+    seen = one_line(text)
+    # Twice for question marks: of three, the first pass leaves two side by side.
+    for signs, harmless in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), *[("??", "? ?")] * 2):
+        seen = seen.replace(signs, harmless)
+    return seen
+
+
+def _kind(program: Program) -> str:
+    return "float" if program.continuous else "int64_t"
+
+
+def _head(program: Program) -> str:
+    rule_set = program.rule_set
+    signature = _SIGNATURE.format(kind=_kind(program)).replace("\n", "\n *   ")
+    if program.continuous:
+        replaced = {
+            "centre": "the middle of the rule's interval",
+            "clip": "the nearest value in the rule's interval",
+            "expert": "what the expert typically did there",
+        }[program.projection]
+        projection = f";\n * an action that breaks a rule becomes {replaced}"
+    else:
+        projection = ""
+    return _HEAD.format(
+        signature=f" *   {signature};",
+        features=counted(len(rule_set.source.features), "number"),
+        actions=counted(len(program.orders), "number"),
+        none="or of the action is not finite"
+        if program.continuous
+        else "is not finite, or an action none that there is",
+        invalid=_INVALID[program.on_invalid],
+        rules=f"{counted(len(rule_set), 'rule')} for "
+        f"{comment(rule_set.source.env_id) or 'an unnamed environment'}",
+        projection=projection,
+    )
+
+
+def _names(program: Program) -> str:
+    features = [
+        f" *   {index:>3}  {comment(feature.name)}"
+        + (f" ({comment(feature.unit)})" if feature.unit else "")
+        for index, feature in enumerate(program.rule_set.source.features)
+    ]
+    actions = [
+        f" *   {index:>3}  {comment(order.dimension.name)}"
+        for index, order in enumerate(program.orders)
+    ]
+    prototype = _SIGNATURE.format(kind=_kind(program))
+    return "\n".join(
+        [
+            "/* The state:",
+            *features,
+            " * The actions:",
+            *actions,
+            " */",
+            "enum {",
+            f"    SHIELD_FEATURES = {len(features)},",
+            f"    SHIELD_ACTIONS = {len(actions)},",
+            f"    SHIELD_RULES = {len(program.rule_set)},",
+            "    SHIELD_INVALID = -1",
+            "};",
+            "",
+            f"{prototype};",
+            "",
+        ]
+    )
+
+
+def _table(program: Program) -> str:
+    """What each rule makes of an action."""
+    lines = [
+        "/* What each rule makes of an action: one that it allows is kept, any other is replaced."
+        " */"
+    ]
+    rows = [
+        f"    {_row(outcome, program)},"
+        f" /* {index}: {_rule_comment(rule, program.rule_set)}{'' if rule.enabled else ', off'} */"
+        for index, (rule, outcome) in enumerate(
+            zip(program.rule_set.rules, program.outcomes, strict=True)
+        )
+    ]
+    if not program.continuous:
+        return "\n".join(
+            [*lines, "static const int64_t shield_value[SHIELD_RULES] = {", *rows, "};", ""]
+        )
+    value = "" if program.projection == "clip" else "float value; "
+    lines += [
+        "static const struct {",
+        f"    {value}float low, high;     /* allowed: low to high */",
+        "    int open_low, open_high; /* 1: and all beyond */",
+        "} shield_rule[SHIELD_RULES] = {",
+        *rows,
+        "};",
+        "",
+        "static int shield_keeps(int rule, float action)",
+        "{",
+        "    return (shield_rule[rule].open_low || !(action < shield_rule[rule].low)) &&",
+        "           (shield_rule[rule].open_high || action <= shield_rule[rule].high);",
+        "}",
+        "",
+    ]
+    if program.projection == "clip":
+        lines += [
+            "static float shield_nearest(int rule, float action)",
+            "{",
+            "    if (!(action > shield_rule[rule].low))",
+            "        action = shield_rule[rule].low;",
+            "    return action < shield_rule[rule].high ? action : shield_rule[rule].high;",
+            "}",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _row(outcome: Outcome, program: Program) -> str:
+    if not program.continuous:
+        return f"INT64_C({outcome.low})"
+    numbers = [outcome.low, outcome.high]
+    if outcome.value is not None:
+        numbers.insert(0, outcome.value)
+    shown = [f"(float){_number(value)}" for value in numbers]
+    flags = [str(int(outcome.open_low)), str(int(outcome.open_high))]
+    return f"{{{', '.join([*shown, *flags])}}}"
+
+
+def _finders(index: int, order: Order, rule_set: RuleSet) -> list[str]:
+    """The functions that find the rule of one action dimension, called ones first."""
+    always = any(not rule.conditions for _, rule in order.scanned)
+    parts = [[]] if always else parts_of(order.nodes)
+    found = []
+    for number in reversed(range(len(parts))):
+        lines = [
+            f"/* {comment(order.dimension.name)}: the rule in force. */"
+            if number == 0
+            else "/* Further down. */",
+            f"static int {_finder(index, number)}(const float *x)",
+            "{",
+        ]
+        if number == 0:
+            if always or not order.asks:
+                lines.append("    (void)x;")
+            lines += [
+                line for place, rule in order.scanned for line in _scan(place, rule, rule_set)
+            ]
+        lines += [_line(step, index, rule_set) for step in parts[number]]
+        found.append("\n".join([*lines, "}", ""]))
+    return found
+
+
+def _finder(index: int, number: int) -> str:
+    return f"shield_rule_of_{index}" + (f"_{number}" if number else "")
+
+
+def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
+    told = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
+    if not rule.conditions:
+        return [f"    {told}"]
+    asked = [
+        _query(feature, threshold, negated=op == ">") for feature, op, threshold in rule.conditions
+    ]
+    return [
+        f"    /* {comment(conditions_text(rule, rule_set))} */",
+        f"    if ({' && '.join(asked)})",
+        f"        {told}",
+    ]
+
+
+def _line(step: Step, index: int, rule_set: RuleSet) -> str:
+    space = "    " * (step.level + 1)
+    match step.kind:
+        case "if":
+            name = comment(rule_set.source.features[step.feature].name)
+            return f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {name} */"
+        case "else":
+            return f"{space}}} else {{"
+        case "end":
+            return f"{space}}}"
+        case "part":
+            return f"{space}return {_finder(index, step.target)}(x);"
+        case "rule":
+            if step.target == NO_RULE:
+                return f"{space}return -1;"
+            rule = rule_set.rules[step.target]
+            return f"{space}return {step.target}; /* {_rule_comment(rule, rule_set)} */"
+
+
+def _query(feature: int, threshold: float, *, negated: bool = False) -> str:
+    asked = f"(double)x[{feature}] <= {_number(threshold)}"
+    return f"!({asked})" if negated else asked
+
+
+def _number(value: float) -> str:
+    """A number that C reads back as the same double."""
+    if math.isinf(value):
+        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
+    return repr(float(value))
+
+
+def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
+    action = action_text(rule.action, rule_set.actions[rule.dimension])
+    return comment(f"{rule_set.name_of(rule)}: {action}")
+
+
+def _valid(program: Program) -> str:
+    """Whether the rules can be asked at all."""
+    table = []
+    asked = "!isfinite(proposed[i])"
+    if not program.continuous:
+        asked = "proposed[i] < shield_first[i] || proposed[i] > shield_last[i]"
+        first, last = (
+            ", ".join(f"INT64_C({end})" for end in ends)
+            for ends in zip(*program.labels, strict=True)
+        )
+        table = [
+            "/* The actions there are. */",
+            f"static const int64_t shield_first[SHIELD_ACTIONS] = {{{first}}};",
+            f"static const int64_t shield_last[SHIELD_ACTIONS] = {{{last}}};",
+            "",
+        ]
+    return "\n".join(
+        [
+            *table,
+            f"static int shield_is_valid(const float *state, const {_kind(program)} *proposed)",
+            "{",
+            "    for (int i = 0; i < SHIELD_FEATURES; i++)",
+            "        if (!isfinite(state[i]))",
+            "            return 0;",
+            "    for (int i = 0; i < SHIELD_ACTIONS; i++)",
+            f"        if ({asked})",
+            "            return 0;",
+            "    return 1;",
+            "}",
+            "",
+        ]
+    )
+
+
+def _decide(program: Program) -> str:
+    calls = [
+        f"    rule[{index}] = {_finder(index, 0)}(state);" for index in range(len(program.orders))
+    ]
+    if not program.continuous:
+        keeps, becomes = "proposed[i] == shield_value[rule[i]]", "shield_value[rule[i]]"
+    elif program.projection == "clip":
+        keeps, becomes = (
+            "shield_keeps(rule[i], proposed[i])",
+            "shield_nearest(rule[i], proposed[i])",
+        )
+    else:
+        keeps, becomes = "shield_keeps(rule[i], proposed[i])", "shield_rule[rule[i]].value"
+    passes = program.on_invalid == "pass"
+    return "\n".join(
+        [
+            _SIGNATURE.format(kind=_kind(program)),
+            "{",
+            "    int changed = 0;",
+            "    if (!shield_is_valid(state, proposed)) {",
+            "        for (int i = 0; i < SHIELD_ACTIONS; i++)",
+            f"            rule[i] = -1{', executed[i] = proposed[i]' if passes else ''};",
+            "        return SHIELD_INVALID;",
+            "    }",
+            *calls,
+            "    for (int i = 0; i < SHIELD_ACTIONS; i++) {",
+            f"        if (rule[i] < 0 || {keeps}) {{",
+            "            executed[i] = proposed[i];",
+            "        } else {",
+            f"            executed[i] = {becomes};",
+            "            changed = 1;",
+            "        }",
+            "    }",
+            "    return changed;",
+            "}",
+            "",
+        ]
+    )

@@ -1,0 +1,354 @@
+"""Rule sets for other programs and for reading, every rule, never cut short.
+
+CSV and text are written here; the other formats have files of their own and are found from here.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.explaining.exports.program import require_rules
+from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
+from sarl_core.explaining.words.edited_sets import edits_counted, is_plain, reading_order
+from sarl_core.files import whole_file
+from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
+from sarl_core.mining.language import (
+    counted,
+    exact_condition,
+    label_text,
+    sentence,
+    share_text,
+    threshold_text,
+)
+from sarl_core.mining.rule_order import rules_for
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid, Shield
+
+FORMATS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
+"""What a rule set is carried away as: endings of file names."""
+CSV_COLUMNS = (
+    "id",
+    "dimension",
+    "action",
+    "rule",
+    "conditions",
+    "support",
+    "confidence",
+    "lift",
+    "joint_support",
+    "samples",
+    "length",
+    "merged_length",
+    "enabled",
+    "origin",
+    "pinned",
+    *(f"held_out_{name}" for name in HeldOut._fields),
+)
+
+
+class Prepared(NamedTuple):
+    """Rules as they are to be carried away.
+
+    Attributes:
+        rule_set: Rounded and merged as was asked.
+        rounding: What became of each threshold; None where none was to be rounded.
+        changed: Demonstrated pairs that the rounded rules decide differently, by the shield's own
+            count; 0 where none was to be rounded.
+        notes: What is to be said of how rules and demonstrations were matched, as clauses.
+    """
+
+    rule_set: RuleSet
+    rounding: Rounding | None = None
+    changed: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def prepare(
+    rule_set: RuleSet, *, merged: bool = False, demonstrations: Demonstrations | None = None
+) -> Prepared:
+    """Round and merge rules, as asked.
+
+    Args:
+        rule_set: To carry away.
+        merged: Whether several conditions on one feature become one interval.
+        demonstrations: Round the thresholds to what changes no decision on these; None for not.
+
+    Returns:
+        The rules, and what rounding did.
+
+    Raises:
+        InputError: If there are no rules, or the demonstrations are for other features or actions.
+    """
+    require_rules(rule_set)
+    notes: tuple[str, ...] = ()
+    rounding, changed = None, 0
+    if demonstrations is not None:
+        rule_set, notes = rules_for(rule_set, demonstrations)
+        rounding = rounded_rules(rule_set, demonstrations)
+        changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)
+        rule_set = rounding.rule_set
+    return Prepared(merged_rules(rule_set) if merged else rule_set, rounding, changed, notes)
+
+
+def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstrations) -> int:
+    """Count the demonstrated pairs that two rule sets decide differently.
+
+    Args:
+        before: Rules.
+        after: As many, in the same order.
+        demonstrations: N states with the actions taken in them.
+
+    Returns:
+        Pairs for which the rule in force or the executed action differs in some dimension.
+
+    Raises:
+        InputError: If the demonstrations have another number of action dimensions.
+    """
+    dimensions = demonstrations.action_columns.shape[1]
+    if dimensions != len(before.actions):
+        raise InputError(
+            f"the rules are for {counted(len(before.actions), 'action dimension')} and the "
+            f"demonstrations have {dimensions}; choose demonstrations of the rules' environment"
+        )
+    one, other = (
+        Shield(rules).decide_batch(demonstrations.observations, demonstrations.action_columns)
+        for rules in (before, after)
+    )
+    differs = (one.rules != other.rules) | (one.executed != other.executed)
+    return int(np.count_nonzero(differs.any(axis=1)))
+
+
+def export_rules(
+    rule_set: RuleSet,
+    suffix: str,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+) -> bytes:
+    """A rule set in one of the formats.
+
+    Args:
+        rule_set: To carry away.
+        suffix: One of `FORMATS`.
+        projection: What a continuous action that breaks a rule becomes; for code.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none; for
+            code.
+
+    Returns:
+        The content of the file.
+
+    Raises:
+        InputError: If the format is not known, there are no rules, or code is asked of rules none
+            of which is switched on.
+        WorkError: If a package is missing that the format needs.
+    """
+    require_rules(rule_set)
+    if suffix == ".onnx":
+        from sarl_core.explaining.exports.onnx_model import rules_to_onnx
+
+        return rules_to_onnx(rule_set, projection, on_invalid)
+    # A file may have brought half of a pair that UTF-8 cannot write.
+    return _text(rule_set, suffix, projection, on_invalid).encode("utf-8", errors="replace")
+
+
+def export_vectors(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> bytes:
+    """Test vectors for a rule set, as CSV.
+
+    Args:
+        rule_set: As it was exported.
+        projection: As it was exported.
+        on_invalid: As it was exported.
+
+    Returns:
+        The content of the file that stands beside the export.
+
+    Raises:
+        InputError: If there are no rules, or none is switched on.
+    """
+    from sarl_core.explaining.exports.vectors import make_vectors, vectors_to_csv
+
+    return vectors_to_csv(make_vectors(rule_set, projection, on_invalid)).encode()
+
+
+def vectors_name(name: str) -> str:
+    """What the file of test vectors is called.
+
+    Args:
+        name: Of the exported file.
+
+    Returns:
+        As "shield.c.vectors.csv".
+    """
+    return f"{name}.vectors.csv"
+
+
+def save_export(
+    rule_set: RuleSet,
+    path: Path,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+) -> Path:
+    """Write a rule set in the format that the file's name ends in, and its test vectors beside it.
+
+    Args:
+        rule_set: To carry away.
+        path: Ends in one of `FORMATS`.
+        projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
+
+    Returns:
+        Where the test vectors are.
+
+    Raises:
+        InputError: As `export_rules`, or if the folder does not exist.
+        WorkError: If it cannot be written to, or a package is missing.
+    """
+    content = export_rules(rule_set, path.suffix.lower(), projection, on_invalid)
+    vectors = export_vectors(rule_set, projection, on_invalid)
+    beside = path.with_name(vectors_name(path.name))
+    for place, data in ((beside, vectors), (path, content)):
+        with whole_file(place) as unfinished:
+            unfinished.write_bytes(data)
+    return beside
+
+
+def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: OnInvalid) -> str:
+    if suffix == ".json":
+        from sarl_core.mining.rule_files import rules_to_json
+
+        return rules_to_json(rule_set)
+    if suffix == ".csv":
+        return rules_to_csv(rule_set)
+    if suffix == ".md":
+        from sarl_core.explaining.exports.markdown import rules_to_markdown
+
+        return rules_to_markdown(rule_set)
+    if suffix == ".py":
+        from sarl_core.explaining.exports.code_python import rules_to_python
+
+        return rules_to_python(rule_set, projection, on_invalid)
+    if suffix == ".c":
+        from sarl_core.explaining.exports.code_c import rules_to_c
+
+        return rules_to_c(rule_set, projection, on_invalid)
+    raise InputError(f"the format {suffix!r} is none of {', '.join(FORMATS)}; choose one of them")
+
+
+def rules_to_csv(rule_set: RuleSet) -> str:
+    """A rule set as CSV.
+
+    Args:
+        rule_set: Any number of rules.
+
+    Returns:
+        A header and one line a rule; `conditions` holds the queries in path order with their
+        thresholds at full precision, `rule` the sentence with rounded numbers.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    features = rule_set.source.features
+    for rule in rule_set.rules:
+        dimension = rule_set.actions[rule.dimension]
+        held_out = rule.held_out
+        conditions = " and ".join(exact_condition(c, features) for c in rule.conditions)
+        writer.writerow(
+            (
+                safe_cell(rule.id),
+                safe_cell(dimension.name),
+                safe_cell(label_text(rule.action, dimension)),
+                safe_cell(sentence(rule, rule_set, evidence=False)),
+                safe_cell(conditions or "always"),
+                repr(rule.support),
+                repr(rule.confidence),
+                repr(rule.lift),
+                repr(rule.joint_support),
+                rule.samples,
+                rule.length,
+                rule.merged_length,
+                "yes" if rule.enabled else "no",
+                rule.origin,
+                "yes" if rule.pinned else "no",
+                *(held_out or [None] * len(HeldOut._fields)),
+            )
+        )
+    return text.getvalue()
+
+
+def rules_to_text(rule_set: RuleSet) -> str:
+    """A rule set for reading.
+
+    Args:
+        rule_set: Any number of rules.
+
+    Returns:
+        What it was mined from and how, then every rule as a sentence, by action
+        dimension: those that a person placed in their order, then the most general first.
+    """
+    source = rule_set.source
+    summary = (
+        f"they cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"{share_text(rule_set.fidelity)} of those."
+        if is_plain(rule_set)
+        else f"{edits_counted(rule_set)}."
+    )
+    lines = [
+        f"Rules for {source.env_id or 'an unnamed environment'}",
+        f"Mined from {counted(source.steps, 'step')} in "
+        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}.",
+        f"{counted(rule_set.rule_count, 'rule')}, {rule_set.mean_length:.2f} conditions on "
+        f"average; {summary}",
+        "They were learned from examples and guarantee nothing.",
+    ]
+    for index, dimension in enumerate(rule_set.actions):
+        rules = reading_order(rule_set.of_dimension(index))
+        lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
+        lines += [
+            f"{rule_set.name_of(rule):>5}. {sentence(rule, rule_set)}{_mark(rule)}"
+            for rule in rules
+        ]
+    if any(rule.placed for rule in rule_set.rules):
+        lines += ["", "Rules written by hand or pinned come before the others, in their order."]
+    return "\n".join(lines) + "\n"
+
+
+def _mark(rule: Rule) -> str:
+    """What a person made of a rule, as " (pinned, off)"."""
+    marks = ["by hand"] if rule.origin == "manual" else ["pinned"] if rule.pinned else []
+    marks += [] if rule.enabled else ["off"]
+    return f" ({', '.join(marks)})" if marks else ""
+
+
+def limits_text(rule_set: RuleSet) -> str:
+    """The thresholds that a rule set was mined at.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "support at least 0.005, confidence at least 0.95".
+    """
+    thresholds = rule_set.thresholds
+    limits = [
+        f"support at least {threshold_text(thresholds.support)}",
+        f"confidence at least {threshold_text(thresholds.confidence)}",
+    ]
+    if rule_set.cut == "leaves":
+        limits = ["every leaf of the tree"]
+    if thresholds.lift:
+        limits.append(f"lift at least {threshold_text(thresholds.lift)}")
+    if thresholds.max_depth is not None:
+        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
+    if any(dimension.is_interval for dimension in rule_set.actions):
+        limits.append(f"divider {rule_set.divider}")
+    return ", ".join(limits)

@@ -1,0 +1,216 @@
+"""A threshold landscape as a file: JSON, CSV, an interactive page, or a picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import logging
+import os
+from collections.abc import Sequence
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import InputError, WorkError, quoted
+from sarl_core.files import whole_file
+from sarl_core.mining.landscape import Landscape
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+MAX_VALUES = 10_001  # an axis in steps of 0.0001
+MAX_CELLS = 4_000_000  # as a file, half a gigabyte
+
+_BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
+
+_LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
+
+
+def parse_grid(text: str, name: str) -> NDArray[np.float64]:
+    """Read the thresholds of a grid, written ``a:b:step``.
+
+    Args:
+        text: As "0:0.5:0.05"; b is included if the steps reach it.
+        name: Of the option, for errors.
+
+    Returns:
+        The thresholds, ascending. Each is the float nearest to the decimal number, so that
+        three steps of 0.05 are 0.15 and nothing beside it.
+
+    Raises:
+        InputError: If it is not of this form, leaves [0, 1] or has too many values.
+    """
+    try:
+        first, last, step = (Decimal(part) for part in text.split(":"))
+    except (ValueError, InvalidOperation) as error:
+        raise InputError(
+            f"{name} is {text!r}; give the first value, the last and the step, as 0:0.5:0.05"
+        ) from error
+    if not all(value.is_finite() for value in (first, last, step)) or step <= 0 or last < first:
+        raise InputError(
+            f"{name} is {text!r}; the step must be above 0 and the last value not below the first"
+        )
+    if first < 0 or last > 1:
+        raise InputError(f"{name} is {text!r}; thresholds are shares from 0 to 1")
+    if (last - first) / step >= MAX_VALUES:
+        raise InputError(f"{name} is {text!r}, more than {MAX_VALUES:,} values; give a larger step")
+    count = int((last - first) / step) + 1
+    return np.array([float(first + index * step) for index in range(count)])
+
+
+def save_landscape(
+    landscape: Landscape, names: Sequence[str], path: Path, *, title: str = ""
+) -> None:
+    """Write a landscape; the file appears whole or not at all.
+
+    Args:
+        landscape: To write.
+        names: Of the action dimensions.
+        path: A `.json`, `.csv`, `.html` (opens without a network) or `.png` file.
+        title: Above the figure.
+
+    Raises:
+        InputError: If the path has another ending, or the grid too many cells for a file.
+        WorkError: If the file cannot be written, or no browser is there to draw a PNG.
+    """
+    if landscape.rule_count.size > MAX_CELLS:
+        raise InputError(
+            f"the grid has {landscape.rule_count.size:,} cells, more than {MAX_CELLS:,}; "
+            "give larger steps"
+        )
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        document = landscape_document(landscape, names)
+        content = json.dumps(document, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    elif suffix == ".csv":
+        content = _csv(landscape, names).encode()
+    elif suffix in (".html", ".png"):
+        from sarl_core.explaining.figures.thresholds import landscape_figure
+
+        figure = landscape_figure(landscape, title=title)
+        content = (
+            figure_to_png(figure)
+            if suffix == ".png"
+            else (figure.to_html(include_plotlyjs=True).encode())
+        )
+    else:
+        raise InputError(f"{path} ends in none of .json, .csv, .html, .png; choose one")
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(content)
+
+
+def landscape_document(landscape: Landscape, names: Sequence[str]) -> dict[str, Any]:
+    """A landscape for JSON.
+
+    Args:
+        landscape: To write.
+        names: Of the action dimensions.
+
+    Returns:
+        `supports`, `confidences`, the four layers as one list a support with one entry a
+        confidence (fidelity null where nothing is covered), and under `dimensions` the layers of
+        each action dimension with its `name`.
+    """
+    return {
+        "supports": landscape.supports.tolist(),
+        "confidences": landscape.confidences.tolist(),
+        **_layers(landscape),
+        "dimensions": [
+            {"name": name, **_layers(part)}
+            for name, part in zip(names, landscape.dimensions, strict=True)
+        ],
+    }
+
+
+def _layers(landscape: Landscape) -> dict[str, Any]:
+    layers = {layer: getattr(landscape, layer).tolist() for layer in _LAYERS}
+    # NaN, the only number that is not itself, is where nothing is covered.
+    layers["fidelity"] = [
+        [None if value != value else value for value in row] for row in layers["fidelity"]
+    ]
+    return layers
+
+
+def _csv(landscape: Landscape, names: Sequence[str]) -> str:
+    """One row a cell; with several action dimensions, of the whole and of each."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("dimension", "support", "confidence", *_LAYERS))
+    parts = [("all", landscape)]
+    if len(names) > 1:
+        parts += zip(names, landscape.dimensions, strict=True)
+    for name, part in parts:
+        layers = _layers(part)
+        for row, support in enumerate(part.supports.tolist()):
+            writer.writerows(
+                (name, support, confidence, *(layers[layer][row][column] for layer in _LAYERS))
+                for column, confidence in enumerate(part.confidences.tolist())
+            )
+    return text.getvalue()
+
+
+def figure_to_png(figure: go.Figure) -> bytes:
+    """Draw a Plotly figure as a picture, two pixels for one so that text is sharp.
+
+    Args:
+        figure: To draw, at the size its layout says.
+
+    Returns:
+        A PNG file.
+
+    Raises:
+        WorkError: If there is no Chromium or Chrome to draw it with.
+    """
+    silence_browser()
+    try:
+        picture: bytes = figure.to_image(format="png", scale=2)
+    except Exception as error:  # whatever Kaleido or the browser has to complain about
+        raise cannot_draw(error, "write .html") from error
+    return picture
+
+
+def silence_browser() -> None:
+    """Let what speaks to the browser log nothing: traces of what it mends or raises itself."""
+    logging.getLogger("choreographer").setLevel(logging.CRITICAL + 1)
+
+
+def cannot_draw(error: Exception, advice: str) -> WorkError:
+    """What to tell who has no browser to draw pictures with, or none that works.
+
+    Args:
+        error: Of Kaleido or the browser.
+        advice: What else to do, after "or".
+
+    Returns:
+        The error to raise.
+    """
+    return WorkError(
+        "the picture could not be drawn, which takes an installed Chromium or Chrome: "
+        f"{_lacking(error)}, or {advice}"
+    )
+
+
+def _lacking(error: Exception) -> str:
+    """What is missing, and how it is mended."""
+    try:
+        from choreographer.browsers.chromium import Chromium
+        from choreographer.errors import BrowserClosedError, BrowserFailedError
+    except ImportError:
+        return "the package kaleido, which speaks to it, is not installed; install it"
+    browser = Chromium.find_browser(skip_local=False)
+    named = browser is not None and os.environ.get(_BROWSER) == browser
+    if browser is None:
+        return f"there is none; install one and, if it is not found, set {_BROWSER} to its program"
+    which = f"{quoted(browser)}, to which {_BROWSER} is set," if named else quoted(browser)
+    do = f"set {_BROWSER} to one that works" if named else "install it anew"
+    if not Path(browser).is_file():
+        return f"{which} does not exist; {do}"
+    if isinstance(error, (BrowserClosedError, BrowserFailedError, OSError)):
+        return f"{which} could not be started; {do}"
+    # Some put several sentences in one error, and some none.
+    told = error.args[0] if error.args and isinstance(error.args[0], str) else type(error).__name__
+    return f"{which} failed ({quoted(told.split('. ')[0].strip(), 120)}); {do}"

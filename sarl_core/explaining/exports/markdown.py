@@ -1,0 +1,114 @@
+"""Rules as a Markdown document: a table an action."""
+
+from __future__ import annotations
+
+import math
+import re
+from html import escape
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.exports.program import one_line
+from sarl_core.explaining.words.edited_sets import edits_counted, is_plain, reading_order
+from sarl_core.explaining.words.evidence import held_out_text, interval_text
+from sarl_core.mining.language import action_text, counted, share_text
+from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.written import limit_texts
+
+_SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
+_ORDINARY = re.compile(r"[A-Za-z0-9 ,;.+/²³°%-]*")
+
+
+def rules_to_markdown(rule_set: RuleSet) -> str:
+    """A rule set as Markdown.
+
+    Args:
+        rule_set: Any number of rules.
+
+    Returns:
+        What it was mined from and how, then a table for each action dimension: rules that a
+        person placed in their order, then those that apply most often. Every name is escaped.
+    """
+    from sarl_core.explaining.exports.export import limits_text
+
+    source = rule_set.source
+    # Rules that overlap or are off have counts that do not add up to a share of the states.
+    summary = (
+        f"They cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"{share_text(rule_set.fidelity)} of those."
+        if is_plain(rule_set)
+        else f"The set was {edits_counted(rule_set)}."
+    )
+    lines = [
+        f"# Rules for {markdown_text(source.env_id) or 'an unnamed environment'}",
+        "",
+        f"{counted(rule_set.rule_count, 'rule')}, mined from {counted(source.steps, 'step')} in "
+        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. {summary}",
+        "",
+        "They were learned from examples and guarantee nothing.",
+    ]
+    held_out = any(rule.held_out is not None for rule in rule_set.rules)
+    headings = ["Rule", "If", "Then", "The expert did so in", "States"]
+    headings += ["Held out"] if held_out else []
+    for index, dimension in enumerate(rule_set.actions):
+        rules = reading_order(rule_set.of_dimension(index))
+        lines += [
+            "",
+            f"## {markdown_text(dimension.name)}: {counted(len(rules), 'rule')}",
+            "",
+            f"| {' | '.join(headings)} |",
+            "|" + " --- |" * len(headings),
+        ]
+        lines += [f"| {' | '.join(_cells(rule, rule_set, held_out=held_out))} |" for rule in rules]
+    if any(rule.placed for rule in rule_set.rules):
+        lines += ["", "Rules written by hand or pinned come before the others, in their order."]
+    return "\n".join(lines) + "\n"
+
+
+def markdown_text(text: str) -> str:
+    """Text from outside that Markdown, and the HTML in it, leave alone.
+
+    Args:
+        text: A name, a unit or a label, which may come from a file.
+
+    Returns:
+        One line.
+    """
+    seen = one_line(text)
+    if _ORDINARY.fullmatch(seen):
+        return seen
+    return escape(_SIGNS.sub(r"\\\1", seen), quote=False)
+
+
+def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
+    features = rule_set.source.features
+    asked = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    action = markdown_text(action_text(rule.action, rule_set.actions[rule.dimension]))
+    name = rule_set.name_of(rule)
+    if rule.origin == "manual":
+        name += ", by hand"
+    elif rule.pinned:
+        name += ", pinned"
+    cells = [
+        f"{name}{'' if rule.enabled else ', off'}",
+        " and ".join(asked) or "always",
+        action,
+        share_text(rule.confidence) if rule.samples else "–",
+        f"{rule.samples:,}",
+    ]
+    if held_out:
+        found = rule.held_out
+        told = "–" if found is None or not found.samples else held_out_text(found)
+        cells.append(f"{told} ({interval_text(found)})" if found and found.episodes else told)
+    return cells
+
+
+def _interval(bounds: Bounds, feature: Feature) -> str:
+    """What is asked of one feature."""
+    name = markdown_text(feature.name)
+    unit = f" {markdown_text(feature.unit)}" if feature.unit else ""
+    limits = limit_texts(bounds, feature)
+    if math.isinf(bounds.low):
+        return f"{name} ≤ {limits[0]}{unit}"
+    if math.isinf(bounds.high):
+        return f"{name} &gt; {limits[0]}{unit}"
+    return f"{limits[0]} &lt; {name} ≤ {limits[1]}{unit}"

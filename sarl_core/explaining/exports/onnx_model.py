@@ -1,0 +1,322 @@
+"""Rules as an ONNX model, which many runtimes can execute; needs the package `onnx`.
+
+Thresholds are float32 in ONNX. The largest float32 number that is at most a threshold divides
+float32 states exactly as the threshold itself does, so nothing is lost.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.errors import WorkError
+from sarl_core.explaining.exports.program import Order, Program, largest_float32, program_of
+from sarl_core.mining.rule_tree import NO_RULE
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.tree import LEAF
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid
+
+# Versions of the operators that runtimes have known for years.
+_OPERATORS, _TREES, _FORMAT = 13, 1, 7
+
+
+def rules_to_onnx(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> bytes:
+    """A rule set as an ONNX model.
+
+    Args:
+        rule_set: The rules; those switched off are left out, and keep their index.
+        projection: What a continuous action that breaks a rule becomes.
+        on_invalid: Whether the action passes where it or the state is none (``pass``). A model
+            cannot stop with an error: for ``raise``, `executed` is then no action at all, NaN or
+            the least int64.
+
+    Returns:
+        A model with the inputs `state` (B, d) float32 and `proposed` (B, m), int64 or float32,
+        and the outputs `executed` (B, m), alike, `rule` (B, m) int64, -1 where none applies, and
+        `invalid` (B, 1), whether a number is not finite or an action none that there is.
+
+    Raises:
+        InputError: As `program_of`.
+        WorkError: If the package `onnx` is missing.
+    """
+    program = program_of(rule_set, projection, on_invalid)
+    try:
+        import onnx
+        from onnx import TensorProto, helper
+    except ImportError as error:
+        raise WorkError(
+            "an ONNX file needs the package onnx, which is not installed; run `pip install onnx`, "
+            "or choose another format"
+        ) from error
+    graph = _Graph(helper)
+    for index, order in enumerate(program.orders):
+        _find(graph, index, order)
+    found = [f"rule_of_{i}" for i in range(len(program.orders))]
+    graph.add("Concat", found, "rule_found", axis=1)
+    graph.add("Not", [_valid(graph, program)], "invalid")
+    nothing = graph.table("no_rule", np.array([NO_RULE], dtype=np.int64))
+    graph.add("Where", ["valid", "rule_found", nothing], "rule")
+    if program.continuous:
+        _replace_continuous(graph, program)
+    else:
+        _replace_discrete(graph, program)
+    d, m = len(rule_set.source.features), len(program.orders)
+    kind = TensorProto.FLOAT if program.continuous else TensorProto.INT64
+    info = helper.make_tensor_value_info
+    model = helper.make_model(
+        helper.make_graph(
+            graph.nodes,
+            "shield",
+            [info("state", TensorProto.FLOAT, ["B", d]), info("proposed", kind, ["B", m])],
+            [
+                info("executed", kind, ["B", m]),
+                info("rule", TensorProto.INT64, ["B", m]),
+                info("invalid", TensorProto.BOOL, ["B", 1]),
+            ],
+            [onnx.numpy_helper.from_array(value, name) for name, value in graph.tables.items()],
+        ),
+        opset_imports=[
+            helper.make_opsetid("", _OPERATORS),
+            helper.make_opsetid("ai.onnx.ml", _TREES),
+        ],
+        ir_version=_FORMAT,
+        producer_name="sarl_core",
+        doc_string="A shield of rules, learned from examples; it guarantees nothing. "
+        + _INVALID[on_invalid],
+    )
+    helper.set_model_props(
+        model,
+        {
+            "environment": rule_set.source.env_id,
+            "on_invalid": on_invalid,
+            "features": json.dumps(
+                [{"name": f.name, "unit": f.unit} for f in rule_set.source.features]
+            ),
+            "actions": json.dumps([order.dimension.name for order in program.orders]),
+            "rules": json.dumps([rule.id for rule in rule_set.rules]),
+        },
+    )
+    onnx.checker.check_model(model)
+    content: bytes = model.SerializeToString()
+    return content
+
+
+_INVALID: dict[OnInvalid, str] = {
+    "raise": "Where `invalid` is true, nothing should be done: `executed` is no action "
+    "(on_invalid: raise).",
+    "pass": "Where `invalid` is true, no rule was asked, and the action passes as it is "
+    "(on_invalid: pass).",
+}
+
+
+def _valid(graph: _Graph, program: Program) -> str:
+    """Add what tells whether the rules can be asked at all: `valid`, (B, 1)."""
+
+    def every(holds: str, name: str) -> str:
+        numbers = graph.add("Cast", [holds], f"{name}_as_number", to=1)  # float
+        least = graph.add("ReduceMin", [numbers], f"{name}_least", axes=[1], keepdims=1)
+        half = graph.table("half", np.array([0.5], dtype=np.float32))
+        return graph.add("Greater", [least, half], f"{name}_valid")
+
+    def finite(values: str) -> str:
+        # What is infinite or no number leaves no zero when it is taken from itself.
+        left = graph.add("Sub", [values, values], f"{values}_left")
+        nothing = graph.table("no_difference", np.array([0], dtype=np.float32))
+        return graph.add("Equal", [left, nothing], f"{values}_finite")
+
+    if program.continuous:
+        holds = finite("proposed")
+    else:
+        first, last = (np.array(ends, dtype=np.int64) for ends in zip(*program.labels, strict=True))
+        under = graph.add("Less", ["proposed", graph.table("first_label", first)], "under_first")
+        over = graph.add("Greater", ["proposed", graph.table("last_label", last)], "over_last")
+        holds = graph.add("Not", [graph.add("Or", [under, over], "no_label")], "is_label")
+    parts = [every(finite("state"), "state"), every(holds, "proposed")]
+    return graph.add("And", parts, "valid")
+
+
+def _execute(graph: _Graph, program: Program, decided: str) -> None:
+    """Add the action to execute: what was decided, where it could be."""
+    otherwise = "proposed"
+    if program.on_invalid == "raise":
+        none = np.float32(np.nan) if program.continuous else np.iinfo(np.int64).min
+        otherwise = graph.table("no_action", np.array([none]))
+    graph.add("Where", ["valid", decided, otherwise], "executed")
+
+
+@dataclass
+class _Graph:
+    """Operators and tables, as they are put together."""
+
+    helper: Any
+    nodes: list[Any] = field(default_factory=list)
+    tables: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    def add(self, operator: str, inputs: Sequence[str], output: str, **options: Any) -> str:
+        """Add an operator and give the name of what it puts out."""
+        self.nodes.append(self.helper.make_node(operator, list(inputs), [output], **options))
+        return output
+
+    def table(self, name: str, values: NDArray[Any]) -> str:
+        """Add a table and give its name."""
+        self.tables[name] = values
+        return name
+
+    def trees(self, trees: _Trees, output: str) -> str:
+        """Add trees that walk with the state."""
+        return self.add(
+            "TreeEnsembleRegressor",
+            ["state"],
+            output,
+            domain="ai.onnx.ml",
+            n_targets=trees.count,
+            aggregate_function="SUM",
+            post_transform="NONE",
+            **{name: values for name, values in vars(trees).items() if name != "count"},
+        )
+
+
+class _Trees:
+    """Trees in the form of the operator: each adds a number to one column of the output."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.nodes_treeids: list[int] = []
+        self.nodes_nodeids: list[int] = []
+        self.nodes_featureids: list[int] = []
+        self.nodes_values: list[float] = []
+        self.nodes_modes: list[str] = []
+        self.nodes_truenodeids: list[int] = []
+        self.nodes_falsenodeids: list[int] = []
+        self.target_treeids: list[int] = []
+        self.target_nodeids: list[int] = []
+        self.target_ids: list[int] = []
+        self.target_weights: list[float] = []
+
+    def query(self, node: int, feature: int, threshold: float, below: int, above: int) -> None:
+        """A node that leads on."""
+        self._node(node, feature, float(largest_float32(threshold)), "BRANCH_LEQ", below, above)
+
+    def leaf(self, node: int, weight: float) -> None:
+        """A node that ends."""
+        self._node(node, 0, 0.0, "LEAF", 0, 0)
+        self.target_treeids.append(self.count)
+        self.target_nodeids.append(node)
+        self.target_ids.append(self.count)
+        self.target_weights.append(float(weight))
+
+    def end(self) -> None:
+        """The tree is complete; the next begins."""
+        self.count += 1
+
+    def _node(
+        self, node: int, feature: int, value: float, mode: str, below: int, above: int
+    ) -> None:
+        self.nodes_treeids.append(self.count)
+        self.nodes_nodeids.append(node)
+        self.nodes_featureids.append(feature)
+        self.nodes_values.append(float(value))
+        self.nodes_modes.append(mode)
+        self.nodes_truenodeids.append(below)
+        self.nodes_falsenodeids.append(above)
+
+
+def _find(graph: _Graph, index: int, order: Order) -> None:
+    """Add what finds the rule of one action dimension: `rule_of_<index>`, (B, 1) int64."""
+    trees = _Trees()
+    if len(order.nodes) == 1:  # a tree of one leaf, which some runtimes do not take
+        trees.query(0, 0, 0.0, 1, 2)
+        trees.leaf(1, order.nodes[0].rule)
+        trees.leaf(2, order.nodes[0].rule)
+    for place, node in enumerate(order.nodes if len(order.nodes) > 1 else ()):
+        if node.feature == LEAF:
+            trees.leaf(place, node.rule)
+        else:
+            trees.query(place, node.feature, node.threshold, node.left, node.right)
+    trees.end()
+    walked = graph.trees(trees, f"walked_{index}")
+    name = f"rule_of_{index}"
+    if not order.scanned:
+        graph.add("Cast", [walked], name, to=7)  # int64
+        return
+    tree = graph.add("Cast", [walked], f"tree_{index}", to=7)
+    trees = _Trees()
+    for _, rule in order.scanned:
+        _chain(trees, rule)
+    applies = graph.trees(trees, f"applies_{index}")
+    # The first column with the largest number is the first rule that applies.
+    first = graph.add("ArgMax", [applies], f"first_{index}", axis=1, keepdims=1)
+    places = np.array([place for place, _ in order.scanned], dtype=np.int64)
+    scanned = graph.add("Gather", [graph.table(f"scanned_{index}", places), first], f"scan_{index}")
+    most = graph.add("ReduceMax", [applies], f"most_{index}", axes=[1], keepdims=1)
+    half = graph.table("half", np.array([0.5], dtype=np.float32))
+    some = graph.add("Greater", [most, half], f"some_{index}")
+    graph.add("Where", [some, scanned, tree], name)
+
+
+def _chain(trees: _Trees, rule: Rule) -> None:
+    """A tree that is 1 where a rule applies and 0 elsewhere."""
+    length = max(rule.length, 1)
+    if not rule.conditions:
+        trees.query(0, 0, 0.0, 1, length + 1)
+        trees.leaf(1, 1.0)
+        trees.leaf(length + 1, 1.0)
+    for depth, (feature, op, threshold) in enumerate(rule.conditions):
+        on, off = depth + 1, length + 1 + depth
+        below, above = (on, off) if op == "<=" else (off, on)
+        trees.query(depth, feature, threshold, below, above)
+        trees.leaf(off, 0.0)
+    if rule.conditions:
+        trees.leaf(length, 1.0)
+    trees.end()
+
+
+def _none_and_place(graph: _Graph) -> tuple[str, str]:
+    """Where no rule applies, and an index for the tables that is valid there too."""
+    zero = graph.table("zero", np.array([0], dtype=np.int64))
+    return (
+        graph.add("Less", ["rule", zero], "none"),
+        graph.add("Max", ["rule", zero], "place"),
+    )
+
+
+def _replace_discrete(graph: _Graph, program: Program) -> None:
+    values = np.array([int(outcome.low) for outcome in program.outcomes], dtype=np.int64)
+    none, place = _none_and_place(graph)
+    value = graph.add("Gather", [graph.table("values", values), place], "value")
+    _execute(graph, program, graph.add("Where", [none, "proposed", value], "decided"))
+
+
+def _replace_continuous(graph: _Graph, program: Program) -> None:
+    none, place = _none_and_place(graph)
+
+    def looked_up(name: str, kind: type[np.generic]) -> str:
+        values = [getattr(outcome, name) for outcome in program.outcomes]
+        table = graph.table(f"{name}_table", np.array(values, dtype=kind))
+        return graph.add("Gather", [table, place], name)
+
+    low, high = looked_up("low", np.float32), looked_up("high", np.float32)
+    open_low, open_high = looked_up("open_low", np.bool_), looked_up("open_high", np.bool_)
+    under = graph.add("Less", ["proposed", low], "under")
+    not_under = graph.add("Not", [under], "not_under")
+    not_over = graph.add("LessOrEqual", ["proposed", high], "not_over")
+    keeps_low = graph.add("Or", [open_low, not_under], "keeps_low")
+    keeps_high = graph.add("Or", [open_high, not_over], "keeps_high")
+    allowed = graph.add("And", [keeps_low, keeps_high], "allowed")
+    kept = graph.add("Or", [none, allowed], "kept")
+    if program.projection == "clip":
+        over_low = graph.add("Greater", ["proposed", low], "over_low")
+        raised = graph.add("Where", [over_low, "proposed", low], "raised")
+        under_high = graph.add("Less", [raised, high], "under_high")
+        value = graph.add("Where", [under_high, raised, high], "value")
+    else:
+        value = looked_up("value", np.float32)
+    _execute(graph, program, graph.add("Where", [kept, "proposed", value], "decided"))

@@ -1,0 +1,132 @@
+"""Recorded steps as files: CSV for a spreadsheet, Parquet with all that is known about them."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.formats.metadata import KEY
+from sarl_core.errors import InputError
+from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
+from sarl_core.files import whole_file
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rollouts.steps import StepTable
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMAT, VERSION = "sarl-steps", 1
+
+
+@dataclass(frozen=True, eq=False)
+class StepRecord:
+    """Recorded steps and what is known about them.
+
+    Attributes:
+        steps: T of them.
+        env_id: Environment.
+        agent: Who acted.
+        seeds: Of the episodes, in their order.
+        features: The d features.
+        rule_set: Whose rules were in force, or None.
+        chosen: What was left of how many steps, in words; "" for all.
+    """
+
+    steps: StepTable
+    env_id: str
+    agent: str
+    seeds: Sequence[int]
+    features: Sequence[Feature]
+    rule_set: RuleSet | None
+    chosen: str = ""
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a step.
+
+        Returns:
+            The columns of `StepTable.to_frame`, the episode's `seed` after its number, and after
+            each `rule` column the rule's id in a `rule_id` column, empty where none applies.
+        """
+        frame = self.steps.to_frame([feature.name for feature in self.features])
+        seeds = [int(seed) for seed in self.seeds]
+        frame.insert(1, "seed", [seeds[episode] for episode in self.steps.episode.tolist()])
+        if self.rule_set is None:
+            return frame
+        ids = [*(rule.id for rule in self.rule_set.rules), None]  # -1 is the last one
+        many = self.steps.rules.shape[1] > 1
+        for dimension, rules in enumerate(self.steps.rules.T.tolist()):
+            ending = f"_{dimension}" if many else ""
+            place = list(frame.columns).index(f"rule{ending}") + 1
+            frame.insert(place, f"rule_id{ending}", [ids[rule] for rule in rules])
+        return frame
+
+
+def steps_to_csv(record: StepRecord) -> bytes:
+    """Steps as CSV, every number in full.
+
+    Args:
+        record: The steps.
+
+    Returns:
+        The file's content; nothing in it is taken for a formula.
+    """
+    return str(safe_cells(record.to_frame()).to_csv(index=False)).encode()
+
+
+def steps_to_parquet(record: StepRecord) -> bytes:
+    """Steps as Parquet, with a description under the schema's key ``sarl`` (JSON).
+
+    Args:
+        record: The steps.
+
+    Returns:
+        The file's content.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rule_set = record.rule_set
+    described = {
+        "format": FORMAT,
+        "version": VERSION,
+        "env_id": record.env_id,
+        "agent": record.agent,
+        "seeds": [int(seed) for seed in record.seeds],
+        "features": [{"name": one.name, "unit": one.unit} for one in record.features],
+        "rules": None if rule_set is None else len(rule_set.rules),
+        "demonstrations": None if rule_set is None else rule_set.source.digest,
+        "chosen": record.chosen,
+    }
+    table = pa.Table.from_pandas(record.to_frame(), preserve_index=False)
+    out = io.BytesIO()
+    pq.write_table(
+        table.replace_schema_metadata({KEY: json.dumps(described, ensure_ascii=False)}),
+        out,
+        compression="zstd",
+    )
+    return out.getvalue()
+
+
+def save_steps(record: StepRecord, path: str | Path) -> None:
+    """Write steps as ``.csv`` or ``.parquet``, by the name's ending.
+
+    Args:
+        record: The steps.
+        path: The file; it appears whole or not at all.
+
+    Raises:
+        InputError: If the ending is another, or the folder does not exist.
+        WorkError: If it cannot be written.
+    """
+    target = Path(path)
+    writers = {".csv": steps_to_csv, ".parquet": steps_to_parquet}
+    write = writers.get(target.suffix.lower())
+    if write is None:
+        raise InputError(f"{target} is neither a .csv nor a .parquet; give it one of these endings")
+    with whole_file(target) as unfinished:
+        unfinished.write_bytes(write(record))

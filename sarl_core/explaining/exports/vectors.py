@@ -1,0 +1,265 @@
+"""Test vectors: states at every threshold, and what the shield decides there.
+
+Whoever carries rules into other code can see whether it decides as the original does, where that
+is hardest: at the thresholds and one float32 step either side.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.explaining.exports.program import Order, largest_float32, program_of
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_tree import RuleNode
+from sarl_core.mining.rules import Condition, RuleSet
+from sarl_core.mining.tree import LEAF
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import OnInvalid, Shield
+
+_INFINITY = np.float32(np.inf)
+_ODD = (np.nan, np.inf, -np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Vectors:
+    """States and actions, and what the shield makes of them.
+
+    Attributes:
+        states: Shape (B, d), float32.
+        proposed: Shape (B, m), int64 or float32.
+        rules: Index of the rule in force or -1, (B, m) int64.
+        executed: Shape (B, m), int64 or float32; where nothing is to be executed, as proposed.
+        invalid: Whether the state is no state, or the action none that there is, (B,).
+        on_invalid: What becomes of those; nothing is executed for ``raise``.
+    """
+
+    states: NDArray[np.float32]
+    proposed: NDArray[Any]
+    rules: NDArray[np.int64]
+    executed: NDArray[Any]
+    invalid: NDArray[np.bool_]
+    on_invalid: OnInvalid
+
+    def __len__(self) -> int:
+        """Number of vectors."""
+        return len(self.states)
+
+
+def make_vectors(
+    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+) -> Vectors:
+    """States at every threshold, one step above it and one below, and what is no state or action.
+
+    The other features of a state are such that it reaches the threshold on the way to the rule.
+    Behind them come states with a number that is none or infinite, and actions that are none.
+
+    Args:
+        rule_set: The rules.
+        projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
+
+    Returns:
+        With what `Shield` decides; the same every time.
+
+    Raises:
+        InputError: As `program_of`.
+    """
+    program = program_of(rule_set, projection, on_invalid)
+    rng = np.random.default_rng(0)
+    typical = _typical_values(rule_set)
+    rows = [typical]
+    for order in program.orders:
+        for path, feature, threshold in _queries(order):
+            rows += _at(path, feature, threshold, typical, rng)
+    for feature in range(len(typical)):
+        for value in _ODD:
+            odd = typical.copy()
+            odd[feature] = value
+            rows.append(odd)
+    none = _no_actions(rule_set, rng)
+    states = np.array(rows + [typical] * len(none), dtype=np.float32)
+    proposed = np.concatenate([proposed_actions(rule_set, len(rows), rng), none])
+    return decided(rule_set, projection, on_invalid, states, proposed)
+
+
+def decided(
+    rule_set: RuleSet,
+    projection: Projection,
+    on_invalid: OnInvalid,
+    states: NDArray[np.float32],
+    proposed: NDArray[Any],
+) -> Vectors:
+    """What the shield makes of states and actions.
+
+    Args:
+        rule_set: The rules.
+        projection: What a continuous action that breaks a rule becomes.
+        on_invalid: What becomes of a step whose state is no state, or whose action is none.
+        states: Shape (B, d).
+        proposed: Shape (B, m).
+
+    Returns:
+        All of it.
+    """
+    shield = Shield(rule_set, projection=projection, on_invalid="pass")
+    decision = shield.decide_batch(states, proposed)
+    invalid = np.array([why is not None for why in decision.invalid], dtype=np.bool_)
+    return Vectors(states, proposed, decision.rules, decision.executed, invalid, on_invalid)
+
+
+def proposed_actions(
+    rule_set: RuleSet, count: int, rng: np.random.Generator
+) -> NDArray[np.int64] | NDArray[np.float32]:
+    """Actions to check: every label in turn; continuous ones at the edges, beside and beyond.
+
+    Args:
+        rule_set: Knows the actions.
+        count: How many, B.
+        rng: Where chance comes from.
+
+    Returns:
+        Shape (B, m), int64 or float32.
+    """
+    columns = [_values(dimension) for dimension in rule_set.actions]
+    kind = np.float32 if rule_set.actions[0].is_interval else np.int64
+    return np.stack([rng.choice(values, count).astype(kind) for values in columns], axis=1)
+
+
+def _no_actions(rule_set: RuleSet, rng: np.random.Generator) -> NDArray[Any]:
+    """Actions one of whose values is none that there is: beyond all labels, or not finite."""
+    rows = []
+    for index, dimension in enumerate(rule_set.actions):
+        labels = (dimension.first - 1, dimension.first + dimension.n_labels)
+        for value in _ODD if dimension.is_interval else labels:
+            action = proposed_actions(rule_set, 1, rng)
+            action[0, index] = value
+            rows.append(action)
+    return np.concatenate(rows)
+
+
+def vectors_to_csv(vectors: Vectors) -> str:
+    """Test vectors as CSV.
+
+    Args:
+        vectors: B of them.
+
+    Returns:
+        A header (state_0..., proposed_0..., rule_0..., executed_0..., invalid) and one line a
+        vector; all numbers read back as the same ones. `invalid` is 1 where the state is no state
+        or the action none; where that is an error, nothing is said to be executed.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    blocks = {
+        "state": vectors.states,
+        "proposed": vectors.proposed,
+        "rule": vectors.rules,
+        "executed": vectors.executed,
+    }
+    names = [f"{name}_{i}" for name, block in blocks.items() for i in range(block.shape[1])]
+    writer.writerow([*names, "invalid"])
+    for invalid, *row in zip(vectors.invalid.tolist(), *blocks.values(), strict=True):
+        cells = [_cell(value) for part in row for value in part]
+        if invalid and vectors.on_invalid == "raise":
+            cells[-vectors.executed.shape[1] :] = [""] * vectors.executed.shape[1]
+        writer.writerow([*cells, int(invalid)])
+    return text.getvalue()
+
+
+def _cell(value: Any) -> str:
+    # The shortest float32 that reads back: "0.1", "nan", "-inf", "3".
+    return str(int(value)) if isinstance(value, np.int64) else str(value).removesuffix(".0")
+
+
+def _values(dimension: LabelledDimension) -> NDArray[Any]:
+    if not dimension.is_interval:
+        return np.arange(dimension.n_labels, dtype=np.int64) + dimension.first
+    edges = np.array(dimension.edges, dtype=np.float32)
+    width = edges[-1] - edges[0] or np.float32(1)
+    return np.concatenate(
+        [
+            edges,
+            np.nextafter(edges, _INFINITY),
+            np.nextafter(edges, -_INFINITY),
+            np.array([dimension.centre(label) for label in range(dimension.n_labels)]),
+            np.array([edges[0] - width, edges[-1] + width]),
+        ]
+    ).astype(np.float32)
+
+
+def _typical_values(rule_set: RuleSet) -> NDArray[np.float32]:
+    """A value amid the thresholds of each feature, 0 where nothing is asked."""
+    asked: dict[int, list[float]] = {}
+    for rule in rule_set.rules:
+        for feature, _, threshold in rule.conditions:
+            asked.setdefault(feature, []).append(threshold)
+    values = np.zeros(len(rule_set.source.features), dtype=np.float32)
+    for feature, thresholds in asked.items():
+        values[feature] = largest_float32(float(np.median(thresholds)))
+    return values
+
+
+def _queries(order: Order) -> Iterator[tuple[Sequence[Condition], int, float]]:
+    """Every query with the way to it: of the rules tried one by one, and of the tree."""
+    for _, rule in order.scanned:
+        for depth, condition in enumerate(rule.conditions):
+            yield rule.conditions[:depth], condition.feature, condition.threshold
+    waiting: list[tuple[RuleNode, tuple[Condition, ...]]] = [(order.nodes[0], ())]
+    while waiting:
+        node, path = waiting.pop()
+        if node.feature == LEAF:
+            continue
+        yield path, node.feature, node.threshold
+        for op, child in (("<=", node.left), (">", node.right)):
+            condition = Condition(node.feature, "<=" if op == "<=" else ">", node.threshold)
+            waiting.append((order.nodes[child], (*path, condition)))
+
+
+def _at(
+    path: Sequence[Condition],
+    feature: int,
+    threshold: float,
+    typical: NDArray[np.float32],
+    rng: np.random.Generator,
+) -> list[NDArray[np.float32]]:
+    """States that reach a query: at its threshold, a step below and a step above."""
+    low: dict[int, float] = {}
+    high: dict[int, float] = {}
+    for asked, op, value in path:
+        if op == "<=":
+            high[asked] = min(value, high.get(asked, np.inf))
+        else:
+            low[asked] = max(value, low.get(asked, -np.inf))
+    state = typical.copy()
+    for asked in low.keys() | high.keys():
+        state[asked] = _between(
+            low.get(asked, -np.inf), high.get(asked, np.inf), float(typical[asked]), rng
+        )
+    at = largest_float32(threshold)
+    found = []
+    with np.errstate(over="ignore"):  # above the largest number is infinity
+        numbers = (np.nextafter(at, -_INFINITY), at, np.nextafter(at, _INFINITY))
+    for number in numbers:
+        copy = state.copy()
+        copy[feature] = number
+        found.append(copy)
+    return found
+
+
+def _between(low: float, high: float, typical: float, rng: np.random.Generator) -> np.float32:
+    """A float32 number above `low` and at most `high`, if there is one."""
+    if low < typical <= high and rng.random() < 0.5:
+        return np.float32(typical)
+    width = high - low
+    if not np.isfinite(width):
+        width = max(1.0, abs(high if np.isfinite(high) else low))
+    share = float(rng.uniform(0.1, 0.9)) * width
+    value = largest_float32(high - share if np.isfinite(high) else low + share)
+    return value if low < float(value) <= high else largest_float32(high)

@@ -1,0 +1,393 @@
+"""Figures of an aggregation: what each round brought, and what a number of rules achieves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from sarl_core.errors import InputError
+from sarl_core.explaining.figures.colours import LABEL_COLOURS, MARKER_COLOUR, faded
+from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.improving.aggregation import Round
+from sarl_core.mining.language import share_text
+
+_BLUE, _GREEN = LABEL_COLOURS[0], LABEL_COLOURS[2]
+_PANELS = ("Return", "Coverage", "Expert would do otherwise", "Rules")
+_PANEL_HEIGHTS = (0.43, 0.19, 0.19, 0.19)
+_ROUNDS_HEIGHT, _BUDGET_HEIGHT = 560, 300
+
+
+@dataclass(frozen=True)
+class RoundPoint:
+    """What one round brought, whether it was run just now or stands in a card.
+
+    Attributes:
+        number: Counted from 1.
+        mean: Mean return of its episodes.
+        std: Their standard deviation.
+        coverage: Share of the met states in which some rule applied.
+        disagreement: Share of the covered decisions in which the expert would do otherwise.
+        rules: Number of rules.
+        pairs: State-action pairs that they were grown from.
+    """
+
+    number: int
+    mean: float
+    std: float
+    coverage: float
+    disagreement: float
+    rules: int
+    pairs: int
+
+
+@dataclass(frozen=True)
+class BudgetPoint:
+    """What the best rules of a number achieve.
+
+    Attributes:
+        rules: Most rules of an action dimension.
+        mean: Mean return.
+        iqm: Interquartile mean.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        episodes: How many it was measured on.
+    """
+
+    rules: int
+    mean: float
+    iqm: float
+    low: float
+    high: float
+    episodes: int
+
+
+def points_of(rounds: Sequence[Round]) -> tuple[RoundPoint, ...]:
+    """The rounds of an aggregation as points of the figure.
+
+    Args:
+        rounds: Those that are finished.
+
+    Returns:
+        One entry a round.
+    """
+    return tuple(
+        RoundPoint(
+            number=one.number,
+            mean=one.mean_return,
+            std=float(one.returns.std(ddof=1)) if len(one.returns) > 1 else 0.0,
+            coverage=one.coverage,
+            disagreement=one.disagreement,
+            rules=one.rules,
+            pairs=one.pairs,
+        )
+        for one in rounds
+    )
+
+
+def card_points(card: Mapping[str, Any]) -> tuple[RoundPoint, ...]:
+    """The rounds that a card tells of.
+
+    Args:
+        card: As `aggregation_card` gives it.
+
+    Returns:
+        One entry a round.
+
+    Raises:
+        InputError: If it is no such card.
+    """
+    try:
+        return tuple(
+            RoundPoint(
+                number=int(one["number"]),
+                mean=float(one["mean"]),
+                std=float(one["std"]),
+                coverage=float(one["coverage"]),
+                disagreement=float(one["disagreement"]),
+                rules=int(one["rules"]),
+                pairs=int(one["pairs"]),
+            )
+            for one in card["rounds"]
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the card does not tell of its rounds ({error!r}); make the rules again with aggregate"
+        ) from error
+
+
+def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint, ...]:
+    """What each number of rules achieves in an environment.
+
+    Args:
+        document: `environments` to lists of points.
+        env_id: Which one.
+
+    Returns:
+        By number of rules; () where the document does not have the environment.
+
+    Raises:
+        InputError: If the document is of another form.
+    """
+    try:
+        found = [
+            BudgetPoint(
+                rules=int(one["rules"]),
+                mean=float(one["mean"]),
+                iqm=float(one["iqm"]),
+                low=float(one["iqm_low"]),
+                high=float(one["iqm_high"]),
+                episodes=int(one["episodes"]),
+            )
+            for one in document["environments"].get(env_id, ())
+        ]
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the returns by number of rules are not of the expected form ({error!r}); write them "
+            "again"
+        ) from error
+    return tuple(sorted(found, key=lambda point: point.rules))
+
+
+def rounds_figure(
+    points: Sequence[RoundPoint],
+    *,
+    planned: int | None = None,
+    chosen: int | None = None,
+    reported: float | None = None,
+    height: int = _ROUNDS_HEIGHT,
+) -> go.Figure:
+    """Return, coverage, disagreement and number of rules over the rounds.
+
+    Args:
+        points: The finished rounds, at least one.
+        planned: Number of rounds there will be; those that are finished where not given.
+        chosen: Number of the round whose rules were taken.
+        reported: Mean return of these on fresh episodes.
+        height: In pixels.
+
+    Returns:
+        Four panels over each other, which share the axis of rounds; the return with one standard
+        deviation to either side.
+    """
+    numbers = [point.number for point in points]
+    means = np.array([point.mean for point in points])
+    spreads = np.array([point.std for point in points])
+    figure = make_subplots(
+        rows=len(_PANELS),
+        cols=1,
+        shared_xaxes=True,
+        row_heights=list(_PANEL_HEIGHTS),
+        vertical_spacing=0.075,
+    )
+    figure.add_scatter(
+        x=[*numbers, *reversed(numbers)],
+        y=np.round(np.concatenate([means + spreads, (means - spreads)[::-1]]), 3),
+        mode="lines",
+        line={"width": 0},
+        fill="toself",
+        fillcolor=faded(_BLUE, 0.16),
+        hoverinfo="skip",
+        row=1,
+        col=1,
+    )
+    shares = [[getattr(point, name) for point in points] for name in ("coverage", "disagreement")]
+    for row, (values, said) in enumerate(
+        (
+            (means, [f"{value:,.1f}" for value in means.tolist()]),
+            *((one, [share_text(share, decimals=1) for share in one]) for one in shares),
+            ([point.rules for point in points], [f"{point.rules:,}" for point in points]),
+        ),
+        start=1,
+    ):
+        extra = "<br>deviation %{customdata:,.1f}" if row == 1 else ""
+        figure.add_scatter(
+            x=numbers,
+            y=np.round(np.asarray(values, dtype=np.float64), 5),
+            mode="lines+markers",
+            name=_PANELS[row - 1],
+            customdata=np.round(spreads, 3) if row == 1 else None,
+            hovertext=said,
+            line={"color": _BLUE, "width": 2.2 if row == 1 else 1.6},
+            marker={"color": _BLUE, "size": 7 if row == 1 else 5},
+            hovertemplate=(
+                f"round %{{x}}, {_PANELS[row - 1].lower()}: <b>%{{hovertext}}</b>{extra}"
+                "<extra></extra>"
+            ),
+            row=row,
+            col=1,
+        )
+    last = max(planned or 0, *numbers)
+    _mark_chosen(figure, points, chosen, reported, last)
+    _finish_rounds(figure, points, last, height)
+    return figure
+
+
+def _mark_chosen(
+    figure: go.Figure,
+    points: Sequence[RoundPoint],
+    chosen: int | None,
+    reported: float | None,
+    last: int,
+) -> None:
+    """A stripe through all panels at the chosen round, and what it achieved afterwards."""
+    place = next((point for point in points if point.number == chosen), None)
+    if place is None:
+        return
+    wide = 0.006 * max(last, 4)
+    for row in range(1, len(_PANELS) + 1):
+        figure.add_vrect(
+            x0=place.number - wide,
+            x1=place.number + wide,
+            fillcolor=MARKER_COLOUR,
+            opacity=0.25,
+            line_width=0,
+            layer="below",
+            row=row,
+            col=1,
+        )
+    figure.add_scatter(
+        x=[place.number],
+        y=[round(place.mean, 3)],
+        mode="markers",
+        name="chosen",
+        marker={
+            "size": 15,
+            "symbol": "circle-open",
+            "color": MARKER_COLOUR,
+            "line": {"width": 2.5},
+        },
+        hoverinfo="skip",
+        row=1,
+        col=1,
+    )
+    if reported is not None:
+        figure.add_scatter(
+            x=[place.number],
+            y=[round(reported, 3)],
+            mode="markers",
+            name="fresh episodes",
+            marker={"size": 12, "symbol": "diamond", "color": _GREEN},
+            hovertemplate="on fresh episodes: <b>%{y:,.1f}</b><extra></extra>",
+            row=1,
+            col=1,
+        )
+
+
+def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int, height: int) -> None:
+    figure.update_layout(**_layout(height), showlegend=False)
+    figure.update_layout(margin={"l": 8, "r": 16, "t": 26, "b": 8})
+    figure.update_xaxes(
+        range=[0.5, max(last, 2) + 0.5],
+        tickformat="d",
+        # Whole rounds only: ticks between them would mean nothing.
+        dtick=max(1, -(-last // 12)),
+        tick0=1,
+        fixedrange=True,
+        zeroline=False,
+    )
+    figure.update_xaxes(title={"text": "round", "standoff": 2}, row=len(_PANELS), col=1)
+    figure.update_yaxes(fixedrange=True, zeroline=False, nticks=4)
+    figure.update_yaxes(nticks=6, row=1, col=1)
+    figure.update_yaxes(range=[0, 1.08], **share_ticks(0, 1, 3), row=2, col=1)
+    most = max(point.disagreement for point in points)
+    highest = max(1.15 * most, 0.05)
+    figure.update_yaxes(range=[0, highest], **share_ticks(0, highest, 3), row=3, col=1)
+    rules = max(point.rules for point in points)
+    figure.update_yaxes(range=[0, 1.2 * rules], tickformat=",d", row=4, col=1)
+    for row, title in enumerate(_PANELS, start=1):
+        figure.add_annotation(
+            text=f"<b>{title}</b>",
+            x=0,
+            y=1,
+            xref="x domain" if row == 1 else f"x{row} domain",
+            yref="y domain" if row == 1 else f"y{row} domain",
+            xanchor="left",
+            yanchor="bottom",
+            yshift=2,
+            showarrow=False,
+        )
+
+
+def budget_figure(
+    points: Sequence[BudgetPoint], *, goal: float | None = None, height: int = _BUDGET_HEIGHT
+) -> go.Figure:
+    """Return against the number of rules.
+
+    Args:
+        points: By number of rules, at least one.
+        goal: A return to mark, as the expert's.
+        height: In pixels.
+
+    Returns:
+        Rules to the right, by powers of two; the typical return with its 95 % interval, and the
+        mean as hollow points.
+    """
+    rules = [point.rules for point in points]
+    iqm = np.array([point.iqm for point in points])
+    figure = go.Figure()
+    figure.add_scatter(
+        x=rules,
+        y=iqm,
+        mode="lines+markers",
+        name="typical return (IQM, 95 % interval)",
+        line={"color": _BLUE, "width": 2.2},
+        marker={"color": _BLUE, "size": 8},
+        error_y={
+            "type": "data",
+            "symmetric": False,
+            "array": np.array([point.high for point in points]) - iqm,
+            "arrayminus": iqm - np.array([point.low for point in points]),
+            "thickness": 2,
+            "width": 4,
+        },
+        customdata=[[point.low, point.high, point.episodes] for point in points],
+        hovertemplate=(
+            "at most %{x} rules: <b>%{y:,.1f}</b><br>95 % interval %{customdata[0]:,.1f} to "
+            "%{customdata[1]:,.1f}<br>%{customdata[2]} episodes<extra></extra>"
+        ),
+    )
+    figure.add_scatter(
+        x=rules,
+        y=[point.mean for point in points],
+        mode="lines+markers",
+        name="mean return",
+        line={"color": _GREEN, "width": 1.6, "dash": "dot"},
+        marker={"color": _GREEN, "size": 8, "symbol": "circle-open", "line": {"width": 2}},
+        hovertemplate="at most %{x} rules: mean <b>%{y:,.1f}</b><extra></extra>",
+    )
+    if goal is not None:
+        figure.add_hline(y=goal, line={"color": MARKER_COLOUR, "width": 1, "dash": "dot"})
+    figure.update_layout(
+        **_layout(height),
+        showlegend=True,
+        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+    )
+    figure.update_xaxes(
+        title={"text": "most rules of an action", "standoff": 2},
+        type="log",
+        tickvals=rules,
+        ticktext=[f"{count:,}" for count in rules],
+        range=[float(np.log10(min(rules))) - 0.12, float(np.log10(max(rules))) + 0.12],
+        fixedrange=True,
+        zeroline=False,
+    )
+    figure.update_yaxes(
+        title={"text": "return", "standoff": 4}, fixedrange=True, nticks=6, zeroline=False
+    )
+    return figure
+
+
+def _layout(height: int) -> dict[str, Any]:
+    return {
+        "height": height,
+        "margin": {"l": 8, "r": 24, "t": 8, "b": 8},
+        "hovermode": "closest",
+        "dragmode": False,
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+    }

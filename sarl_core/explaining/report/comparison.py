@@ -1,0 +1,407 @@
+"""The part of a report that says what a shield was worth: a comparison, read from files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from sarl_core.documents import parse_json
+from sarl_core.environments.failures import cannot_fail
+from sarl_core.errors import InputError, quoted
+from sarl_core.explaining.report.svg import MUTED, NEUTRAL, Scale, dot_and_interval
+from sarl_core.explaining.words.comparison import POLICY_TEXT
+from sarl_core.limits import limited_bytes
+from sarl_core.mining.language import at_least_text, number_text, share_text
+from sarl_core.rollouts.episodes import cut_text
+from sarl_core.rollouts.statistics import MeanInterval
+from sarl_core.studies.comparison import Comparison, comparison_row
+from sarl_core.studies.shield_effect import Effect
+
+_MAX_BYTES = 16 * 2**20
+_MOST_ROWS = 200
+_HEADINGS = (
+    "Failures",
+    "Against no shield",
+    "Actions changed",
+    "Freedom left",
+    "Steps with a rule",
+    "Rules",
+    "Episodes",
+)
+_ALWAYS = ("Failures",)  # a typical return hides them
+_UNKNOWN, _NOT_KNOWN, _NONE = "–", "not known", "cannot fail"
+_NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
+_DIFFERENCE = ("return_difference", "difference_low", "difference_high")
+HARMS: Effect = "harms"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the episodes of one agent, with a shield or without, came to.
+
+    Attributes:
+        name: Of agent and shield.
+        env_id: Environment, "" where unknown.
+        seed: Of the first episode, None where unknown.
+        rules: Number of rules in force, None without a shield or where unknown.
+        episodes: How many.
+        mean: Of the returns.
+        std: Their standard deviation.
+        iqm: Mean of the middle half of the returns.
+        low: Lower end of its 95 % interval.
+        high: Upper end.
+        changed: Share of steps at which the shield changed the action, None without one.
+        covered: Share of steps at which a rule applied, None without a shield.
+        crashes: Share of episodes that ended in failure, None where unknown.
+        crash_ends: Its 95 % interval, None where unknown.
+        cut: Episodes that were cut off before their end; their failures are not among `crashes`.
+        freedom: What the rules left the agent to choose from, 0 to 1, None where unknown.
+        gained: Return with the shield less the return without it on the same seeds, mean and 95 %
+            interval; None where both were not run.
+        effect: What that and the failures mean: helps, harms, or no difference seen; "" where
+            unknown.
+    """
+
+    name: str
+    env_id: str
+    seed: int | None
+    rules: int | None
+    episodes: int
+    mean: float
+    std: float
+    iqm: float
+    low: float
+    high: float
+    changed: float | None
+    covered: float | None
+    crashes: float | None
+    crash_ends: tuple[float, float] | None = None
+    cut: int = 0
+    freedom: float | None = None
+    gained: MeanInterval | None = None
+    effect: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A result as it is shown.
+
+    Attributes:
+        name: Of agent and shield.
+        picture: SVG of the typical return and its interval.
+        typical: In numbers.
+        interval: Of the typical return.
+        mean: Mean return and standard deviation.
+        more: One text a heading of the comparison.
+    """
+
+    name: str
+    picture: str
+    typical: str
+    interval: str
+    mean: str
+    more: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A comparison.
+
+    Attributes:
+        sentences: In which environment, on which seeds.
+        headings: Of what else is known of at least one result.
+        rows: One a result.
+        ends: The numbers at the left and right end of the picture.
+    """
+
+    sentences: tuple[str, ...]
+    headings: tuple[str, ...]
+    rows: tuple[Row, ...]
+    ends: tuple[str, str]
+
+
+def results_of(comparison: Comparison) -> tuple[Result, ...]:
+    """A comparison as results.
+
+    Args:
+        comparison: A arms on the same seeds.
+
+    Returns:
+        A results.
+    """
+    return tuple(
+        _result(
+            comparison_row(arm, episodes, comparison.alone(place))
+            | {"environment": comparison.env_id},
+            "",
+            comparison.seed,
+        )
+        for place, (arm, episodes) in enumerate(
+            zip(comparison.arms, comparison.episodes, strict=True)
+        )
+    )
+
+
+def read_results(path: Path) -> tuple[Result, ...]:
+    """Read a comparison: the CSV of the page Shield, or what `evaluate --json` printed.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its results.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    try:
+        text = limited_bytes(path, _MAX_BYTES).decode("utf-8-sig")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise InputError(
+            f"the comparison {path} cannot be read ({reason}); give the CSV file of the page "
+            "Shield, or a JSON document of `evaluate --json`"
+        ) from error
+    return results_from_text(text, path.name)
+
+
+def results_from_text(text: str, name: str) -> tuple[Result, ...]:
+    """The same from a file's content.
+
+    Args:
+        text: Of the file.
+        name: Of the file; tells CSV from JSON, and names the result of a JSON document.
+
+    Returns:
+        Its results.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    rows = _json_row(text, name) if name.lower().endswith(".json") else _csv_rows(text, name)
+    if not 0 < len(rows) <= _MOST_ROWS:
+        raise InputError(
+            f"the comparison {name} has {len(rows)} rows; give one with 1 to {_MOST_ROWS}"
+        )
+    return tuple(_result(row, name) for row in rows)
+
+
+def compared(results: Sequence[Result]) -> Compared | None:
+    """What a comparison came to.
+
+    Args:
+        results: Any number.
+
+    Returns:
+        The part of the report; None without results.
+    """
+    if not results:
+        return None
+    scale = Scale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
+    more = [_more(one) for one in results]
+    known = [
+        place
+        for place, heading in enumerate(_HEADINGS)
+        if heading in _ALWAYS or any(texts[place] != _UNKNOWN for texts in more)
+    ]
+    environments = sorted({one.env_id for one in results if one.env_id})
+    where = f" in {' and '.join(environments)}" if environments else ""
+    seeds = {one.seed for one in results if one.seed is not None}
+    since = f", from seed {seeds.pop()} on" if len(seeds) == 1 else ""
+    return Compared(
+        sentences=(
+            f"Agents were run{where}{since}. The typical return is the mean of the middle half of "
+            "the episodes; the line through the dot shows where it probably lies (95 % interval). "
+            "It leaves out the worst quarter of the episodes, so it hides crashes: read the mean "
+            "and the failures beside it.",
+            *(
+                f"{one.name}: {cut_text(one.env_id, one.cut, one.episodes)}."
+                for one in results
+                if one.cut
+            ),
+            *(f"{one.name}: these rules harm the agent." for one in results if one.effect == HARMS),
+            *(f"{one.name}: {_policy(one)}" for one in results if one.freedom == 0.0),
+        ),
+        headings=tuple(_HEADINGS[place] for place in known),
+        rows=tuple(
+            _row(one, scale, tuple(texts[place] for place in known))
+            for one, texts in zip(results, more, strict=True)
+        ),
+        ends=(number_text(scale.low), number_text(scale.high)),
+    )
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
+    try:
+        reader = csv.DictReader(io.StringIO(text), strict=True)
+        rows = [dict(row) for row in reader]
+        there = reader.fieldnames or []
+    except csv.Error as error:
+        raise InputError(
+            f"the comparison {name} is no CSV ({error}); give the file that the page Shield "
+            "downloads"
+        ) from error
+    for column in ("arm", "episodes", *_NUMBERS):
+        if column not in there:
+            raise InputError(
+                f"the comparison {name} has no column {column!r}; give the CSV file that the page "
+                "Shield downloads, or a .json document of `evaluate --json`"
+            )
+    return [{key: value or None for key, value in row.items() if key} for row in rows]
+
+
+def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
+    try:
+        document = parse_json(text)
+    except InputError as error:
+        raise InputError(f"the comparison {name} is too large: {error}") from error
+    except ValueError as error:
+        raise InputError(
+            f"the comparison {name} is not JSON ({error}); give what `evaluate --json` printed"
+        ) from error
+    summary = document.get("summary") if isinstance(document, dict) else None
+    episodes = document.get("episodes") if isinstance(document, dict) else None
+    if not isinstance(summary, dict) or not isinstance(episodes, list) or not episodes:
+        raise InputError(
+            f"the comparison {name} has no episodes with a summary; give what `evaluate --json` "
+            "printed"
+        )
+    first = episodes[0].get("seed") if isinstance(episodes[0], dict) else None
+    # Without a shield no rule ever applies, which is what is shown of it.
+    alone = not summary.get("coverage")
+    row = {
+        "arm": name[: -len(".json")],
+        "environment": document.get("environment"),
+        "episodes": len(episodes),
+        "seed": first,
+        **summary,
+    }
+    return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
+
+
+def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Result:
+    def number(key: str) -> float:
+        value = row.get(key)
+        try:
+            if isinstance(value, bool):
+                raise TypeError
+            found = float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            found = math.nan
+        if not math.isfinite(found):
+            raise InputError(
+                f"{key!r} in the comparison {name} is {quoted(value)}, not a number; download it "
+                "again"
+            )
+        return found
+
+    def share(key: str) -> float | None:
+        return None if row.get(key) is None else min(max(number(key), 0.0), 1.0)
+
+    def whole(key: str) -> int | None:
+        return None if row.get(key) is None else int(number(key))
+
+    mean, std, iqm, low, high = map(number, _NUMBERS)
+    gained = None
+    if all(row.get(name) is not None for name in _DIFFERENCE):
+        gained = MeanInterval(*map(number, _DIFFERENCE))
+    effect = str(row.get("effect") or "")
+    if not low <= iqm <= high:
+        raise InputError(
+            f"the interval of {quoted(row['arm'])} in the comparison {name} does not hold its "
+            "value; download it again"
+        )
+    return Result(
+        name=str(row["arm"]),
+        env_id=str(row.get("environment") or ""),
+        seed=seed if seed is not None else whole("seed"),
+        rules=whole("rules"),
+        episodes=int(number("episodes")),
+        mean=mean,
+        std=std,
+        iqm=iqm,
+        low=low,
+        high=high,
+        changed=share("intervention_rate"),
+        covered=share("coverage"),
+        crashes=share("failure_rate") if row.get("crash_rate") is None else share("crash_rate"),
+        crash_ends=_both(share("failure_low"), share("failure_high")),
+        cut=whole("cut") or 0,
+        freedom=None if row.get("coverage") is None else share("freedom"),
+        gained=gained,
+        effect=effect if effect in get_args(Effect) else "",
+    )
+
+
+def _both(low: float | None, high: float | None) -> tuple[float, float] | None:
+    return None if low is None or high is None else (low, high)
+
+
+# --- showing -----------------------------------------------------------------------------------
+
+
+def _policy(one: Result) -> str:
+    changed = (
+        "" if one.changed is None else f" They changed {share_text(one.changed)} of the steps."
+    )
+    return f"{POLICY_TEXT[0].lower()}{POLICY_TEXT[1:]}.{changed}"
+
+
+def _crashes(one: Result) -> str:
+    """The share of failures with its interval."""
+    if cannot_fail(one.env_id):
+        return _NONE
+    if one.crashes is None or one.cut == one.episodes:
+        return _NOT_KNOWN
+    told = at_least_text(one.crashes, one.cut)
+    if one.crash_ends is None:
+        return told
+    low, high = map(share_text, one.crash_ends)
+    return f"{told} ({low} to {high})"
+
+
+def _gained(one: Result) -> str:
+    """The paired difference in return, and what it means."""
+    if one.gained is None:
+        return _UNKNOWN
+    low, mean, high = map(number_text, (one.gained.low, one.gained.mean, one.gained.high))
+    return f"{mean} ({low} to {high}){f': {one.effect}' if one.effect else ''}"
+
+
+def _more(one: Result) -> tuple[str, ...]:
+    """A text for each of `_HEADINGS`."""
+
+    def told(value: float | None) -> str:
+        return _UNKNOWN if value is None else share_text(value)
+
+    return (
+        _crashes(one),
+        _gained(one),
+        told(one.changed),
+        told(one.freedom),
+        told(one.covered),
+        _UNKNOWN if one.rules is None else f"{one.rules:,}",
+        f"{one.episodes:,}",
+    )
+
+
+def _row(one: Result, scale: Scale, more: tuple[str, ...]) -> Row:
+    colour = MUTED if one.changed is None else NEUTRAL
+    return Row(
+        name=one.name,
+        picture=dot_and_interval(scale, one.iqm, one.low, one.high, colour=colour, zero=True),
+        typical=number_text(one.iqm),
+        interval=f"{number_text(one.low)} to {number_text(one.high)}",
+        mean=f"{number_text(one.mean)} ± {number_text(one.std)}",
+        more=more,
+    )

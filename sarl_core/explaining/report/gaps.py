@@ -1,0 +1,244 @@
+"""The part of a report that says what the rules do not reach, and which of them are doubtful."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.report.demonstrations import ActionShares, action_shares
+from sarl_core.explaining.report.svg import NEUTRAL, share_bar
+from sarl_core.explaining.report.tally import Tally
+from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.validation.contradictions import NEAR, find_contradictions
+from sarl_core.mining.validation.evidence import FEWEST_EPISODES
+from sarl_core.mining.validation.holding_out import verdict
+from sarl_core.rendering.example_frames import Examples, Played
+
+FEW_STATES = 30
+_MOST_NAMED = 24
+_MOST_COMPARED = 50_000  # steps; to compare more states with each other takes minutes
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How far the rules of one action dimension reach.
+
+    Attributes:
+        name: Of the dimension; "" where there is only one.
+        text: As "14,012 of 15,000 demonstrated states (93 %)".
+        bar: SVG.
+        uncovered: What the expert did in the other states; None where there are none.
+    """
+
+    name: str
+    text: str
+    bar: str
+    uncovered: ActionShares | None
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Rules that deserve a second look, and why.
+
+    Attributes:
+        text: Why, and how many they are.
+        names: Of the rules, as far as they are named.
+        more: How many are not named.
+    """
+
+    text: str
+    names: tuple[str, ...]
+    more: int
+
+
+@dataclass(frozen=True)
+class Beyond:
+    """What was met when somebody played the episodes of the pictures.
+
+    Attributes:
+        player: Who.
+        steps: How many steps.
+        covered: Share at which some rule applied.
+        outside: Share at which some number lay beyond all demonstrated ones.
+        far: Share at which a rule applied beyond its own states; "" where that is not known.
+    """
+
+    player: str
+    steps: str
+    covered: str
+    outside: str
+    far: str
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What the rules do not reach.
+
+    Attributes:
+        coverage: One entry an action dimension.
+        contradictions: How often demonstrations disagree, in words; "" where that was not asked.
+        doubts: Rules that deserve a second look.
+        beyond: One entry a player; () without pictures.
+        with_boxes: Whether `Beyond.far` is known.
+    """
+
+    coverage: tuple[Coverage, ...]
+    contradictions: str
+    doubts: tuple[Doubt, ...]
+    beyond: tuple[Beyond, ...]
+    with_boxes: bool
+
+
+def gaps(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    examples: Examples | None,
+) -> Gaps:
+    """What the rules do not reach, and which of them are doubtful.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        examples: With the episodes that were played; None without pictures.
+
+    Returns:
+        The part of the report.
+    """
+    boxed = any(rule.box is not None for rule in rule_set.rules)
+    return Gaps(
+        coverage=tuple(
+            _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
+        ),
+        contradictions=_contradictions(demonstrations, rule_set.divider),
+        doubts=_doubts(rule_set, demonstrations, tally),
+        beyond=tuple(
+            _beyond(one, rule_set, demonstrations, boxed=boxed)
+            for one in (examples.played if examples is not None else ())
+        ),
+        with_boxes=boxed,
+    )
+
+
+def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
+    share = tally.covered(dimension)
+    action = rule_set.actions[dimension]
+    left = tally.labels[tally.rules[:, dimension] < 0, dimension]
+    return Coverage(
+        name=action.name if len(rule_set.actions) > 1 else "",
+        text=f"{share.part:,} of {counted(share.whole, 'demonstrated state')} "
+        f"({share_text(share.value)})",
+        bar=share_bar(share.value, NEUTRAL),
+        uncovered=action_shares(np.bincount(left, minlength=action.n_labels), action)
+        if len(left)
+        else None,
+    )
+
+
+def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
+    if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
+        return ""
+    found = find_contradictions(demonstrations, divider=divider)
+    count = int(found.found().sum())
+    if not count:
+        return (
+            "None was found: wherever it came to the same state again, or nearly the same in "
+            "another episode, it did the same."
+        )
+    share = share_text(count / len(demonstrations))
+    return (
+        f"In {count:,} of {counted(len(demonstrations), 'state')} ({share}) it did something else "
+        "in the same state, or in the nearest one of another episode, no feature of which differs "
+        f"by more than {NEAR:g} of its standard deviation. A rule can be right in only one of "
+        "them. Where the expert changes its mind within a short way, this need be no mistake."
+    )
+
+
+def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> tuple[Doubt, ...]:
+    rules = [
+        (index, rule) for index, rule in enumerate(rule_set.rules) if rule.enabled and rule.samples
+    ]
+    found = []
+
+    def doubt(chosen: Sequence[int], one: str, many: str) -> None:
+        if chosen:
+            named = [rule_set.name_of(rule_set.rules[index]) for index in sorted(chosen)]
+            text = f"1 rule {one}" if len(chosen) == 1 else f"{len(chosen):,} rules {many}"
+            found.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
+
+    few = [index for index, rule in rules if rule.origin == "mined" and rule.samples < FEW_STATES]
+    doubt(
+        few,
+        f"rests on fewer than {FEW_STATES} states: it may be chance.",
+        f"rest on fewer than {FEW_STATES} states each: they may be chance.",
+    )
+    if tally.same:
+        apart = [
+            index
+            for index, rule in rules
+            if rule.origin == "mined"
+            and 0 < tally.by_episode[index].episodes < FEWEST_EPISODES <= demonstrations.n_episodes
+        ]
+        lie = f"fewer than {FEWEST_EPISODES} of the {demonstrations.n_episodes:,} episodes"
+        doubt(
+            apart,
+            f"has its states in {lie}: it may know those and no other.",
+            f"have their states in {lie}: they may know those and no others.",
+        )
+    if rule_set.cut == "thresholds":
+        needed = rule_set.thresholds.confidence
+        wanted = share_text(needed)
+        failed = [index for index, rule in rules if verdict(rule, needed) == "below"]
+        doubt(
+            failed,
+            f"does not reach {wanted} in the episodes kept aside.",
+            f"do not reach {wanted} in the episodes kept aside.",
+        )
+    else:
+        minority = [index for index, rule in rules if 2 * rule.correct < rule.samples]
+        doubt(
+            minority,
+            "says what the expert did in less than half of its states.",
+            "say what the expert did in less than half of their states.",
+        )
+    off = [index for index, rule in enumerate(rule_set.rules) if not rule.enabled]
+    doubt(off, "is switched off and does nothing.", "are switched off and do nothing.")
+    return tuple(found)
+
+
+def _beyond(
+    played: Played, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
+) -> Beyond:
+    seen, rules = played.steps.observation, played.steps.rules
+    low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
+    outside = ((seen < low) | (seen > high)).any(axis=1)
+    covered = (rules >= 0).any(axis=1)
+    return Beyond(
+        player=played.player.name,
+        steps=f"{len(seen):,}",
+        covered=share_text(float(covered.mean())),
+        outside=share_text(float(outside.mean())),
+        far=share_text(float(_far(seen, rules, rule_set).mean())) if boxed else "",
+    )
+
+
+def _far(
+    seen: NDArray[np.float32], rules: NDArray[np.int64], rule_set: RuleSet
+) -> NDArray[np.bool_]:
+    """Whether a rule in force lies beyond the states it was made from, (T,)."""
+    found = np.zeros(len(seen), dtype=np.bool_)
+    for index in np.unique(rules[rules >= 0]).tolist():
+        rule = rule_set.rules[index]
+        if rule.box is not None:
+            rows = np.flatnonzero(rules[:, rule.dimension] == index)
+            inside = (seen[rows] >= np.float32(rule.box.least)) & (
+                seen[rows] <= np.float32(rule.box.most)
+            )
+            found[rows] |= ~inside.all(axis=1)
+    return found

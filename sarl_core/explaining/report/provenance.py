@@ -1,0 +1,205 @@
+"""The part of a report that lets others make it again: fingerprints, versions, seeds, commands."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.report.tally import Tally
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.language import counted, threshold_text
+from sarl_core.mining.rule_files import rules_digest
+from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
+from sarl_core.mining.tree import PolicyTree
+
+_PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")
+_PROGRAM = "python -m sarl_core"
+
+
+def digest_of(rule_set: RuleSet) -> str:
+    """Fingerprint of rules (blake2b, 32 hex digits), whatever file they came in.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        As `rules_digest`.
+    """
+    return rules_digest(rule_set)
+
+
+def facts(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    *,
+    rules_name: str,
+    demonstrations_name: str,
+    seeds: tuple[int, int] | None,
+    notes: Sequence[str] = (),
+) -> tuple[tuple[str, str], ...]:
+    """What tells a report from any other.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        rules_name: Of the rule file, "" where there is none.
+        demonstrations_name: Of their file, likewise.
+        seeds: First and last of the episodes that were played; None where none were.
+        notes: What is to be said of how rules and demonstrations were matched.
+
+    Returns:
+        Names and values.
+    """
+    source = rule_set.source
+    found = [
+        ("Demonstrations", _named(demonstrations.digest, demonstrations_name)),
+        ("Rules", _named(digest_of(rule_set), rules_name)),
+    ]
+    if not tally.same:
+        size = f"{source.steps:,} steps in {counted(source.episodes, 'episode')}"
+        found.append(("Rules were made from", _named(source.digest, size)))
+    if demonstrations.seed is not None:
+        found.append(("Seed of the demonstrations", str(demonstrations.seed)))
+    if seeds is not None:
+        found.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
+    found += [("Which feature is which", note) for note in notes]
+    versions = [f"Python {platform.python_version()}"]
+    versions += [f"{package} {_version(package)}" for package in _PACKAGES]
+    return (*found, ("Versions", ", ".join(versions)))
+
+
+def _named(digest: str, name: str) -> str:
+    return f"{digest} ({name})" if name else digest
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def command_line(
+    command: str, argument: str | Path, options: Mapping[str, object | Sequence[object] | None]
+) -> str:
+    """A command as one types it.
+
+    Args:
+        command: As "report".
+        argument: Its file.
+        options: Name to value; several in a list or tuple, None for none.
+
+    Returns:
+        One line, with whatever a shell would take for more than a name in quotes.
+    """
+    words = [command, str(argument)]
+    for name, value in options.items():
+        values = value if isinstance(value, (list, tuple)) else [value]
+        for one in values:
+            if one is not None:
+                words += [name, str(one)]
+    return f"{_PROGRAM} {shlex.join(words)}"
+
+
+def mining_command(
+    rule_set: RuleSet,
+    rules: str | Path,
+    demonstrations: str | Path,
+    given: Demonstrations,
+    *,
+    env: str | None = None,
+) -> str | None:
+    """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
+
+    Args:
+        rule_set: The rules.
+        rules: Their file.
+        demonstrations: The file of the demonstrations.
+        given: The demonstrations.
+        env: That was named when they were read, which gives names and bounds; None for none.
+
+    Returns:
+        One line; None for rules from other data, of a budget, tried on episodes kept aside, or
+        edited by hand.
+    """
+    plain = all(
+        rule.origin == "mined" and rule.enabled and not rule.pinned and rule.held_out is None
+        for rule in rule_set.rules
+    )
+    if rule_set.cut != "thresholds" or rule_set.source.digest != given.digest or not plain:
+        return None
+    limits = rule_set.thresholds
+    named = next((name for name, pair in NAMED_SETTINGS.items() if pair == limits), None)
+    continuous = any(action.is_interval for action in rule_set.actions)
+    return command_line(
+        "mine",
+        demonstrations,
+        {
+            "--setting": named,
+            "--support": None if named else threshold_text(limits.support),
+            "--confidence": None if named else threshold_text(limits.confidence),
+            "--lift": threshold_text(limits.lift) if limits.lift else None,
+            "--max-depth": limits.max_depth,
+            "--divider": rule_set.divider if continuous else None,
+            "--env": env,
+            "--out": rules,
+        },
+    )
+
+
+def commands_that_hold(
+    commands: Sequence[str], rule_set: RuleSet, trees: Sequence[PolicyTree] | None
+) -> tuple[str, ...]:
+    """Commands without a mining command that would make other rules than these.
+
+    Rounding, merging, leaving rules out: what was done to rules after mining need not show. So
+    they are mined again.
+
+    Args:
+        commands: One line each.
+        rule_set: The rules, under the names they came with.
+        trees: Grown from the demonstrations; None for rules that no thresholds cut.
+
+    Returns:
+        Those that make what they say.
+    """
+    mining = f"{_PROGRAM} mine "
+    if not any(line.startswith(mining) for line in commands) or mined_again(rule_set, trees):
+        return tuple(commands)
+    return tuple(line for line in commands if not line.startswith(mining))
+
+
+def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
+    """Whether trees give the same rules, under the same names.
+
+    Args:
+        rule_set: The rules.
+        trees: Grown from demonstrations; None for rules that no thresholds cut.
+
+    Returns:
+        False without trees.
+    """
+    if not trees:
+        return False
+    limits = rule_set.thresholds
+    again = mine_rules(
+        trees,
+        supp_min=limits.support,
+        conf_min=limits.confidence,
+        lift_min=limits.lift,
+        max_depth=limits.max_depth,
+    )
+    one, other = (
+        [(rule.id, rule.dimension, rule.conditions, rule.action) for rule in rules.rules]
+        for rules in (again, rule_set)
+    )
+    return one == other and (again.actions, again.source.features) == (
+        rule_set.actions,
+        rule_set.source.features,
+    )

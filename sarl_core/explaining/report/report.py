@@ -1,0 +1,321 @@
+"""A report: one HTML file that opens without a network, for people who know only the domain.
+
+The parts are worked out first, each by a module of its own; the template only puts them in place,
+and escapes every text. What is drawn comes as SVG from `report_svg`, without script.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from sarl_core.agents.agent import Agent, shipped_experts
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import names_of
+from sarl_core.errors import InputError, SarlError
+from sarl_core.explaining.report.comparison import Result, compared
+from sarl_core.explaining.report.demonstrations import shown
+from sarl_core.explaining.report.gaps import gaps
+from sarl_core.explaining.report.provenance import commands_that_hold, facts, mined_again
+from sarl_core.explaining.report.rules import in_order, rules_part
+from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
+from sarl_core.explaining.report.thresholds import kept
+from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
+from sarl_core.mining.editing.renaming import renamed_rules
+from sarl_core.mining.envelope import with_splits
+from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.validation.cross_fitting import cross_fit
+from sarl_core.progress import Progress
+from sarl_core.rendering.example_frames import (
+    EPISODES,
+    FIRST_SEED,
+    Examples,
+    Player,
+    try_example_frames,
+)
+
+TEMPLATES = Path(__file__).parent / "templates"
+MOST_IN_FULL = 60
+MOST_FRAMES = 12
+_MOST_FITTED = 50_000  # steps; to grow ten trees of more takes minutes
+
+
+@dataclass(frozen=True, eq=False)
+class Wishes:
+    """What a report is to hold.
+
+    Attributes:
+        in_full: So many rules in full, with pictures; the others stand in a table.
+        frames: Pictures a rule; 0 for none.
+        env_id: Where they are played; "" for the environment of the demonstrations.
+        agent: Who plays; None for the shipped expert and, where it does not come by or there is
+            none, a novice that the rules shield.
+        seed: Of the first episode that is played.
+        episodes: How many each player plays.
+        max_steps: After which one is cut off; `episodes.MAX_STEPS` where None.
+        commands: How the rules and the report are made again, one line each.
+        rules_name: Of the rule file, "" where there is none.
+        demonstrations_name: Of their file, likewise.
+    """
+
+    in_full: int = MOST_IN_FULL
+    frames: int = 3
+    env_id: str = ""
+    agent: str | Path | Agent | None = None
+    seed: int = FIRST_SEED
+    episodes: int = EPISODES
+    max_steps: int | None = None
+    commands: tuple[str, ...] = ()
+    rules_name: str = ""
+    demonstrations_name: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what no report can hold.
+
+        Raises:
+            InputError: If a number is out of range.
+        """
+        for name, value, least, most in (
+            ("the number of rules in full", self.in_full, 0, 1_000),
+            ("the number of pictures a rule", self.frames, 0, MOST_FRAMES),
+            ("the number of episodes", self.episodes, 1, 1_000),
+            ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, 2**31 - 1),
+            ("the seed", self.seed, 0, 2**31 - 1 - self.episodes),
+        ):
+            if not least <= value <= most:
+                raise InputError(f"{name} is {value}; give one from {least} to {most:,}")
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A finished report.
+
+    Attributes:
+        html: The file's content.
+        rules: Number of rules.
+        in_full: How many of them are shown in full.
+        pictures: Number of example frames.
+        without: Why there are none; "" where there are some, or none were wished for.
+        notes: How demonstrations, rules and environment were read and matched, as clauses.
+    """
+
+    html: str
+    rules: int
+    in_full: int
+    pictures: int
+    without: str
+    notes: tuple[str, ...] = ()
+
+
+def make_report(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    wishes: Wishes | None = None,
+    *,
+    card: Mapping[str, Any] | None = None,
+    comparison: Sequence[Result] = (),
+    trees: Sequence[PolicyTree] | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Make a report of rules and the demonstrations they are about.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: N pairs of the same features and actions.
+        wishes: What it is to hold.
+        card: Of the rule file, as `read_card` gives it.
+        comparison: Results to show.
+        trees: Grown from the demonstrations with the rules' divider; grown here where not given
+            and needed.
+        progress: Called with (units done, in all) while pictures are made; returning False stops.
+
+    Returns:
+        The report; the same arguments give the same one, byte for byte.
+
+    Raises:
+        InputError: If the demonstrations have other features or actions than the rules, or an
+            agent that was named cannot play.
+        CancelledError: If `progress` returned False.
+    """
+    wishes = wishes or Wishes()
+    as_given = rule_set
+    rule_set, notes = report_rules(rule_set, demonstrations)
+    if same_environment(rule_set, demonstrations):
+        # A rule file keeps the names of its day; a report speaks as the demonstrations do.
+        rule_set = renamed_rules(rule_set, names_of(demonstrations))
+    rule_set = with_splits(rule_set, demonstrations)
+    counts = tally(rule_set, demonstrations)
+    if trees is None and rule_set.cut == "thresholds":
+        trees = grow_policy_trees(demonstrations, divider=rule_set.divider)
+    order = in_order(rule_set, wishes.in_full)
+    examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
+    env_id = demonstrations.env_id or rule_set.source.env_id
+    html = _template().render(
+        title=f"Rules for {task_name(env_id)}" if env_id else "Rules from demonstrations",
+        key_numbers=_key_numbers(rule_set, counts),
+        elsewhere=_elsewhere(as_given, demonstrations, trees),
+        shown=shown(rule_set, demonstrations, counts),
+        kept=kept(rule_set, counts, trees, card),
+        rules=rules_part(rule_set, demonstrations, counts, order, examples),
+        pictures=_about_pictures(examples, without, wishes, demonstrations),
+        frame_size=examples.size if examples is not None else (0, 0),
+        gaps=gaps(rule_set, demonstrations, counts, examples),
+        compared=compared(comparison),
+        again=facts(
+            as_given,
+            demonstrations,
+            counts,
+            rules_name=wishes.rules_name,
+            demonstrations_name=wishes.demonstrations_name,
+            seeds=(wishes.seed, wishes.seed + wishes.episodes - 1) if examples else None,
+            notes=() if same_environment(rule_set, demonstrations) else notes,
+        ),
+        commands=commands_that_hold(wishes.commands, as_given, trees),
+    )
+    return Report(
+        html=html,
+        rules=len(rule_set),
+        in_full=len(order[0]),
+        pictures=sum(len(found) for found in examples.frames.values()) if examples else 0,
+        without=without,
+        notes=tuple(
+            dict.fromkeys((*demonstrations.notes, *notes, *(examples.remarks if examples else ())))
+        ),
+    )
+
+
+def task_name(env_id: str) -> str:
+    """A task's name for people.
+
+    Args:
+        env_id: As "LunarLander-v3".
+
+    Returns:
+        As "Lunar Lander".
+    """
+    family = re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1].rsplit("/", 1)[-1])
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", family)
+
+
+# --- pictures ----------------------------------------------------------------------------------
+
+
+def _examples(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    rules: Sequence[int],
+    wishes: Wishes,
+    progress: Progress | None,
+) -> tuple[Examples | None, str]:
+    """The frames, or why there are none."""
+    usable = [index for index in rules if rule_set.rules[index].enabled]
+    if not wishes.frames or not usable:
+        return None, ""
+    env_id = wishes.env_id or demonstrations.env_id or rule_set.source.env_id
+    if not env_id:
+        return None, "the demonstrations do not say which environment they are from"
+    if ":" in env_id and not wishes.env_id:
+        # Gymnasium imports the module of "module:Id", and this id is a stranger's.
+        return None, f"the environment {env_id!r} names a module to import, which a file may not do"
+    players = _players(env_id, wishes)
+    found = try_example_frames(
+        env_id,
+        rule_set,
+        usable,
+        players,
+        each=wishes.frames,
+        episodes=wishes.episodes,
+        seed=wishes.seed,
+        max_steps=wishes.max_steps,
+        progress=progress,
+    )
+    if not isinstance(found, SarlError):
+        return found, ""
+    if wishes.agent is not None or wishes.env_id:
+        raise found  # who asked for it by name is to know
+    return None, str(found).split(";")[0]
+
+
+def _players(env_id: str, wishes: Wishes) -> tuple[Player, ...]:
+    # Sampled, as the shipped demonstrations were: so an agent comes by more states.
+    novice = Player("a novice held to the rules", "novice", shielded=True)
+    agent = wishes.agent
+    if agent is None:
+        if env_id.rsplit(":", 1)[-1] not in shipped_experts():
+            return (novice,)
+        agent = "expert"
+    name = agent.name if isinstance(agent, Agent) else Path(agent).stem
+    called = f"the {name}" if name in ("novice", "expert") else f"the agent {name}"
+    return Player(called, agent, shielded=False, stochastic=True), novice
+
+
+def _about_pictures(
+    examples: Examples | None, without: str, wishes: Wishes, demonstrations: Demonstrations
+) -> tuple[str, ...]:
+    if examples is None:
+        return (f"There are no pictures of states: {without}.",) if without else ()
+    names = [played.player.name for played in examples.played]
+    first, last = wishes.seed, wishes.seed + wishes.episodes - 1
+    recorded = demonstrations.seed
+    elsewhere = (
+        ", none of which was demonstrated"
+        if recorded is not None
+        and (last < recorded or first >= recorded + demonstrations.n_episodes)
+        else ""
+    )
+    return (
+        f"The pictures show states in which the rule applies, from {examples.env_id}. "
+        f"{_capital(' and '.join(names))} played {counted(wishes.episodes, 'episode')}"
+        f"{' each' if len(names) > 1 else ''} for them (seeds {first} to {last}{elsewhere}). A "
+        "rule without pictures came up in none of these episodes.",
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+# --- numbers -----------------------------------------------------------------------------------
+
+
+def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...]:
+    followed = counts.followed
+    rules = [rule for rule in rule_set.rules if rule.enabled]
+    merged = sum(rule.merged_length for rule in rules) / max(len(rules), 1)
+    return (
+        (f"{len(rules):,}", "rule" if len(rules) == 1 else "rules"),
+        (f"{merged:.1f}", "conditions a rule, on average"),
+        (share_text(counts.coverage), "of the demonstrated states have a rule"),
+        (share_text(followed.value), "of these show what the rule says"),
+    )
+
+
+def _elsewhere(
+    rule_set: RuleSet, demonstrations: Demonstrations, trees: Sequence[PolicyTree] | None
+) -> tuple[str, str]:
+    """What the rules are worth where they were not mined, and a warning; "" where not known."""
+    if len(demonstrations) > _MOST_FITTED or not mined_again(rule_set, trees):
+        return "", ""
+    fit = cross_fit(demonstrations, divider=rule_set.divider)
+    judged = fit.at(rule_set.thresholds)
+    return judged_sentence(judged), parting_text(rule_set.fidelity, judged)
+
+
+@lru_cache(maxsize=1)
+def _template() -> Any:
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html")

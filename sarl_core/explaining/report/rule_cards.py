@@ -1,0 +1,311 @@
+"""One rule of a report in full: its sentence, its evidence, its conditions and its pictures."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.figures.distributions import FeatureRow
+from sarl_core.explaining.report.svg import Scale, evidence_bar, interval_bar
+from sarl_core.explaining.report.tally import Share, Tally
+from sarl_core.explaining.words.evidence import what_tells
+from sarl_core.mining.language import (
+    action_text,
+    counted,
+    done_text,
+    is_flag,
+    number_text,
+    sentence,
+    share_text,
+    short_condition,
+)
+from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.mining.written import value_text
+from sarl_core.rendering.example_frames import ExampleFrame, Examples
+
+_MOST_VALUES = 3  # under a picture
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How often the expert did what a rule says.
+
+    Attributes:
+        source: Of which states, as "that the rule was made from".
+        text: As "412 of 425 states (97 %)".
+        interval: What other episodes can tell, in words; "" of those that the rule was made from.
+        bar: SVG.
+        below: Whether the interval lies below the threshold.
+    """
+
+    source: str
+    text: str
+    interval: str
+    bar: str
+    below: bool
+
+
+@dataclass(frozen=True)
+class ConditionRow:
+    """What a rule asks of one feature.
+
+    Attributes:
+        text: As "pole angle > 0.02 rad".
+        data: The demonstrated range, as "-0.2 to 0.2".
+        bar: SVG; "" where it is yes or no.
+    """
+
+    text: str
+    data: str
+    bar: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An example frame.
+
+    Attributes:
+        source: A data address.
+        alt: What it is, in words.
+        caption: What was done.
+        values: Of features that the rule asks about.
+        place: Where to find it again.
+    """
+
+    source: str
+    alt: str
+    caption: str
+    values: str
+    place: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """A rule in full.
+
+    Attributes:
+        name: As "R12", by its place in the rule file.
+        title: The rule as a sentence.
+        colour: Of its action.
+        action: Its name.
+        tags: As "switched off".
+        support: How often it applies, in words.
+        evidence: One entry a source.
+        conditions: One a feature.
+        pictures: Frames at which it applied.
+    """
+
+    name: str
+    title: str
+    colour: str
+    action: str
+    tags: tuple[str, ...]
+    support: str
+    evidence: tuple[Evidence, ...]
+    conditions: tuple[ConditionRow, ...]
+    pictures: tuple[Picture, ...]
+
+
+def rule_card(
+    rule_set: RuleSet,
+    index: int,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    ranges: Sequence[FeatureRow],
+    examples: Examples | None,
+) -> Card:
+    """A rule in full.
+
+    Args:
+        rule_set: The rules.
+        index: Of the rule.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        ranges: Every feature of them in numbers.
+        examples: Frames at which rules applied, None without pictures.
+
+    Returns:
+        What is shown of it.
+    """
+    rule = rule_set.rules[index]
+    dimension = rule_set.actions[rule.dimension]
+    frames = examples.frames.get(index, ()) if examples is not None else ()
+    # Where several rules apply, or this one is off, it applies to more states than it decides.
+    rows = np.flatnonzero(rule.applies(demonstrations.observations))
+    applying, decided = len(rows), len(tally.rows(index, rule.dimension))
+    return Card(
+        name=rule_set.name_of(rule),
+        title=sentence(rule, rule_set, evidence=False),
+        colour=label_colour(rule.action),
+        action=action_text(rule.action, dimension),
+        tags=tags(rule),
+        support=_support(rule, applying, decided, tally),
+        evidence=_evidence(rule, rule_set, index, tally, applying),
+        conditions=tuple(
+            _condition(
+                bounds,
+                rule_set.source.features[bounds.feature],
+                ranges[bounds.feature],
+                (
+                    demonstrations.observations[rows, bounds.feature].min().item(),
+                    demonstrations.observations[rows, bounds.feature].max().item(),
+                )
+                if len(rows)
+                else (),
+            )
+            for bounds in rule.bounds
+        ),
+        pictures=tuple(_picture(frame, rule, rule_set, ranges) for frame in frames),
+    )
+
+
+def tags(rule: Rule) -> tuple[str, ...]:
+    """What is special about a rule.
+
+    Args:
+        rule: Any.
+
+    Returns:
+        As ("switched off", "written by hand").
+    """
+    found = []
+    if not rule.enabled:
+        found.append("switched off")
+    if rule.origin == "manual":
+        found.append("written by hand")
+    if rule.pinned:
+        found.append("put in its place by hand")
+    return tuple(found)
+
+
+def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
+    told = f"{decided:,}" if decided else "none"
+    if tally.same and rule.origin == "mined" and rule.samples == applying:
+        return (
+            f"Applies in {share_text(rule.support)} of the demonstrated states "
+            f"({counted(rule.samples, 'state')})"
+            + (f"; it decides {told} of them." if decided != applying else ".")
+        )
+    text = f"Applies in {share_text(applying / len(tally.rules))} of this report's states "
+    text += f"({applying:,})"
+    if rule.origin == "mined" and rule.samples:
+        text += f", and in {share_text(rule.support)} of those it was made from"
+    if decided != applying:
+        text += f"; it decides {told} of this report's"
+    return f"{text}."
+
+
+def _evidence(
+    rule: Rule, rule_set: RuleSet, index: int, tally: Tally, applying: int
+) -> tuple[Evidence, ...]:
+    threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
+    found = []
+    if rule.origin == "mined":
+        found.append(_mined(Share(rule.correct, rule.samples), threshold))
+    if rule.held_out is not None:
+        source = "of episodes kept aside, which it was not made from"
+        found.append(_tried(source, rule.held_out, threshold))
+    if not (tally.same or tally.split) or rule.origin != "mined":
+        here = tally.by_episode[index]
+        decided = "that it decides " if here.samples != applying else ""
+        found.append(_tried(f"{decided}of this report's demonstrations", here, threshold))
+    return tuple(found)
+
+
+def _states(share: Share) -> str:
+    states = "1 state" if share.whole == 1 else f"{share.whole:,} states"
+    return f"{share.part:,} of {states} ({share_text(share.value)})"
+
+
+def _nothing(source: str) -> Evidence:
+    return Evidence(source, "0 of 0 states", "nothing is known there", "", below=False)
+
+
+def _mined(share: Share, threshold: float | None) -> Evidence:
+    """No interval: a rule was chosen for being right there."""
+    source = "that the rule was made from"
+    if not share.whole:
+        return _nothing(source)
+    bar = evidence_bar(share.value, None, below=False, threshold=threshold)
+    return Evidence(source, _states(share), "", bar, below=False)
+
+
+def _tried(source: str, found: HeldOut, threshold: float | None) -> Evidence:
+    if not found.samples:
+        return _nothing(source)
+    interval = found.interval
+    below = threshold is not None and interval is not None and interval.high < threshold
+    if found.share is None:  # an older file counted states alone
+        told, share = (
+            "the file does not say in how many episodes they lie",
+            found.correct / found.samples,
+        )
+    else:
+        share = found.share
+        told = f"{share_text(share)} of its states in an episode, on average over "
+        told += f"{counted(found.episodes, 'episode')}; "
+        told += "these are too few to say more" if interval is None else what_tells(interval)
+    return Evidence(
+        source=source,
+        text=_states(Share(found.correct, found.samples)),
+        interval=f"{told}{', below the threshold' if below else ''}",
+        bar=evidence_bar(share, interval, below=below, threshold=threshold),
+        below=below,
+    )
+
+
+def _condition(
+    bounds: Bounds,
+    feature: Feature,
+    row: FeatureRow,
+    states: Sequence[float],
+) -> ConditionRow:
+    text = short_condition(bounds, feature)
+    if is_flag(feature, bounds):
+        return ConditionRow(text, "", "")
+    unit = f" {feature.unit}" if feature.unit else ""
+    low = number_text(row.low, apart_from=row.high)
+    high = number_text(row.high, apart_from=row.low)
+    finite = [value for value in (bounds.low, bounds.high) if math.isfinite(value)]
+    scale = Scale.over([row.low, row.high, *finite], margin=0.04)
+    return ConditionRow(
+        text,
+        f"{low} to {high}{unit}",
+        interval_bar(scale, (row.low, row.high), (bounds.low, bounds.high), states),
+    )
+
+
+def _picture(
+    frame: ExampleFrame, rule: Rule, rule_set: RuleSet, ranges: Sequence[FeatureRow]
+) -> Picture:
+    dimension, features = rule_set.actions[rule.dimension], rule_set.source.features
+    value = frame.executed[rule.dimension].item()
+    did = done_text(value, dimension)
+    followed = dimension.label_of(value) == rule.action
+    name = frame.player[:1].upper() + frame.player[1:]
+    return Picture(
+        source=f"data:image/png;base64,{base64.b64encode(frame.picture).decode('ascii')}",
+        alt=f"The scene at step {frame.step} of the episode with seed {frame.seed}, where the "
+        f"rule applies; {frame.player} chose {did}",
+        caption=f"{name}: {did}{'' if followed else ', against the rule'}",
+        values="; ".join(
+            _value_text(frame.observation[bounds.feature].item(), features[bounds.feature], bounds)
+            for bounds in rule.bounds[:_MOST_VALUES]
+            if not is_flag(features[bounds.feature], bounds)
+        ),
+        place=f"seed {frame.seed}, step {frame.step}",
+    )
+
+
+def _value_text(value: float, feature: Feature, bounds: Bounds) -> str:
+    return (
+        f"{feature.name} {value_text(value, feature, [bounds])}"
+        f"{f' {feature.unit}' if feature.unit else ''}"
+    )

@@ -1,0 +1,195 @@
+"""The part of a report that shows the rules: the first in full, the others in a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.figures.distributions import feature_rows
+from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
+from sarl_core.explaining.report.tally import Tally
+from sarl_core.mining.language import action_text, conditions_text, counted, share_text
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.rendering.example_frames import Examples
+
+MOST_IN_TABLE = 5_000
+_PRINTED_LINES = 150  # of the table; the file itself holds all
+
+
+@dataclass(frozen=True)
+class Line:
+    """A rule in a table.
+
+    Attributes:
+        name: As "R12", by its place in the rule file.
+        action: Its name.
+        colour: Of its action.
+        when: Its conditions, in signs.
+        support: Share of the states to which it applies.
+        samples: Number of those.
+        confidence: Share of those with its action.
+        tags: As "switched off".
+    """
+
+    name: str
+    action: str
+    colour: str
+    when: str
+    support: str
+    samples: str
+    confidence: str
+    tags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The rules of one action dimension.
+
+    Attributes:
+        name: Of the dimension; "" where there is only one.
+        cards: Rules in full.
+    """
+
+    name: str
+    cards: tuple[Card, ...]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The rules.
+
+    Attributes:
+        introduction: What is shown how, in sentences.
+        groups: Rules in full, by action dimension.
+        lines: The others.
+        printed: How many of those are printed.
+        left_out: Number of rules that are not even in the table.
+    """
+
+    introduction: tuple[str, ...]
+    groups: tuple[Group, ...]
+    lines: tuple[Line, ...]
+    printed: int
+    left_out: int
+
+
+def in_order(rule_set: RuleSet, most: int) -> tuple[list[int], list[int]]:
+    """Which rules are shown in full, and which in a table.
+
+    Args:
+        rule_set: The rules.
+        most: So many in full, the same number of each action dimension as far as there are.
+
+    Returns:
+        Indices: those in full by dimension and support; the others likewise. Rules that a person
+        placed come first, in their order.
+    """
+    queues = []
+    for dimension in range(len(rule_set.actions)):
+        own = [index for index, rule in enumerate(rule_set.rules) if rule.dimension == dimension]
+        own.sort(key=lambda index: _rank(rule_set.rules[index]))
+        queues.append(own)
+    shares = [0] * len(queues)
+    for _ in range(min(most, len(rule_set.rules))):
+        open_ones = [place for place, own in enumerate(queues) if shares[place] < len(own)]
+        shares[min(open_ones, key=lambda place: shares[place])] += 1
+    full = [index for own, share in zip(queues, shares, strict=True) for index in own[:share]]
+    rest = [index for own, share in zip(queues, shares, strict=True) for index in own[share:]]
+    rest.sort(key=lambda index: _rank(rule_set.rules[index]))
+    return full, rest
+
+
+def _rank(rule: Rule) -> tuple[bool, float]:
+    return (not rule.placed, 0.0 if rule.placed else -rule.support)
+
+
+def rules_part(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    order: tuple[Sequence[int], Sequence[int]],
+    examples: Examples | None,
+) -> Rules:
+    """The rules, the first in full.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Of the report.
+        tally: The rules on them.
+        order: As `in_order` gives it.
+        examples: Frames at which rules applied, None without pictures.
+
+    Returns:
+        The part of the report.
+    """
+    full, rest = order
+    ranges = feature_rows(demonstrations)
+    groups = []
+    for dimension, action in enumerate(rule_set.actions):
+        cards = tuple(
+            rule_card(rule_set, index, demonstrations, tally, ranges, examples)
+            for index in full
+            if rule_set.rules[index].dimension == dimension
+        )
+        if cards:
+            groups.append(Group(action.name if len(rule_set.actions) > 1 else "", cards))
+    lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
+    return Rules(
+        introduction=_introduction(rule_set, tally, len(full), len(rest)),
+        groups=tuple(groups),
+        lines=lines,
+        printed=_PRINTED_LINES,
+        left_out=max(len(rest) - MOST_IN_TABLE, 0),
+    )
+
+
+def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tuple[str, ...]:
+    if not rule_set.rules:
+        return (
+            "There is no rule: no part of the tree reaches the thresholds. Such a shield leaves "
+            "every action as it is.",
+        )
+    only_one = not any(rule.placed for rule in rule_set.rules)
+    applying = (
+        "In a state at most one rule for each action applies; where none does, the agent acts as "
+        "it likes."
+        if only_one
+        else "Several may apply; the first, in this order, decides. Where none applies, the agent "
+        "acts as it likes."
+    )
+    if any(not rule.enabled for rule in rule_set.rules):
+        applying += " A rule that is switched off decides nothing."
+    found = [f"Of several conditions in a rule all must hold. {applying}"]
+    if rest:
+        each = ", as many of each action," if len(rule_set.actions) > 1 else ""
+        found.append(
+            f"There are {len(rule_set.rules):,} rules. The {full:,} that apply most often{each} "
+            f"are shown in full, the other {rest:,} in a table after them."
+        )
+    if tally.split:
+        found.append(
+            f"The rules were mined from {counted(rule_set.source.episodes, 'episode')} of these "
+            "demonstrations; the others were kept aside to try the rules on."
+        )
+    elif not tally.same:
+        found.append(
+            "The rules were made from other data than the demonstrations of this report (from "
+            f"{counted(rule_set.source.steps, 'state')}); both counts are shown."
+        )
+    return tuple(found)
+
+
+def _line(rule_set: RuleSet, index: int) -> Line:
+    rule = rule_set.rules[index]
+    return Line(
+        name=rule_set.name_of(rule),
+        action=action_text(rule.action, rule_set.actions[rule.dimension]),
+        colour=label_colour(rule.action),
+        when=conditions_text(rule, rule_set),
+        support=share_text(rule.support),
+        samples=f"{rule.samples:,}",
+        confidence=share_text(rule.confidence) if rule.samples else "–",
+        tags=tags(rule),
+    )

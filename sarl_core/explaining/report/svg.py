@@ -1,0 +1,258 @@
+"""Small pictures of a report: SVG that stretches with the page, without script and without text.
+
+Places are percentages of the width, so that nothing in them shrinks on a small screen. What they
+show is said beside them in words, or in their label.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.explaining.figures.colours import LAYER_SCALE
+
+# Of the page's own style, light or dark. The colours of actions stay those of actions.
+NEUTRAL, BAD, MUTED = "var(--fill)", "var(--bad)", "var(--muted)"
+
+
+class Scale(NamedTuple):
+    """Numbers from left to right.
+
+    Attributes:
+        low: At the left edge.
+        high: At the right edge, above `low`.
+    """
+
+    low: float
+    high: float
+
+    @classmethod
+    def over(cls, values: Sequence[float], *, margin: float = 0.0) -> Scale:
+        """The scale that shows all of some finite numbers.
+
+        Args:
+            values: At least one.
+            margin: Room at either end, as a share of the width.
+
+        Returns:
+            Some width, even where all numbers are equal.
+        """
+        low, high = min(values), max(values)
+        room = (high - low) * margin or (0.0 if low < high else max(abs(low), 1.0) / 2)
+        return cls(low - room, high + room)
+
+    def place(self, value: float) -> float:
+        """Where a number stands, 0 to 1; those outside stand at the edge."""
+        return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
+
+
+def share_bar(share: float, colour: str) -> str:
+    """A share as a bar; said in words beside it.
+
+    Args:
+        share: 0 to 1.
+        colour: As "#0072B2", or one of the page's.
+
+    Returns:
+        SVG.
+    """
+    track = _box(0, 1, 0, 12, "track")
+    return _picture("bar", 12, track + _box(0, share, 0, 12, fill=colour))
+
+
+def evidence_bar(
+    share: float, interval: tuple[float, float] | None, *, below: bool, threshold: float | None
+) -> str:
+    """A share with its interval, and the threshold it had to reach; said in words beside it.
+
+    Args:
+        share: 0 to 1.
+        interval: Its lower and upper end; None for none.
+        below: Whether the interval lies below the threshold.
+        threshold: Marked by a line, None for no line.
+
+    Returns:
+        SVG.
+    """
+    parts = [_box(0, 1, 5, 8, "track"), _box(0, share, 5, 8, fill=BAD if below else NEUTRAL)]
+    if threshold is not None:
+        parts.append(_line(threshold, 0, 18, "mark"))
+    if interval is not None:
+        low, high = interval
+        parts += [_across(low, high, 9, "ink"), _line(low, 5, 13, "ink"), _line(high, 5, 13, "ink")]
+    return _picture("bar", 18, "".join(parts))
+
+
+def interval_bar(
+    scale: Scale, data: tuple[float, float], asked: tuple[float, float], states: Sequence[float]
+) -> str:
+    """What a rule asks of a feature, against the data; said in words beside it.
+
+    Args:
+        scale: From left to right.
+        data: Least and largest demonstrated value.
+        asked: The rule's bounds, infinite where there is none.
+        states: Least and largest value of the rule's own states; () where it has none.
+
+    Returns:
+        SVG.
+    """
+    low, high = (scale.place(value) for value in asked)
+    parts = [
+        _box(scale.place(data[0]), scale.place(data[1]), 5, 6, "track"),
+        _box(low, high, 3, 10, "asked"),
+    ]
+    if states:
+        first, last = (scale.place(value) for value in states)
+        parts.append(_box(first, max(last, first + 0.006), 6, 4, "states"))
+    for place, bound in ((low, asked[0]), (high, asked[1])):
+        if math.isfinite(bound):
+            parts.append(_line(place, 0, 16, "edge"))
+    return _picture("bar", 16, "".join(parts))
+
+
+def columns(
+    values: Sequence[float], label: str, colours: Sequence[str], *, zero: float, top: float
+) -> str:
+    """Numbers as columns, side by side.
+
+    Args:
+        values: Finite.
+        label: What is seen, in words.
+        colours: One a column.
+        zero: Where the columns begin.
+        top: The upper edge, or the lower one if below `zero`; see `column_range`.
+
+    Returns:
+        SVG.
+    """
+    height = 84.0
+    low, high = min([zero, top, *values]), max([zero, top, *values])
+    span = (high - low) or 1.0
+    width = 1 / max(len(values), 1)
+    ground = height * (high - zero) / span
+    parts = []
+    for index, (value, colour) in enumerate(zip(values, colours, strict=True)):
+        end = height * (high - value) / span
+        y, tall = min(ground, end), max(abs(end - ground), 0.8)
+        parts.append(
+            f'<rect x="{_percent((index + 0.1) * width)}" y="{y:.1f}" '
+            f'width="{_percent(0.8 * width)}" height="{tall:.1f}" style="fill:{colour}"/>'
+        )
+    parts.append(_across(0, 1, round(ground, 1), "axis"))
+    return _picture("columns", int(height), "".join(parts), label)
+
+
+def dot_and_interval(
+    scale: Scale, value: float, low: float, high: float, *, colour: str, zero: bool
+) -> str:
+    """A number and how sure one can be of it; said in words beside it.
+
+    Args:
+        scale: The same for all that are compared.
+        value: The number.
+        low: Lower end of its interval.
+        high: Upper end.
+        colour: Of the dot.
+        zero: Whether to mark zero, where the scale has it inside.
+
+    Returns:
+        SVG.
+    """
+    parts = [_across(0, 1, 8, "axis")]
+    if zero and scale.low < 0 < scale.high:
+        parts.append(_line(scale.place(0.0), 0, 16, "axis"))
+    parts.append(_across(scale.place(low), scale.place(high), 8, "wide", colour))
+    parts.append(
+        f'<circle cx="{_percent(scale.place(value))}" cy="8" r="4.5" class="dot" '
+        f'style="fill:{colour}"/>'
+    )
+    return _picture("bar", 16, "".join(parts))
+
+
+def mix_bar(shares: Sequence[float], colours: Sequence[str]) -> str:
+    """Shares of a whole behind each other; said in words beside it.
+
+    Args:
+        shares: Summing to at most 1.
+        colours: One a share.
+
+    Returns:
+        SVG.
+    """
+    parts, at = [_box(0, 1, 0, 12, "track")], 0.0
+    for share, colour in zip(shares, colours, strict=True):
+        if share > 0:
+            parts.append(_box(at, at + share, 0, 12, fill=colour))
+        at += share
+    return _picture("bar", 12, "".join(parts))
+
+
+def layer_colour(share: float) -> tuple[str, str]:
+    """The colour of a cell of a landscape, and one that is legible on it.
+
+    Args:
+        share: 0 to 1, from ground to ink.
+
+    Returns:
+        Ground and text, as "#f4ecd8".
+    """
+    places = [place for place, _ in LAYER_SCALE]
+    channels: NDArray[np.float64] = np.array(
+        [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for _, colour in LAYER_SCALE], float
+    )
+    mixed = [round(float(np.interp(share, places, channels[:, index]))) for index in range(3)]
+    ground = "#" + "".join(f"{value:02x}" for value in mixed)
+    dark, light = "#15202a", "#ffffff"
+    return ground, dark if _contrast(ground, dark) >= _contrast(ground, light) else light
+
+
+def _contrast(one: str, other: str) -> float:
+    """The contrast of two colours as WCAG defines it, 1 to 21."""
+    first, second = sorted((_luminance(one), _luminance(other)))
+    return (second + 0.05) / (first + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    ]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f}%"
+
+
+def _box(
+    start: float, end: float, y: float, height: float, css: str = "", *, fill: str = ""
+) -> str:
+    look = (f' class="{css}"' if css else "") + (f' style="fill:{fill}"' if fill else "")
+    return (
+        f'<rect x="{_percent(start)}" y="{y:g}" width="{_percent(max(end - start, 0.0))}" '
+        f'height="{height:g}"{look}/>'
+    )
+
+
+def _line(at: float, top: float, bottom: float, css: str) -> str:
+    place = _percent(at)
+    return f'<line x1="{place}" x2="{place}" y1="{top:g}" y2="{bottom:g}" class="{css}"/>'
+
+
+def _across(start: float, end: float, y: float, css: str, colour: str = "") -> str:
+    look = f' style="stroke:{colour}"' if colour else ""
+    return (
+        f'<line x1="{_percent(start)}" x2="{_percent(end)}" y1="{y:g}" y2="{y:g}" '
+        f'class="{css}"{look}/>'
+    )
+
+
+def _picture(css: str, height: int, content: str, label: str = "") -> str:
+    told = f'role="img" aria-label="{escape(label)}"' if label else 'aria-hidden="true"'
+    return f'<svg class="{css}" width="100%" height="{height}" {told}>{content}</svg>'

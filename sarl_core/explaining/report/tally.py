@@ -1,0 +1,174 @@
+"""What a report counts: the rules on the demonstrations it is about, each state under its rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.explaining.words.edited_sets import is_plain
+from sarl_core.mining.rule_order import Fitted, rules_for
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.validation.episode_counts import count_applied
+from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.shielding.shield import Shield
+
+
+class Share(NamedTuple):
+    """So many of so many.
+
+    Attributes:
+        part: How many.
+        whole: Of how many.
+    """
+
+    part: int
+    whole: int
+
+    @property
+    def value(self) -> float:
+        """0 to 1; NaN of nothing."""
+        return self.part / self.whole if self.whole else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Rules counted on N demonstrated pairs with m action dimensions.
+
+    Attributes:
+        same: Whether the rules were mined from these very demonstrations.
+        split: Whether they were mined from some of these episodes and tried on all the others.
+        rules: Index of the rule in force or -1, (N, m) int64.
+        labels: What the expert did, (N, m) int64.
+        shares: Of each rule, in how many of its states the expert did what it says.
+        by_episode: The same of each rule, counted by episodes.
+    """
+
+    same: bool
+    split: bool
+    rules: NDArray[np.int64]
+    labels: NDArray[np.int64]
+    shares: tuple[Share, ...]
+    by_episode: tuple[HeldOut, ...]
+
+    def covered(self, dimension: int) -> Share:
+        """In how many states a rule of a dimension applies."""
+        column = self.rules[:, dimension]
+        return Share(int((column >= 0).sum()), len(column))
+
+    def rows(self, rule: int, dimension: int) -> NDArray[np.int64]:
+        """The states of a rule, ascending."""
+        return np.flatnonzero(self.rules[:, dimension] == rule)
+
+    @property
+    def coverage(self) -> float:
+        """Share of states with a rule, averaged over action dimensions."""
+        return float((self.rules >= 0).mean())
+
+    @property
+    def followed(self) -> Share:
+        """In how many of the covered states the expert did what the rule says."""
+        return Share(sum(share.part for share in self.shares), int((self.rules >= 0).sum()))
+
+
+def report_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Fitted:
+    """The rules as a report speaks of them: in the order of the demonstrations' features.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: N pairs.
+
+    Returns:
+        Under their own names.
+
+    Raises:
+        InputError: If features or actions are others.
+    """
+    fitted = rules_for(rule_set, demonstrations)
+    for rules, shown in zip(fitted.rule_set.actions, demonstrations.action_dimensions, strict=True):
+        if not rules.is_interval and (rules.n_labels, rules.first) != (
+            len(shown.labels),
+            shown.first,
+        ):
+            raise InputError(
+                f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
+                f"{len(shown.labels)} in the demonstrations; give the demonstrations the rules "
+                "were mined from"
+            )
+    return fitted
+
+
+def same_environment(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
+    """Whether rules and demonstrations are known to be of one environment.
+
+    Args:
+        rule_set: The rules.
+        demonstrations: Any.
+
+    Returns:
+        False also where one of them does not say.
+    """
+    return bool(demonstrations.env_id) and rule_set.source.env_id == demonstrations.env_id
+
+
+def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
+    """Count rules on demonstrations.
+
+    Args:
+        rule_set: The rules; those that are switched off count nothing.
+        demonstrations: N pairs of the same features and actions.
+
+    Returns:
+        The counts; a state belongs to the rule a shield would find for it.
+
+    Raises:
+        InputError: If features or actions differ.
+    """
+    rule_set = report_rules(rule_set, demonstrations).rule_set
+    actions = demonstrations.action_columns
+    found = Shield(rule_set).rules_in_force(demonstrations.observations)
+    labels = np.stack(
+        [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
+    )
+    said = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
+    inside = found >= 0
+    right = inside & (said[np.maximum(found, 0)] == labels)
+    count = len(rule_set.rules)
+    row, _ = np.nonzero(inside)
+    by_episode = count_applied(count, found[inside], row, right[inside], demonstrations).held_out()
+    shares = tuple(Share(one.correct, one.samples) for one in by_episode)
+    return Tally(
+        same=rule_set.source.digest == demonstrations.digest,
+        split=_is_split(rule_set, demonstrations, shares),
+        rules=found,
+        labels=labels,
+        shares=shares,
+        by_episode=tuple(by_episode),
+    )
+
+
+def _is_split(rule_set: RuleSet, demonstrations: Demonstrations, shares: Sequence[Share]) -> bool:
+    """Whether what was mined from and what was held out add up to the demonstrations."""
+    if not 0 < rule_set.source.episodes < demonstrations.n_episodes:
+        return False
+    plain = is_plain(rule_set)
+    tried = [
+        (rule.samples + rule.held_out.samples, rule.correct + rule.held_out.correct)
+        == (share if plain else _wherever_it_applies(rule, rule_set, demonstrations))[::-1]
+        for rule, share in zip(rule_set.rules, shares, strict=True)
+        if rule.held_out is not None and rule.origin == "mined" and rule.enabled
+    ]
+    return bool(tried) and all(tried)
+
+
+def _wherever_it_applies(rule: Rule, rule_set: RuleSet, demonstrations: Demonstrations) -> Share:
+    """How a rule fares in all states to which it applies, also where another one decides."""
+    holds = rule.applies(demonstrations.observations)
+    values = demonstrations.action_columns[holds, rule.dimension]
+    right = rule_set.actions[rule.dimension].labels_of(values) == rule.action
+    return Share(int(right.sum()), int(holds.sum()))

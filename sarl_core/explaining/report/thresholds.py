@@ -1,0 +1,362 @@
+"""The part of a report that says which rules were kept, and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sarl_core.documents import parse_json
+from sarl_core.errors import InputError
+from sarl_core.explaining.report.svg import layer_colour
+from sarl_core.explaining.report.tally import Tally
+from sarl_core.explaining.words.edited_sets import edits_sentence
+from sarl_core.limits import limited_bytes
+from sarl_core.mining.landscape import Landscape, threshold_landscape
+from sarl_core.mining.language import counted, number_text, share_text, threshold_text
+from sarl_core.mining.rules import FILTERED, NAMED_SETTINGS, UNFILTERED, RuleSet, Thresholds
+from sarl_core.mining.tree import PolicyTree
+
+# Fine where the rules change fast: at small supports and high confidences.
+_SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+_CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
+_CARD_BYTES = 2**20
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A pair of thresholds.
+
+    Attributes:
+        count: Number of rules, short.
+        ground: Its colour.
+        ink: Of the number on it.
+        chosen: Whether it is the pair in force.
+    """
+
+    count: str
+    ground: str
+    ink: str
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The number of rules at pairs of thresholds.
+
+    Attributes:
+        supports: Headings of the columns.
+        rows: Minimum confidence and its cells, the strictest first.
+    """
+
+    supports: tuple[str, ...]
+    rows: tuple[tuple[str, tuple[Cell, ...]], ...]
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """What thresholds give.
+
+    Attributes:
+        name: As "half the support", or "these".
+        thresholds: In words.
+        rules: Their number.
+        length: Conditions a rule.
+        covered: Share of states with a rule.
+        followed: Share of those in which the expert did what the rule says.
+        chosen: Whether they are in force.
+    """
+
+    name: str
+    thresholds: str
+    rules: str
+    length: str
+    covered: str
+    followed: str
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Which rules were kept, and why.
+
+    Attributes:
+        sentences: In words.
+        plane: None where no thresholds cut the rules.
+        plane_text: What the plane shows, in words.
+        neighbours: What other thresholds give.
+        card: Names and values from the card of the rule file.
+    """
+
+    sentences: tuple[str, ...]
+    plane: Plane | None
+    plane_text: str
+    neighbours: tuple[Neighbour, ...]
+    card: tuple[tuple[str, str], ...]
+
+
+def read_card(rules: Path) -> Mapping[str, Any] | None:
+    """The card beside a rule file, which says how the rules were made.
+
+    Args:
+        rules: As "rules.json"; its card is "rules.card.json".
+
+    Returns:
+        None where there is none.
+
+    Raises:
+        InputError: If it cannot be read.
+    """
+    path = rules.with_suffix(".card.json")
+    if not path.is_file():
+        return None
+    try:
+        card = parse_json(limited_bytes(path, _CARD_BYTES))
+    except (OSError, ValueError, InputError) as error:
+        raise InputError(
+            f"the card {path} cannot be read ({error}); mend it or take it away"
+        ) from (error)
+    if not isinstance(card, dict):
+        raise InputError(f"the card {path} is not a JSON object; mend it or take it away")
+    return card
+
+
+def kept(
+    rule_set: RuleSet,
+    tally: Tally,
+    trees: Sequence[PolicyTree] | None,
+    card: Mapping[str, Any] | None,
+) -> Kept:
+    """Which rules were kept, and why.
+
+    Args:
+        rule_set: The rules.
+        tally: Of them on the demonstrations of the report.
+        trees: Grown from those demonstrations; None for rules that no thresholds cut.
+        card: Of the rule file, None without one.
+
+    Returns:
+        The part of the report.
+    """
+    facts = _card_facts(card) if card is not None else ()
+    edits = edits_sentence(rule_set)
+    then = (edits,) if edits else ()
+    if rule_set.cut == "leaves" or trees is None:
+        return Kept((*_built(rule_set, card), *then), None, "", (), facts)
+    limits = rule_set.thresholds
+    landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
+    same = (
+        ""
+        if tally.same
+        else " It counts the demonstrations of this report, which are not those the rules were "
+        "mined from."
+    )
+    text = (
+        "Each cell holds the number of rules that its pair of thresholds gives; darker is more. "
+        f"The framed cell is the pair in force.{same}"
+    )
+    if edits:
+        text += " It counts the rules as they were mined, before the changes by hand."
+    sentences = (*_cut(rule_set), *then)
+    return Kept(sentences, _plane(landscape, limits), text, _neighbours(trees, limits), facts)
+
+
+# --- thresholds --------------------------------------------------------------------------------
+
+
+def _cut(rule_set: RuleSet) -> tuple[str, ...]:
+    limits, steps = rule_set.thresholds, rule_set.source.steps
+    least = math.ceil(limits.support * steps - 1e-9)
+    found = [
+        "Rules come from a decision tree: questions about the state, asked one after the other. "
+        "Each way through the tree ends at the first point that is good enough to be a rule.",
+        f"A rule was kept if it applies to at least {share_text(limits.support)} of the "
+        f"demonstrated states ({counted(max(least, 1), 'state')} of {steps:,}; this share is its "
+        "support), and if the expert did what the rule says in at least "
+        f"{share_text(limits.confidence)} of those (its confidence).",
+    ]
+    if limits.lift > 0:
+        found.append(
+            "It also had to name its action at least "
+            f"{number_text(limits.lift)} times as often as the action occurs in all states "
+            "(its lift)."
+        )
+    if limits.max_depth is not None:
+        found.append(f"No rule may ask more than {counted(limits.max_depth, 'question')}.")
+    named = [name for name, pair in NAMED_SETTINGS.items() if pair == limits]
+    found.append(
+        f"This is the setting “{named[0]}” of the paper behind the method."
+        if named
+        else "These thresholds were chosen by whoever made the rules; they are not one of the two "
+        "settings that the paper behind the method names."
+    )
+    if any(action.is_interval for action in rule_set.actions):
+        found.append(
+            f"Each continuous action was divided into {rule_set.divider} equal intervals, and a "
+            "rule names one of them."
+        )
+    return tuple(found)
+
+
+def _landscape(
+    trees: Sequence[PolicyTree],
+    limits: Thresholds,
+    supports: Sequence[float],
+    confidences: Sequence[float],
+) -> Landscape:
+    """The landscape of a grid that has the thresholds in force among its lines."""
+    return threshold_landscape(
+        trees,
+        np.unique([*supports, limits.support]),
+        np.unique([*confidences, limits.confidence]),
+        lift_min=limits.lift,
+        max_depth=limits.max_depth,
+    )
+
+
+def _plane(landscape: Landscape, limits: Thresholds) -> Plane:
+    counts = landscape.rule_count
+    # From one rule to thousands: by powers of ten.
+    depth = np.log10(1.0 + counts) / max(float(np.log10(1.0 + counts.max())), 1e-9)
+    rows = []
+    for column in range(len(landscape.confidences) - 1, -1, -1):
+        confidence = float(landscape.confidences[column])
+        cells = []
+        for row, support in enumerate(landscape.supports.tolist()):
+            ground, ink = layer_colour(float(depth[row, column]))
+            chosen = support == limits.support and confidence == limits.confidence
+            cells.append(Cell(f"{int(counts[row, column]):,}", ground, ink, chosen))
+        rows.append((_short(confidence), tuple(cells)))
+    return Plane(tuple(_short(float(support)) for support in landscape.supports), tuple(rows))
+
+
+def _short(share: float) -> str:
+    """A threshold as a percentage, without its sign."""
+    return threshold_text(float(np.round(100 * share, 6)))
+
+
+def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighbour, ...]:
+    support, confidence = limits.support, limits.confidence
+    pairs: dict[str, tuple[float, float]] = {"in force": (support, confidence)}
+    if support > 0:
+        pairs["half the support"] = (support / 2, confidence)
+        pairs["twice the support"] = (min(2 * support, 1.0), confidence)
+    else:
+        pairs["some support"] = (FILTERED.support, confidence)
+    pairs["less confidence"] = (support, max(confidence - 0.05, 0.0))
+    if confidence < 1:
+        pairs["more confidence"] = (support, float(np.round((confidence + 1) / 2, 6)))
+    for name, setting in (("“filtered”", FILTERED), ("“unfiltered”", UNFILTERED)):
+        pairs[name] = (setting.support, setting.confidence)
+    found: dict[tuple[float, float], Neighbour] = {}
+    for name, pair in pairs.items():
+        if pair in found:
+            continue
+        at = _landscape(trees, Thresholds(*pair, limits.lift, limits.max_depth), (), ())
+        found[pair] = Neighbour(
+            name=name,
+            thresholds=f"{_short(pair[0])} %, {_short(pair[1])} %",
+            rules=f"{int(at.rule_count[0, 0]):,}",
+            length=f"{float(at.mean_length[0, 0]):.1f}",
+            covered=share_text(float(at.coverage[0, 0])),
+            followed=share_text(float(at.fidelity[0, 0])),
+            chosen=name == "in force",
+        )
+    return tuple(found.values())
+
+
+# --- a budget ----------------------------------------------------------------------------------
+
+
+def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]:
+    if rule_set.cut != "leaves":
+        return _cut(rule_set)
+    found = [
+        "These rules were not cut out by thresholds. A tree of a few questions was built so that "
+        "in every state exactly one rule for each action applies: few rules that do as much as "
+        "possible. So these rules leave an agent nothing to choose from: they are a policy that "
+        "replaces it, and no longer a shield that corrects it here and there.",
+    ]
+    if card is not None and isinstance(card.get("budget"), int):
+        each = " for each action" if len(rule_set.actions) > 1 else ""
+        rounds = card.get("rounds")
+        asked = (
+            f" In {counted(len(rounds), 'round')} the rules were let act, the expert was asked "
+            "what it would have done in the states they led to, and the rules were built anew "
+            "from all its answers."
+            if isinstance(rounds, list) and rounds
+            else ""
+        )
+        found.append(f"The budget was {card['budget']:,} rules{each}.{asked}")
+        if card.get("refined") is True:
+            found.append(
+                "Then the thresholds in the rules were moved to where the rules achieve more "
+                "when they act. They are therefore no plain record of what the expert did most "
+                "often: a rule may say what only a part of its states show."
+            )
+    found.append(
+        "So judge these rules by what they achieve (see the card below and the comparison), and "
+        "read the share of states in which the expert did the same as how far they follow it."
+    )
+    return tuple(found)
+
+
+def _shares(reported: Mapping[str, Any]) -> list[float]:
+    """The ends of the interval of the failures, as far as a card has them."""
+    ends = (reported.get("failure_low"), reported.get("failure_high"))
+    return [float(end) for end in ends if isinstance(end, (int, float)) and 0 <= end <= 1]
+
+
+def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """What a card says, as far as it can be understood."""
+    found: list[tuple[str, str]] = []
+
+    def number(value: object) -> str | None:
+        usable = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return number_text(float(value)) if usable and math.isfinite(float(value)) else None  # type: ignore[arg-type]
+
+    def text(name: str, key: str) -> None:
+        if isinstance(card.get(key), str):
+            found.append((name, str(card[key])))
+
+    if (budget := number(card.get("budget"))) is not None:
+        found.append(("Most rules for each action", budget))
+    if isinstance(rounds := card.get("rounds"), list) and rounds:
+        chosen = number(card.get("chosen_round"))
+        told = f", of which the rules of round {chosen} were taken" if chosen else ""
+        found.append(("Rounds of asking the expert", f"{len(rounds)}{told}"))
+    if isinstance(refined := card.get("refined"), bool):
+        found.append(("Thresholds moved to achieve more", "yes" if refined else "no"))
+    text("Chosen by", "chosen_by")
+    if isinstance(reported := card.get("reported"), Mapping):
+        mean, std = number(reported.get("mean")), number(reported.get("std"))
+        least, most = number(reported.get("min")), number(reported.get("max"))
+        episodes = number(reported.get("episodes"))
+        if mean is not None:
+            spread = f" ± {std}" if std is not None else ""
+            ends = f", from {least} to {most}" if least is not None and most is not None else ""
+            over = f", over {episodes} episodes" if episodes is not None else ""
+            found.append(
+                ("Mean return of an agent that follows the rules", f"{mean}{spread}{ends}{over}")
+            )
+        failures = number(reported.get("failures"))
+        shares = [number(100 * share) for share in _shares(reported)]
+        cut = number(reported.get("cut"))
+        over = f", {cut} of which were cut off before they could fail" if cut else ""
+        if failures is not None and episodes is not None and len(shares) == 2:
+            found.append(
+                (
+                    "Failures of an agent that follows the rules",
+                    f"{failures} of {episodes} episodes{over} (95 % interval {shares[0]} to "
+                    f"{shares[1]} %)",
+                )
+            )
+    text("Reported on", "reported_on")
+    if (seed := number(card.get("seed"))) is not None:
+        found.append(("Seed", seed))
+    text("Made by", "command")
+    return tuple(found)

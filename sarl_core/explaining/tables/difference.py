@@ -1,0 +1,111 @@
+"""The difference of two rule sets as columns of tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.words.difference import said_text, what_text
+from sarl_core.mining.language import action_text, conditions_text, label_text
+from sarl_core.mining.rule_tree import NO_RULE
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.disagreement import Disagreement
+
+KINDS = ("added", "removed", "changed")
+NO_ID = "–"
+
+
+def rule_rows(found: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, list[Any]]:
+    """Rules that were added, removed or changed.
+
+    Args:
+        found: The comparison.
+        kinds: Which of them.
+
+    Returns:
+        Column name to one value a rule; of each kind the largest rules first.
+    """
+    difference = found.difference
+    entries: list[tuple[str, Rule, RuleSet, str]] = []
+    if "changed" in kinds:
+        entries += [
+            ("changed", change.after, found.second, what_text(change, found, beside=True))
+            for change in difference.changed
+        ]
+    for kind, rules, rule_set in (
+        ("added", difference.added, found.second),
+        ("removed", difference.removed, found.first),
+    ):
+        if kind in kinds:
+            entries += [
+                (kind, rule, rule_set, "") for rule in sorted(rules, key=lambda one: -one.samples)
+            ]
+    return {
+        "What": [kind for kind, *_ in entries],
+        "Rule": [rule_set.name_of(rule) for _, rule, rule_set, _ in entries],
+        "Action": [
+            action_text(rule.action, rule_set.actions[rule.dimension])
+            for _, rule, rule_set, _ in entries
+        ],
+        "When": [conditions_text(rule, rule_set) for _, rule, rule_set, _ in entries],
+        "Change": [told for *_, told in entries],
+        "States": [rule.samples for _, rule, _, _ in entries],
+    }
+
+
+def example_rows(
+    found: Disagreement,
+    dimension: int,
+    states: NDArray[np.float32],
+    *,
+    names: tuple[str, str],
+    demonstrations: Demonstrations | None = None,
+    most: int = 50,
+) -> dict[str, list[Any]]:
+    """Some states of which the two say different things.
+
+    Args:
+        found: The comparison.
+        dimension: Action dimension.
+        states: What was compared, (B, d).
+        names: What the two sets are called.
+        demonstrations: Where the states are theirs: episode, step and what the expert did.
+        most: Number of states, spread evenly over all there are.
+
+    Returns:
+        Column name to one value a state.
+    """
+    rows = np.flatnonzero(found.differs[:, dimension])
+    if len(rows) > most:
+        rows = rows[np.linspace(0, len(rows) - 1, most).astype(np.int64)]
+    columns: dict[str, list[Any]] = {}
+    if demonstrations is not None:
+        assert demonstrations.steps is not None
+        columns["Episode"] = demonstrations.episodes[rows].tolist()
+        columns["Step"] = demonstrations.steps[rows].tolist()
+    for name, rule_set, rules, labels in zip(
+        names, (found.first, found.second), found.rules, found.labels, strict=True
+    ):
+        action = rule_set.actions[dimension]
+        says = [said_text(label, action) for label in labels[rows, dimension].tolist()]
+        columns[f"{_capital(name)} says"] = says
+        columns[f"Rule, {name}"] = [
+            NO_ID if index == NO_RULE else rule_set.name_of(rule_set.rules[index])
+            for index in rules[rows, dimension].tolist()
+        ]
+    if demonstrations is not None:
+        action = found.first.actions[dimension]
+        did = action.labels_of(demonstrations.action_columns[rows, dimension]).tolist()
+        columns["Expert did"] = [
+            label_text(label, action) if 0 <= label < action.n_labels else NO_ID for label in did
+        ]
+    for at, feature in enumerate(found.first.source.features):
+        columns[feature.name] = states[rows, at].tolist()
+    return columns
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

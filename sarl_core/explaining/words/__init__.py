@@ -1,0 +1,1 @@
+"""Rules, evidence and results in sentences."""

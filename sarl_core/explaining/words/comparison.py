@@ -1,0 +1,128 @@
+"""What a comparison comes to, in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sarl_core.mining.language import at_least_text
+from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.statistics import Rate
+from sarl_core.studies.shield_effect import ERROR_RATE, ShieldEffect, shield_effect
+
+POLICY_TEXT = (
+    "These rules decide every step (freedom 0 %), so they are a policy that replaces the agent "
+    "and no longer a shield that corrects it"
+)
+"""What is said of rules that leave an agent nothing to choose from."""
+
+
+def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str:
+    """Whether a shield did an agent good, by the same seeds with it and without.
+
+    Args:
+        agent: Its name, as "novice".
+        shield: What is in force, as "the unfiltered rules".
+        alone: Episodes of the agent without a shield.
+        shielded: Its episodes with the shield, on the same seeds.
+
+    Returns:
+        As "With the unfiltered rules the typical return of the expert falls from 271 to 242 (its
+        mean from 271 to 168, a difference of −103, 95 % interval −186 to −21), and 25 % instead
+        of 0 % of its episodes end in a crash: these rules harm it."
+    """
+    found = shield_effect(alone, shielded)
+    before, after = (_whole(episodes.statistics.iqm) for episodes in (alone, shielded))
+    mean = found.returns.mean
+    if not _told(found):
+        change = (
+            f"does not clearly change ({after}, without them {before}; "
+            f"{_difference(found, alone, shielded)})"
+        )
+    elif mean * (shielded.statistics.iqm - alone.statistics.iqm) > 0:
+        word = "rises" if mean > 0 else "falls"
+        change = f"{word} from {before} to {after} ({_difference(found, alone, shielded)})"
+    else:  # what moved lies among the worst or the best episodes
+        change = (
+            f"hides what changes ({after}, without them {before}): its mean "
+            f"{'rises' if mean > 0 else 'falls'} ({_difference(found, alone, shielded)})"
+        )
+    harm = ": these rules harm it" if found.effect == "harms" else ""
+    crashes = _crashes(found, alone, shielded)
+    return f"With {shield} the typical return of the {agent} {change}{crashes}{harm}."
+
+
+def verdict_on_all(agent: str, alone: Episodes, shielded: Sequence[tuple[str, Episodes]]) -> str:
+    """What each of several shields did to an agent, the one that served it best first.
+
+    Args:
+        agent: Its name, as "novice".
+        alone: Episodes of the agent without a shield.
+        shielded: What is in force, as "the unfiltered rules", and its episodes with it, on the
+            same seeds; at least one.
+
+    Returns:
+        As that of `verdict`, and then "; with the filtered rules it rises to 305 (its mean from 22
+        to 305, a difference of 283, 95 % interval 279 to 287; 75 % of its episodes crash)."
+    """
+    best, *others = sorted(shielded, key=lambda pair: pair[1].statistics.iqm, reverse=True)
+    first = verdict(agent, best[0], alone, best[1]).removesuffix(".")
+    return "; ".join([first, *(_clause(name, alone, episodes) for name, episodes in others)]) + "."
+
+
+def _told(found: ShieldEffect) -> bool:
+    """Whether a difference in return is said to be one; of few episodes with a caution."""
+    return found.return_p < ERROR_RATE or (found.too_few and found.returns.mean != 0.0)
+
+
+def _difference(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
+    """The means with their paired difference, its interval, and whether it may be chance."""
+    if found.returns.low == found.returns.high == 0.0:
+        return "every episode has the same return with them and without"
+    before, after = (_whole(episodes.statistics.mean) for episodes in (alone, shielded))
+    ends = [_whole(end) for end in (found.returns.low, found.returns.high)]
+    few = f"; {found.episodes} episodes are too few to rule out chance" if found.too_few else ""
+    return (
+        f"its mean from {before} to {after}, a difference of {_whole(found.returns.mean)}, 95 % "
+        f"interval {ends[0]} to {ends[1]}{few}"
+    )
+
+
+def _whole(number: float) -> str:
+    """A whole number; never a zero with a sign."""
+    return f"{round(number):,}".replace("-", "−")
+
+
+def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
+    """The same of one more shield, in a few words."""
+    found = shield_effect(alone, shielded)
+    after = _whole(shielded.statistics.iqm)
+    notes = [_difference(found, alone, shielded)]
+    if alone.failures is not None and shielded.failures is not None:
+        some = alone.failures.count or shielded.failures.count
+        notes += [f"{_share(shielded.failures)} of its episodes crash"] if some else []
+    if found.effect == "harms":
+        notes.append("these rules harm it")
+    told = "; ".join(notes)
+    if not _told(found):
+        return f"with {shield} it does not clearly change ({after}; {told})"
+    word = "rises" if shielded.statistics.iqm > alone.statistics.iqm else "falls"
+    return f"with {shield} it {word} to {after} ({told})"
+
+
+def _share(failures: Rate) -> str:
+    return at_least_text(failures.rate, failures.unknown)
+
+
+def _crashes(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
+    """What to say of the failures; nothing where it is not known which ends are some."""
+    if alone.failures is None or shielded.failures is None:
+        return ""
+    before, after = _share(alone.failures), _share(shielded.failures)
+    if alone.failures.rate == shielded.failures.rate:
+        none = not alone.failures.count
+        return "" if none else f", and {after} of its episodes end in a crash, as without"
+    chance = "" if found.failure_p < ERROR_RATE else ", which alone may still be chance"
+    return (
+        f", and {after} instead of {before} of its episodes end in a crash"
+        f"{'' if found.too_few else chance}"
+    )

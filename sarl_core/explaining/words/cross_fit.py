@@ -1,0 +1,109 @@
+"""What a whole rule set is worth elsewhere, in words, and a warning where it is worth much less."""
+
+from __future__ import annotations
+
+from sarl_core.explaining.words.evidence import influence_text, range_text, what_tells
+from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.validation.cross_fitting import Judged, parts
+from sarl_core.mining.validation.evidence import HeldOut
+
+
+def elsewhere_text(found: HeldOut) -> str:
+    """A share on other episodes, with what that can tell.
+
+    Args:
+        found: Of a whole rule set.
+
+    Returns:
+        As "91 % (78 to 99 %)".
+    """
+    if found.share is None:
+        return "no state"
+    told = share_text(found.share)
+    return told if found.interval is None else f"{told} ({range_text(found.interval)})"
+
+
+def judged_sentence(judged: Judged) -> str:
+    """What a rule set is worth in episodes that it was not mined from.
+
+    Args:
+        judged: Cross-fitted, or held out.
+
+    Returns:
+        As "Where each of 62 episodes is judged by rules mined without it, they are right in 95 % of
+        their states on average (between 92 and 98 % is what that can tell), and 29 % of the states
+        of an episode have a rule (26 to 32 %)."
+    """
+    fidelity, coverage = judged.fidelity, judged.coverage
+    count = len(judged.numbers)
+    if not judged.folds:
+        where = f"In {counted(count, 'episode')} that they were not mined from, the rules"
+    elif judged.whole_episodes:
+        where = (
+            f"Where each of {counted(count, 'episode')} is judged by rules mined without it, they"
+        )
+    else:
+        where = (
+            f"There is one episode only. Where each of {count} stretches of it is judged by rules "
+            "mined without it, they"
+        )
+    if fidelity.share is None:
+        return f"{where} apply in no state."
+    told = share_text(fidelity.share)
+    if fidelity.interval is not None:
+        told += f" of their states on average ({what_tells(fidelity.interval)})"
+    else:
+        told += " of their states on average"
+        if judged.whole_episodes:
+            told += " (too few episodes to say more)"
+    reach = "" if coverage.interval is None else f" ({range_text(coverage.interval)})"
+    one = "an episode" if judged.whole_episodes else "one"
+    return (
+        f"{where} are right in {told}, and {share_text(coverage.share or 0.0)} of the states of "
+        f"{one} have a rule{reach}."
+    )
+
+
+def parting_text(mined: float, judged: Judged) -> str:
+    """A warning where the fidelity on what was mined from parts from that on other episodes.
+
+    Args:
+        mined: Fidelity on what was mined from; NaN where there is none.
+        judged: The same rules, or those of the same thresholds, on other episodes.
+
+    Returns:
+        One or two sentences; "" where there is nothing to warn of.
+    """
+    fidelity = judged.fidelity
+    if fidelity.share is None or not parts(mined, fidelity):
+        return ""
+    where = "in episodes" if judged.whole_episodes else "in stretches of the episode"
+    return (
+        f"The rules are right in {share_text(mined)} of the states they were mined from, and only "
+        f"in {elsewhere_text(fidelity)} {where} that they were not mined from. Part of what they "
+        "say is chance: believe the second number. Rules of more states (a higher minimum support) "
+        "part less."
+    )
+
+
+def influence_sentences(judged: Judged) -> list[str]:
+    """Which episode alone moves the fidelity, and which would if every state counted for itself.
+
+    Args:
+        judged: A rule set on several episodes.
+
+    Returns:
+        None, one or two sentences.
+    """
+    found = []
+    once = influence_text(judged.influence)
+    if once:
+        found.append(f"One episode alone moves this: {once}.")
+    by_states = judged.influence_by_states
+    told = influence_text(by_states)
+    if told and by_states is not None:
+        found.append(
+            f"If every state counted for itself, the rules would be right in "
+            f"{share_text(by_states.share)}, and {told}. Therefore each episode counts once."
+        )
+    return found

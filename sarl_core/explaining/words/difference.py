@@ -1,0 +1,263 @@
+"""The difference of two rule sets, in words and as a document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sarl_core.mining.editing.difference import RuleChange
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import (
+    action_text,
+    conditions_text,
+    counted,
+    exact_condition,
+    label_text,
+    sentence,
+    share_text,
+)
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.disagreement import Disagreement
+
+NO_RULE_TEXT = "no rule"
+_SHOWN = 10  # rules of each kind in the text for a terminal
+
+
+def said_text(label: int, dimension: LabelledDimension) -> str:
+    """What a rule set says of a state.
+
+    Args:
+        label: A label, or one that no label is (-1, or one past the last) for no rule.
+        dimension: Whose label it is.
+
+    Returns:
+        As "push right" or "no rule".
+    """
+    return label_text(label, dimension) if 0 <= label < dimension.n_labels else NO_RULE_TEXT
+
+
+def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = False) -> str:
+    """What changed of a rule.
+
+    Args:
+        change: One of the difference.
+        difference: Knows the names.
+        beside: Whether the rule as it is now stands beside this, so that what was is enough.
+
+    Returns:
+        As "angle > 0.1 instead of angle > 0.2; switched off"; beside the rule "was angle > 0.2;
+        switched off".
+    """
+    before, after, what = change
+    parts = []
+    if "conditions" in what:
+        was = conditions_text(before, difference.first)
+        now = conditions_text(after, difference.second)
+        if was == now:  # they differ beyond what is shown
+            was, now = exact_text(before, difference.first), exact_text(after, difference.second)
+        parts.append(f"was {was}" if beside else f"{now} instead of {was}")
+    if "action" in what:
+        dimension = difference.first.actions[before.dimension]
+        said = action_text(before.action, dimension)
+        says = action_text(after.action, difference.second.actions[after.dimension])
+        parts.append(f"said {said}" if beside else f"{says} instead of {said}")
+    if "switched" in what:
+        parts.append(f"switched {'on' if after.enabled else 'off'}")
+    if "place" in what:
+        if after.pinned == before.pinned:
+            parts.append("another place in the order")
+        else:
+            parts.append("pinned" if after.pinned else "no longer pinned")
+    if "origin" in what:
+        parts.append(f"{after.origin} instead of {before.origin}")
+    return "; ".join(parts)
+
+
+def exact_text(rule: Rule, rule_set: RuleSet) -> str:
+    """The conditions of a rule at full precision.
+
+    Args:
+        rule: One of the set.
+        rule_set: Knows the names.
+
+    Returns:
+        As "angle > 0.1000000001"; "always" without conditions.
+    """
+    features = rule_set.source.features
+    return " and ".join(exact_condition(one, features) for one in rule.conditions) or "always"
+
+
+def rows_text(found: Disagreement) -> str:
+    """How the rules of two sets differ, in a sentence.
+
+    Args:
+        found: The comparison.
+
+    Returns:
+        As "2 rules added, 1 rule removed, none changed, 12 rules the same."
+    """
+    difference = found.difference
+    counts = (
+        (len(difference.added), "added"),
+        (len(difference.removed), "removed"),
+        (len(difference.changed), "changed"),
+        (difference.same, "the same"),
+    )
+    told = ", ".join(
+        f"{counted(count, 'rule') if count else 'none'} {what}" for count, what in counts
+    )
+    return f"{told[:1].upper()}{told[1:]}."
+
+
+def decided_text(found: Disagreement, *, states: str) -> str:
+    """On how many states two sets decide differently, in a sentence.
+
+    Args:
+        found: The comparison.
+        states: What the states are, as "demonstrated state".
+
+    Returns:
+        As "The two decide 12 of 500 demonstrated states (2.4 %) differently."
+    """
+    of_all = f"of {counted(found.states, states)}"
+    if not found.different:
+        return f"The two decide none {of_all} differently."
+    return f"The two decide {found.different:,} {of_all} ({share_text(found.share)}) differently."
+
+
+def kinds_text(found: Disagreement, dimension: int, names: tuple[str, str]) -> str:
+    """In what way they do, in one action dimension.
+
+    Args:
+        found: The comparison.
+        dimension: Which one.
+        names: What the two sets are called.
+
+    Returns:
+        As "3 where both have a rule, 5 where only the first has one".
+    """
+    contradicting, only_first, only_second = found.kinds(dimension)
+    parts = [
+        f"{count:,} where {where}"
+        for count, where in (
+            (contradicting, "both have a rule and they say different things"),
+            (only_first, f"only {names[0]} has a rule"),
+            (only_second, f"only {names[1]} has a rule"),
+        )
+        if count
+    ]
+    return ", ".join(parts) or "none"
+
+
+def difference_document(
+    found: Disagreement, *, names: tuple[str, str], states_from: str
+) -> dict[str, Any]:
+    """Everything that differs, for JSON.
+
+    Args:
+        found: The comparison.
+        names: What the two sets are called, as their files.
+        states_from: Where the states are from.
+
+    Returns:
+        A document; labels are numbers with their names beside them.
+    """
+    difference = found.difference
+    return {
+        "first": names[0],
+        "second": names[1],
+        "added": [_rule(rule, found.second) for rule in difference.added],
+        "removed": [_rule(rule, found.first) for rule in difference.removed],
+        "changed": [
+            {
+                "what": list(change.what),
+                "text": what_text(change, found),
+                "before": _rule(change.before, found.first),
+                "after": _rule(change.after, found.second),
+            }
+            for change in difference.changed
+        ],
+        "same": difference.same,
+        "states": {
+            "from": states_from,
+            "count": found.states,
+            "different": found.different,
+            "share": found.share,
+        },
+        "dimensions": [
+            {
+                "name": action.name,
+                "different": int(found.differs[:, at].sum()),
+                **found.kinds(at)._asdict(),
+                "says": [*(label_text(one, action) for one in range(action.n_labels)), None],
+                "confusion": found.confusion(at).tolist(),
+            }
+            for at, action in enumerate(found.first.actions)
+        ],
+    }
+
+
+def _rule(rule: Rule, rule_set: RuleSet) -> dict[str, Any]:
+    return {
+        "id": rule.id,
+        "dimension": rule.dimension,
+        "conditions": [condition._asdict() for condition in rule.conditions],
+        "action": rule.action,
+        "enabled": rule.enabled,
+        "pinned": rule.pinned,
+        "origin": rule.origin,
+        "text": sentence(rule, rule_set, evidence=False),
+    }
+
+
+def difference_lines(found: Disagreement, *, names: tuple[str, str], states_from: str) -> list[str]:
+    """The same for reading.
+
+    Args:
+        found: The comparison.
+        names: What the two sets are called, as their files.
+        states_from: Where the states are from, as a sentence.
+
+    Returns:
+        Lines; of each kind the first few rules.
+    """
+    difference = found.difference
+    lines = [
+        f"From {names[0]} ({counted(len(found.first), 'rule')}) to {names[1]} "
+        f"({counted(len(found.second), 'rule')}): {_lower(rows_text(found))}",
+        decided_text(found, states="state"),
+        states_from,
+    ]
+    if found.different:
+        several = len(found.first.actions) > 1
+        for at, action in enumerate(found.first.actions):
+            told = kinds_text(found, at, ("the first", "the second"))
+            lines.append(f"  {action.name}: {told}" if several else f"  {told}")
+    for title, rules, rule_set in (
+        ("Added", difference.added, found.second),
+        ("Removed", difference.removed, found.first),
+    ):
+        if rules:
+            often = sorted(rules, key=lambda rule: -rule.samples)
+            told_rules = [f"{rule_set.name_of(rule)}: {sentence(rule, rule_set)}" for rule in often]
+            lines += ["", f"{title}:", *_first_few(told_rules)]
+    if difference.changed:
+        changes = [
+            f"{before if before == after else f'{before} (now {after})'}: "
+            f"{what_text(change, found)}"
+            for change in difference.changed
+            for before in (found.first.name_of(change.before),)
+            for after in (found.second.name_of(change.after),)
+        ]
+        lines += ["", "Changed:", *_first_few(changes)]
+    return lines
+
+
+def _first_few(lines: list[str]) -> list[str]:
+    shown = [f"  {line}" for line in lines[:_SHOWN]]
+    if len(lines) > _SHOWN:
+        shown.append(f"  and {len(lines) - _SHOWN:,} more; --json lists them all")
+    return shown
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

@@ -1,0 +1,137 @@
+"""Edits and what they change, in words."""
+
+from __future__ import annotations
+
+from sarl_core.mining.editing.edits import Add, Edit, Move, Pin, Remove, Switch, Unpin
+from sarl_core.mining.language import (
+    action_text,
+    conditions_text,
+    counted,
+    label_text,
+    sentence,
+    share_text,
+)
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.shielding.effects import Change, Conflict, Verdicts
+
+
+def edit_text(edit: Edit, rule_set: RuleSet) -> str:
+    """What an edit does, as the end of "undo: ...".
+
+    Args:
+        edit: Any.
+        rule_set: Knows what features, actions and rules are called.
+
+    Returns:
+        As "switch off R12" or "add a rule (always push right)".
+    """
+    rule = rule_set.names.get(edit.rule_id, "a rule")
+    if isinstance(edit, Switch):
+        return f"switch {'on' if edit.on else 'off'} {rule}"
+    if isinstance(edit, Pin):
+        return f"pin {rule}"
+    if isinstance(edit, Unpin):
+        return f"unpin {rule}"
+    if isinstance(edit, Move):
+        return f"move {rule} {'up' if edit.up else 'down'}"
+    if isinstance(edit, Remove):
+        return f"remove {rule}"
+    told = sentence(edit.rule, rule_set, evidence=False).rstrip(".")
+    told = told[:1].lower() + told[1:]
+    return f"add a rule ({told})" if isinstance(edit, Add) else f"change {rule} ({told})"
+
+
+def state_text(rule: Rule) -> str:
+    """What a person made of a rule, for tables.
+
+    Args:
+        rule: Any.
+
+    Returns:
+        As "mined", "pinned", "manual"; with ", off" where it is switched off.
+    """
+    kind = "manual" if rule.origin == "manual" else "pinned" if rule.pinned else "mined"
+    return kind if rule.enabled else f"{kind}, off"
+
+
+def change_text(found: Change, before: Verdicts, after: Verdicts, *, states: str) -> str:
+    """What edits change at once, as a sentence.
+
+    Args:
+        found: Of the two verdicts.
+        before: Of the set without them.
+        after: Of the set with them.
+        states: What the states are, as "demonstrated state".
+
+    Returns:
+        As "3 of 15,000 demonstrated states are decided differently: ...".
+    """
+    of_all = f"of {counted(found.states, states)}"
+    if not found.different:
+        return f"None {of_all} is decided differently."
+    verb = "is" if found.different == 1 else "are"
+    text = f"{found.different:,} {of_all} {verb} decided differently"
+    parts = []
+    if found.newly_covered:
+        parts.append(f"{found.newly_covered:,} had no rule and now have one")
+    if found.newly_uncovered:
+        parts.append(f"{found.newly_uncovered:,} had a rule and now have none")
+    if len(found.by_dimension) > 1:
+        names = [
+            f"{action.name} {count:,}"
+            for action, count in zip(after.rule_set.actions, found.by_dimension, strict=True)
+            if count
+        ]
+        parts.append(f"by action: {', '.join(names)}")
+    text += f" ({'; '.join(parts)})." if parts else "."
+    moved = [
+        f"{name} {verb} from {share_text(old)} to {share_text(new)}"
+        for name, old, new in (
+            ("Coverage", before.coverage, after.coverage),
+            ("fidelity", before.fidelity, after.fidelity),
+        )
+        if old != new and old == old and new == new  # NaN equals nothing
+        for verb in ["rises" if new > old else "falls"]
+    ]
+    if moved:
+        told = " and ".join(moved)
+        text += f" {told[:1].upper()}{told[1:]}."
+    return text
+
+
+def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:
+    """A placed rule that overrules another, as a sentence.
+
+    Args:
+        conflict: Of the rule set.
+        rule_set: The edited one.
+        states: What the states are, as "demonstrated state".
+
+    Returns:
+        As "R1 (push right) takes 12 demonstrated states from R5 (push left): ...".
+    """
+    rule, other = rule_set.rules[conflict.rule], rule_set.rules[conflict.other]
+    dimension = rule_set.actions[rule.dimension]
+    says, said = label_text(rule.action, dimension), label_text(other.action, dimension)
+    name, other_name = rule_set.name_of(rule), rule_set.name_of(other)
+    text = f"{name} ({says}) takes {counted(conflict.states, states)} from {other_name} ({said})"
+    if conflict.right is None or conflict.other_right is None:
+        return f"{text}."
+    return (
+        f"{text}; the expert did as {name} says in {conflict.right:,} of them, as {other_name} "
+        f"says in {conflict.other_right:,}."
+    )
+
+
+def rule_name(rule: Rule, rule_set: RuleSet) -> str:
+    """A rule in one line, where there is little room.
+
+    Args:
+        rule: One of the set.
+        rule_set: Knows the names.
+
+    Returns:
+        As "R12: pole angle > 0.02 rad → push right".
+    """
+    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    return f"{rule_set.name_of(rule)}: {conditions_text(rule, rule_set)} → {does}"

@@ -1,0 +1,402 @@
+"""How sure a rule is, in words: counts, intervals, and what is still missing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MARKER_COLOUR, MUTED_COLOUR
+from sarl_core.mining.language import counted, number_text, share_text
+from sarl_core.mining.rules import Rule
+from sarl_core.mining.validation.episode_counts import Influence
+from sarl_core.mining.validation.evidence import HeldOut, Interval
+from sarl_core.mining.validation.holding_out import (
+    Shortfall,
+    Verdict,
+    episodes_needed,
+    most_shown,
+    verdict,
+)
+from sarl_core.mining.validation.stability import Band, RuleStability
+from sarl_core.mining.written import limit_text
+
+VERDICTS: dict[Verdict, str] = {
+    "below": "too low",
+    "open": "open",
+    "reached": "reached",
+    "unknown": "too few episodes",
+}
+"""What each verdict is called on screen."""
+VERDICT_COLOURS: dict[Verdict, str] = {
+    "below": INTERVENTION_COLOUR,
+    "open": "#4A6FA5",
+    "reached": "#2E8B6F",
+    "unknown": MUTED_COLOUR,
+}
+MOVES = 0.02
+"""How far one episode has to move a share for it to be worth a word."""
+
+
+def range_text(interval: Interval) -> str:
+    """An interval of a share.
+
+    Args:
+        interval: Its ends.
+
+    Returns:
+        As "78 to 99 %".
+    """
+    return " to ".join(_ends(interval))
+
+
+def what_tells(interval: Interval) -> str:
+    """The same for whoever has never heard of an interval.
+
+    Args:
+        interval: Its ends.
+
+    Returns:
+        As "between 78 and 99 % is what that can tell".
+    """
+    return f"between {' and '.join(_ends(interval))} is what that can tell"
+
+
+def _ends(interval: Interval) -> tuple[str, str]:
+    """Both, with as many digits as part them."""
+    low, high = map(share_text, interval)
+    if low == high and interval.low < interval.high:
+        low, high = (share_text(end, decimals=2) for end in interval)
+    return low.removesuffix(" %"), high
+
+
+def mined_text(rule: Rule) -> str:
+    """A rule's confidence on what it was mined from, as "97 % of 412 states"."""
+    states = counted(rule.samples, "state")
+    return f"{share_text(rule.confidence)} of {states}" if rule.samples else "no states"
+
+
+def held_out_text(held_out: HeldOut | None) -> str:
+    """What other episodes say, as "91 % in 14 episodes"; "" where nothing was held out."""
+    if held_out is None:
+        return ""
+    if not held_out.samples:
+        return "no states"
+    if held_out.share is None:  # an older file counted states alone
+        share = share_text(held_out.correct / held_out.samples)
+        return f"{share} of {counted(held_out.samples, 'state')}"
+    return f"{share_text(held_out.share)} in {counted(held_out.episodes, 'episode')}"
+
+
+def evidence_text(rule: Rule) -> str:
+    """A rule's confidence with its counts.
+
+    Args:
+        rule: With what was held out, if anything was.
+
+    Returns:
+        As "97 % of 412 states; held out: 91 % in 14 episodes (96 states)".
+    """
+    held = held_out_text(rule.held_out)
+    if not held:
+        return mined_text(rule)
+    states = ""
+    if rule.held_out is not None and rule.held_out.episodes:
+        states = f" ({counted(rule.held_out.samples, 'state')})"
+    return f"{mined_text(rule)}; held out: {held}{states}"
+
+
+def interval_text(held_out: HeldOut | None) -> str:
+    """The 95 % interval of a mean over episodes.
+
+    Args:
+        held_out: What was counted, None where nothing was.
+
+    Returns:
+        As "78 to 99 %"; "too few episodes" where there is none, "" where nothing was held out.
+    """
+    if held_out is None:
+        return ""
+    found = held_out.interval
+    return "too few episodes" if found is None else range_text(found)
+
+
+def told_by_episodes(held_out: HeldOut, *, what: str, its: str = "its states") -> str:
+    """What other episodes say, for whoever has never heard of an interval.
+
+    Args:
+        held_out: What was counted.
+        what: Was observed of each episode, as "it was right".
+        its: Of what.
+
+    Returns:
+        As "In 14 episodes that it was not mined from, it was right in 91 % of its states on
+        average, and between 78 and 99 % is what that can tell."
+    """
+    if held_out.share is None:
+        if held_out.samples:
+            share = share_text(held_out.correct / held_out.samples)
+            return (
+                f"Of {counted(held_out.samples, 'state')} that it was not mined from, {what} in "
+                f"{share}; the file does not say in how many episodes."
+            )
+        return "There was no state for it in the episodes that it was not mined from."
+    text = (
+        f"In {counted(held_out.episodes, 'episode')} that it was not mined from, {what} in "
+        f"{share_text(held_out.share)} of {its} on average"
+    )
+    if held_out.interval is None:
+        return f"{text}; {'that is' if held_out.episodes > 1 else 'one is'} too few to say more."
+    return f"{text}, and {what_tells(held_out.interval)}."
+
+
+def influence_text(found: Influence | None) -> str:
+    """The episode that alone moves a share.
+
+    Args:
+        found: The one that moves it most; None where there are fewer than two.
+
+    Returns:
+        As "without episode 41 (1,000 steps) it would be 71 % instead of 97 %"; "" where none moves
+        it by `MOVES`.
+    """
+    if found is None or found.moves < MOVES:
+        return ""
+    return (
+        f"without episode {found.episode} ({counted(found.steps, 'step')}) it would be "
+        f"{share_text(found.without)} instead of {share_text(found.share)}"
+    )
+
+
+def moved_text(found: Influence | None) -> str:
+    """The same for a table, as "episode 41: 71 % without it"."""
+    if found is None or found.moves < MOVES:
+        return ""
+    return f"episode {found.episode}: {share_text(found.without)} without it"
+
+
+def more_text(more: float) -> str:
+    """How many episodes are still missing.
+
+    Args:
+        more: What `more_episodes` gives.
+
+    Returns:
+        As "12 more episodes".
+    """
+    if math.isnan(more):
+        return "too few episodes to say"
+    if more == 0:
+        return "enough"
+    if math.isinf(more):
+        return "never at this rate"
+    return f"{int(more):,} more {'episode' if more == 1 else 'episodes'}"
+
+
+def shortfall_text(found: Shortfall) -> str:
+    """How many rules reach a lower bound, and why the others do not.
+
+    Args:
+        found: Of some rules.
+
+    Returns:
+        As "2 of 9 rules reach 80 %; 4 were met in too few held-out episodes to show that even if
+        never wrong, and 3 were not right often enough".
+    """
+    reach = "reaches" if found.reached == 1 else "reach"
+    told = f"{found.reached:,} of {counted(found.rules, 'rule')} {reach} {share_text(found.least)}"
+    if found.reached == found.rules:
+        return told
+    were = "was" if found.too_few == 1 else "were"
+    few = f"{found.too_few:,} {were} met in too few held-out episodes to show that even if never"
+    were = "was" if found.wrong == 1 else "were"
+    return f"{told}; {few} wrong, and {found.wrong:,} {were} not right often enough"
+
+
+def remedy_text(found: Shortfall, there: int, *, in_command: bool = False) -> str:
+    """Why no rule reaches a lower bound, and what to do.
+
+    Args:
+        found: Of some rules.
+        there: Episodes in all, the held-out ones among them.
+        in_command: Whether what to do is written as options of `mine`.
+
+    Returns:
+        As "12 held-out episodes can show at most 87.8 %, even of a rule that is never wrong; hold
+        out at least 16 of the 62 (26 %), or ask for less: the best of these rules shows 78.1 %";
+        "" where some rule reaches it, or there is no rule.
+    """
+    if found.reached or not found.rules:
+        return ""
+    least = f" (--lower-bound {math.floor(100 * found.best) / 100:g})" if in_command else ""
+    shows = f"the best of these rules shows {share_text(found.best, decimals=1)}"
+    most = most_shown(found.episodes)
+    if most >= found.least:
+        more = "hold out" if 2 * found.episodes < there else "demonstrate"
+        more = f"{more} more episodes, so that each rule is met in more of those held out"
+        return f"{shows}; ask for less{least}, or {more}" if found.best else more
+    best = f"ask for less: {shows}{least}" if found.best else ""
+    wanted = share_text(found.least)
+    told = (
+        f"{counted(found.episodes, 'held-out episode')} can show at most "
+        f"{share_text(most, decimals=1)}, even of a rule that is never wrong"
+        if most
+        else f"{counted(found.episodes, 'held-out episode')} can show nothing of a rule"
+    )
+    or_best = f", or {best}" if best else ""
+    (needed,) = episodes_needed(np.ones(1), np.zeros(1), found.least).tolist()
+    if math.isinf(needed):
+        return f"{told}, and no number of them can show {wanted}" + (best and f"; {best}")
+    if 2 * needed > there:  # the other half has to be mined from
+        return (
+            f"{told}, and {wanted} takes at least {needed:,.0f}: too many of the {there:,} there "
+            f"are; demonstrate more{or_best}"
+        )
+    percent = math.ceil(100 * needed / there)
+    share = f"--hold-out {percent / 100:g}" if in_command else f"{percent} %"
+    return f"{told}; hold out at least {needed:,.0f} of the {there:,} ({share}){or_best}"
+
+
+def never_text(missing: Sequence[float]) -> str:
+    """Why no further episodes would make any rule certain.
+
+    Args:
+        missing: What `more_episodes` gives of each rule.
+
+    Returns:
+        As "No rule would reach it: 3 never do at this rate, and 5 were met in too few held-out
+        episodes to say."; "" where one would.
+    """
+    if any(map(math.isfinite, missing)):
+        return ""
+    unknown = sum(map(math.isnan, missing))
+    never = len(missing) - unknown
+    parts = []
+    if never:
+        parts.append(f"{never:,} never {'does' if never == 1 else 'do'} at this rate")
+    if unknown:
+        were = "was" if unknown == 1 else "were"
+        parts.append(f"{unknown:,} {were} met in too few held-out episodes to say")
+    return f"No rule would reach it: {', and '.join(parts)}."
+
+
+def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int]:
+    """How many rules have each verdict.
+
+    Args:
+        rules: With what was held out, if anything was.
+        threshold: The minimum confidence.
+
+    Returns:
+        One count a verdict.
+    """
+    counts: dict[Verdict, int] = dict.fromkeys(VERDICTS, 0)
+    for rule in rules:
+        counts[verdict(rule, threshold)] += 1
+    return counts
+
+
+def band_text(band: Band, feature: Feature) -> str:
+    """How far one threshold of a rule moves.
+
+    Args:
+        band: What was found.
+        feature: Its name, its unit and what is known of the threshold.
+
+    Returns:
+        As "pole angle > 0.0213 rad (0.018 to 0.025)".
+    """
+    sign = "≤" if band.op == "<=" else ">"
+    limit = limit_text(band.threshold, feature)
+    own = f"{feature.name} {sign} {limit}{f' {feature.unit}' if feature.unit else ''}"
+    if not band.found:
+        return f"{own} (not asked again)"
+    low = number_text(band.low, apart_from=band.high)
+    high = number_text(band.high, apart_from=band.low)
+    return f"{own} ({low})" if band.low == band.high else f"{own} ({low} to {high})"
+
+
+def stability_text(one: RuleStability, rounds: int) -> str:
+    """How often a rule came back.
+
+    Args:
+        one: What was found of it.
+        rounds: How often episodes were drawn.
+
+    Returns:
+        As "came back in 27 of 30 rounds".
+    """
+    return f"came back in {round(one.returns * rounds)} of {counted(rounds, 'round')}"
+
+
+_STYLE = """<style>
+.sarl-sure { width: 100%; max-width: 640px; font-size: 0.82rem; margin: 0.1rem 0 0.2rem; }
+.sarl-sure div { display: flex; align-items: center; gap: 0.6rem; line-height: 1.5; }
+.sarl-sure b { flex: 0 0 5.6rem; font-weight: 400; opacity: 0.75; }
+.sarl-sure span.t { position: relative; flex: 1 1 auto; height: 14px; min-width: 90px; }
+.sarl-sure span.t::before { content: ''; position: absolute; left: 0; right: 0; top: 6.5px;
+  height: 1px; background: rgba(128,140,150,0.4); }
+.sarl-sure i { position: absolute; }
+.sarl-sure i.w { top: 4px; height: 6px; border-radius: 3px; min-width: 2px; }
+.sarl-sure i.p { top: 1px; width: 12px; height: 12px; margin-left: -6px; border-radius: 50%; }
+.sarl-sure i.m { top: -1px; bottom: -1px; width: 2px; margin-left: -1px; background: MARKER; }
+.sarl-sure em { flex: 0 0 10.5rem; font-style: normal; font-variant-numeric: tabular-nums; }
+</style>""".replace("MARKER", MARKER_COLOUR)
+
+
+def evidence_bar(rule: Rule, threshold: float) -> str:
+    """What is known of a rule over one scale, with the minimum confidence marked.
+
+    Args:
+        rule: With what was held out, if anything was.
+        threshold: The minimum confidence.
+
+    Returns:
+        HTML without script, styled in place: a dot for each share, and for what was held out a
+        whisker, its interval; "" where no pair is the rule's.
+    """
+    if not rule.samples:
+        return ""
+    held = rule.held_out
+    share = None if held is None else held.share
+    interval = None if held is None else held.interval
+    lowest = min(
+        value
+        for value in (threshold, rule.confidence, share, *(interval or ()))
+        if value is not None
+    )
+    # To the next tenth below, so that dots can be told apart where all is near to one.
+    floor = float(max(math.floor(lowest * 10 - 0.5) / 10, 0.0))
+
+    def place(value: float) -> float:
+        return 100 * (value - floor) / (1 - floor)
+
+    def line(name: str, share: float, interval: Interval | None, ink: str, text: str) -> str:
+        whisker = ""
+        if interval is not None:
+            low, high = place(interval.low), place(interval.high)
+            whisker = (
+                f'<i class="w" style="left:{low:.2f}%;width:{high - low:.2f}%;'
+                f'background:{ink}"></i>'
+            )
+        return (
+            f"<div><b>{escape(name)}</b>"
+            f'<span class="t" title="{escape(text)}">'
+            f'<i class="m" style="left:{place(threshold):.2f}%"></i>{whisker}'
+            f'<i class="p" style="left:{place(share):.2f}%;background:{ink}"></i></span>'
+            f"<em>{escape(text)}</em></div>"
+        )
+
+    lines = [line("mined from", rule.confidence, None, MUTED_COLOUR, share_text(rule.confidence))]
+    if share is not None:
+        ink = VERDICT_COLOURS[verdict(rule, threshold)]
+        lines.append(line("held out", share, interval, ink, interval_text(held)))
+    scale = (
+        f'<div style="opacity:0.6"><b></b><span class="t" style="display:flex;justify-content:'
+        f'space-between;height:auto"><small>{share_text(floor)}</small><small>100 %</small></span>'
+        "<em></em></div>"
+    )
+    return f'{_STYLE}<div class="sarl-sure">{"".join(lines)}{scale}</div>'

@@ -1,0 +1,1 @@
+"""Rule sets that are mined again, where they failed."""

@@ -1,0 +1,400 @@
+"""Demonstrations where they are missing (the paper's Prospects): dataset aggregation for rules.
+
+The rules act, the expert says what it would have done in the states they lead to, and rules are
+grown again from all answers (DAgger, Ross et al. 2011). Of all rounds the best is found by
+successive halving, and reported on episodes that nothing was chosen by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.improving.plan import Plan
+from sarl_core.improving.questions import Answers, ask, importance, scores
+from sarl_core.improving.refinement import generation_cost, generation_seed, refine
+from sarl_core.improving.successive_halving import planned_episodes, successive_halving
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.tree import PolicyTree
+from sarl_core.progress import CancelledError, Progress, report
+from sarl_core.rollouts import seeds
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
+from sarl_core.rollouts.seeds import RunSeeds
+from sarl_core.shielding.shield import Shield
+
+_FIRST_VALIDATION = 16
+_MARKS = 8  # points on the way of a refinement from which the best is chosen
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one round brought.
+
+    Attributes:
+        number: Counted from 1.
+        pairs: State-action pairs that its rules were grown from.
+        rules: Number of rules.
+        returns: Of its episodes, in which the rules shielded a novice, (E,).
+        coverage: Share of the met states in which some rule applied.
+        disagreement: Share of the covered decisions in which the expert would do otherwise.
+        needed: Share of the met states that no rule covers, or where the expert would do
+            otherwise in some action dimension.
+        cut: How many of its episodes were cut off before their end.
+    """
+
+    number: int
+    pairs: int
+    rules: int
+    returns: NDArray[np.float64]
+    coverage: float
+    disagreement: float
+    needed: float
+    cut: int = 0
+
+    @property
+    def mean_return(self) -> float:
+        """Mean of the returns."""
+        return float(self.returns.mean())
+
+
+@dataclass(frozen=True)
+class Aggregation:
+    """A finished (or a stopped) aggregation.
+
+    Attributes:
+        env_id: Environment.
+        plan: What was to be done.
+        rule_set: The best that was found.
+        trees: Of its rules, one an action dimension, with the pairs it was grown from.
+        rounds: All that were finished.
+        chosen: Number of the round whose rules are the best.
+        validation_mean: Mean return by which these very rules were chosen; too good by what luck
+            it had. None where the run was stopped before.
+        refined: Whether its thresholds and labels were moved afterwards.
+        reported: Episodes that nothing was chosen by; None where the run was stopped before.
+        demonstrations: All pairs of the chosen round.
+        seeds: Which episodes served for what.
+    """
+
+    env_id: str
+    plan: Plan
+    rule_set: RuleSet
+    trees: tuple[PolicyTree, ...]
+    rounds: tuple[Round, ...]
+    chosen: int
+    validation_mean: float | None
+    refined: bool
+    reported: Episodes | None
+    demonstrations: Demonstrations
+    seeds: RunSeeds
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a person should know of how the episodes came about, as clauses."""
+        cut, of = sum(one.cut for one in self.rounds), sum(len(one.returns) for one in self.rounds)
+        steps = self.plan.max_steps or MAX_STEPS
+        said = (
+            (cut_text(self.env_id, cut, of, steps, episodes="episodes of the rounds"),)
+            if cut
+            else ()
+        )
+        return (*said, *(() if self.reported is None else self.reported.remarks))
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it was not stopped before its report."""
+        return self.reported is not None
+
+
+def aggregate(
+    start: Demonstrations,
+    plan: Plan,
+    *,
+    env_id: str | None = None,
+    agent: str | Agent = "novice",
+    expert: str | Agent = "expert",
+    jobs: int = 1,
+    progress: Progress | None = None,
+    watch: Callable[[Round], None] | None = None,
+) -> Aggregation:
+    """Improve demonstrations and rules in turns.
+
+    Args:
+        start: What the expert has shown so far.
+        plan: How many rules, rounds and episodes.
+        env_id: Environment; that of `start` where not given.
+        agent: Who is shielded, as in `make_agent`.
+        expert: Who is asked: a trained policy.
+        jobs: Processes; changes the speed, never the result.
+        progress: Called with (units done, in all); returning False stops.
+        watch: Called after every round.
+
+    Returns:
+        The best rules. Stopped after a first round (by `progress`, or by Ctrl-C), every part
+        that was finished counts: the choice among the rounds, the refinement as far as it went.
+
+    Raises:
+        InputError: If agent, expert and environment do not fit, or the expert acts at random.
+        CancelledError: If `progress` returned False before the first round was finished.
+    """
+    env_id = env_id or start.env_id
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    run = _Run(start, plan, env_id, make_agent(agent, env_id), make_agent(expert, env_id), jobs)
+    clock = _Clock(run.planned_units(), progress)
+    try:
+        for number in range(1, plan.rounds + 1):
+            run.round(number, clock)
+            if watch is not None:
+                watch(run.rounds[-1])
+        run.select(clock)
+        run.refine(clock)
+        run.report(clock)
+    except (CancelledError, KeyboardInterrupt):
+        if not run.rounds:
+            raise
+    return run.result()
+
+
+class _Clock:
+    """Counts episodes over all parts of a run."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self.total, self.progress, self.done = total, progress, 0
+
+    def tick(self, units: int = 1) -> None:
+        self.done += units
+        report(self.progress, min(self.done, self.total), self.total)
+
+    def of(self) -> Progress:
+        """For work that counts its own episodes from 0."""
+        before = self.done
+
+        def told(done: int, _: int) -> None:
+            self.tick(before + done - self.done)
+
+        return told
+
+
+@dataclass(frozen=True)
+class _Choice:
+    """The best so far.
+
+    Attributes:
+        index: Of its round, counted from 0.
+        trees: Of its rules.
+        mean: Of the validation episodes that these rules were chosen by; None for none.
+        refined: Whether the trees are no longer those of the round.
+    """
+
+    index: int
+    trees: tuple[PolicyTree, ...]
+    mean: float | None = None
+    refined: bool = False
+
+
+class _Run:
+    """The rounds so far, and what was made of them: whoever stops it loses nothing finished."""
+
+    def __init__(
+        self, start: Demonstrations, plan: Plan, env_id: str, agent: Agent, expert: Agent, jobs: int
+    ) -> None:
+        self.plan, self.env_id, self.jobs = plan, env_id, jobs
+        self.agent, self.expert = agent, expert
+        self.answers = Answers(env_id, expert, start)
+        self.rounds: list[Round] = []
+        self.trees: list[tuple[PolicyTree, ...]] = []
+        self.choice: _Choice | None = None
+        self.reported: Episodes | None = None
+        self.seeds = RunSeeds(rounds=self.seed(seeds.ROUNDS))
+
+    def planned_units(self) -> int:
+        plan = self.plan
+        refined = plan.generations * generation_cost() + (
+            planned_episodes(_MARKS + 1, _FIRST_VALIDATION, plan.validation)
+            if plan.generations
+            else 0
+        )
+        return (
+            plan.rounds * plan.episodes
+            + planned_episodes(plan.rounds, _FIRST_VALIDATION, plan.validation)
+            + refined
+            + plan.report
+        )
+
+    def grow(self, index: int) -> tuple[PolicyTree, ...]:
+        """The trees of a round (counted from 0)."""
+        pairs = self.answers.pairs(index)
+        label_scores = scores(self.expert, pairs.observations)
+        ways: dict[str, Any] = {}
+        if label_scores is not None:
+            # Two ways to say what matters, in turns; which is better is seen, not known.
+            ways = {"scores": label_scores} if index % 2 else {"weights": importance(label_scores)}
+        return grow_budgeted_trees(
+            pairs,
+            max_rules=self.plan.max_rules,
+            divider=self.plan.divider,
+            seed=self.plan.seed + index,
+            **ways,
+        )
+
+    def rules(self, trees: tuple[PolicyTree, ...]) -> RuleSet:
+        at = self.plan.thresholds
+        if at is None:
+            return leaf_rules(trees)
+        return mine_rules(
+            trees,
+            supp_min=at.support,
+            conf_min=at.confidence,
+            lift_min=at.lift,
+            max_depth=at.max_depth,
+        )
+
+    def shielded(
+        self, rules: RuleSet, seed: int, episodes: int, clock: _Clock, *, keep_steps: bool = False
+    ) -> Episodes:
+        return rollout(
+            self.env_id,
+            self.agent,
+            shield=Shield(rules, projection=self.plan.projection),
+            episodes=episodes,
+            seed=seed,
+            jobs=self.jobs,
+            keep_steps=keep_steps,
+            max_steps=self.plan.max_steps,
+            progress=clock.of(),
+        )
+
+    def seed(self, first: int) -> int:
+        return seeds.of_run(first, self.plan.seed)
+
+    def round(self, number: int, clock: _Clock) -> None:
+        trees = self.grow(number - 1)
+        rules = self.rules(trees)
+        found = self.shielded(
+            rules,
+            self.seeds.rounds + (number - 1) * seeds.SEEDS_A_ROUND,
+            self.plan.episodes,
+            clock,
+            keep_steps=True,
+        )
+        table = found.steps
+        assert table is not None
+        wanted = ask(self.expert, table.observation)
+        covered = table.rules >= 0
+        said = np.array([rule.action for rule in rules.rules] or [0])[np.maximum(table.rules, 0)]
+        labels = np.stack(
+            [
+                dimension.labels_of(column)
+                for dimension, column in zip(rules.actions, wanted.T, strict=True)
+            ],
+            axis=1,
+        )
+        otherwise = covered & (said != labels)
+        self.trees.append(trees)
+        self.rounds.append(
+            Round(
+                number=number,
+                pairs=trees[0].source.steps,
+                rules=len(rules),
+                returns=found.returns,
+                coverage=float(covered.any(axis=1).mean()),
+                disagreement=float(otherwise.sum() / max(int(covered.sum()), 1)),
+                needed=float((otherwise | ~covered).any(axis=1).mean()),
+                cut=int(found.cut.sum()),
+            )
+        )
+        self.answers.add(table, wanted, seed=self.seed(number))
+
+    def select(self, clock: _Clock) -> None:
+        """Choose the best round."""
+        first = self.seed(seeds.VALIDATION)
+        best, mean = self.best_of([self.rules(trees) for trees in self.trees], first, clock)
+        self.choice = _Choice(best, self.trees[best], mean)
+        self.seeds = self.seeds._replace(validation=first)
+
+    def best_of(self, candidates: list[RuleSet], seed: int, clock: _Clock) -> tuple[int, float]:
+        """The best candidate, and its mean return over all episodes that it was given."""
+        found = successive_halving(
+            len(candidates),
+            lambda index, first, count: (
+                self.shielded(candidates[index], first, count, clock).returns
+            ),
+            seed=seed,
+            first=_FIRST_VALIDATION,
+            most=self.plan.validation,
+        )
+        return found.best, float(found.means[found.best])
+
+    def refine(self, clock: _Clock) -> None:
+        """Move thresholds and labels of the best rules, and keep what is better."""
+        start = self.choice
+        assert start is not None
+        if not self.plan.generations:
+            return
+        first = generation_seed(self.plan.seed, 1)
+
+        def better(trees: tuple[PolicyTree, ...]) -> None:
+            # By the episodes of the search only: for who stops before the second validation.
+            self.choice = _Choice(start.index, trees, refined=True)
+            self.seeds = self.seeds._replace(refinement=first)
+
+        marks = refine(
+            self.env_id,
+            start.trees,
+            self.answers.pairs(start.index),
+            agent=self.agent,
+            projection=self.plan.projection,
+            generations=self.plan.generations,
+            marks=_MARKS,
+            max_steps=self.plan.max_steps,
+            seed=self.plan.seed,
+            jobs=self.jobs,
+            progress=clock.of(),
+            better=better,
+        )
+        self.seeds = self.seeds._replace(refinement=first)
+        candidates = [start.trees, *marks]
+        # On other episodes than those of the rounds: the first candidate was chosen by them.
+        second = self.seed(seeds.SECOND_VALIDATION)
+        found, mean = self.best_of([self.rules(one) for one in candidates], second, clock)
+        self.choice = _Choice(start.index, candidates[found], mean, refined=found > 0)
+        self.seeds = self.seeds._replace(second_validation=second)
+
+    def report(self, clock: _Clock) -> None:
+        """Episodes that nothing was chosen by."""
+        assert self.choice is not None
+        first = self.seed(seeds.REPORT)
+        rules = self.rules(self.choice.trees)
+        self.reported = self.shielded(rules, first, self.plan.report, clock)
+        self.seeds = self.seeds._replace(report=first)
+
+    def result(self) -> Aggregation:
+        choice = self.choice
+        if choice is None:  # stopped early: the episodes of the rounds are all there is
+            best = int(np.argmax([found.mean_return for found in self.rounds]))
+            choice = _Choice(best, self.trees[best])
+        pairs = self.answers.pairs(choice.index)
+        return Aggregation(
+            env_id=self.env_id,
+            plan=self.plan,
+            rule_set=with_boxes(self.rules(choice.trees), pairs),
+            trees=choice.trees,
+            rounds=tuple(self.rounds),
+            chosen=choice.index + 1,
+            validation_mean=choice.mean,
+            refined=choice.refined,
+            reported=self.reported,
+            demonstrations=pairs,
+            seeds=self.seeds,
+        )

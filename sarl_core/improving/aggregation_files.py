@@ -1,0 +1,192 @@
+"""What an aggregation leaves behind: the rules, and the card that says how they came about."""
+
+from __future__ import annotations
+
+import json
+import platform
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sarl_core.errors import WorkError
+from sarl_core.files import whole_file
+from sarl_core.improving.aggregation import Aggregation, Round
+from sarl_core.mining.rule_files import write_rules
+from sarl_core.rollouts.statistics import summarise
+
+
+def card_path(rules: Path) -> Path:
+    """Where the card of a rule file stands: `name.card.json` beside `name.json`."""
+    return rules.with_suffix(".card.json")
+
+
+def stopped_path(out: Path) -> Path:
+    """Where to write what a stopped run has found, so that nothing finished is lost.
+
+    Args:
+        out: Where it would have been written at its end.
+
+    Returns:
+        `out` if there is no such file and no card of one; else `name.stopped.json` beside it.
+    """
+    if not out.exists() and not card_path(out).exists():
+        return out
+    return out.with_name(f"{out.stem}.stopped{out.suffix}")
+
+
+class Saved(NamedTuple):
+    """What was written.
+
+    Attributes:
+        rules: The rule file.
+        card: What its card says.
+    """
+
+    rules: Path
+    card: dict[str, Any]
+
+
+def save_aggregation(found: Aggregation, out: Path, *, command: str) -> Saved:
+    """Write the rule file and its card: both, or neither.
+
+    Args:
+        found: To be kept.
+        out: The rule file, `.json`. That of a stopped run takes no other's place: see
+            `stopped_path`.
+        command: That makes it again; stands in the card.
+
+    Returns:
+        Where the rules are, and the card.
+
+    Raises:
+        InputError: If the folder does not exist.
+        WorkError: If it cannot be written to.
+    """
+    if not found.is_finished:
+        out = stopped_path(out)
+    for path in (out, card_path(out)):
+        if path.is_dir():
+            raise WorkError(f"{path} is a folder and cannot be written; choose another name")
+    card = aggregation_card(found, command=command)
+    # Both are written before the first takes its place.
+    with whole_file(out) as rules:
+        write_rules(found.rule_set, rules)
+        with whole_file(card_path(out)) as beside:
+            beside.write_text(json.dumps(card, indent=2) + "\n", encoding="utf-8")
+    return Saved(out, card)
+
+
+def chosen_by(found: Aggregation) -> str:
+    """What the rules were chosen by, as it stands after "chosen by".
+
+    Args:
+        found: Finished or stopped.
+    """
+    up_to = f"the mean of up to {found.plan.validation} episodes"
+    if found.seeds.validation is None:
+        return "the episodes of their round only"
+    if found.seeds.second_validation is not None:
+        return f"{up_to} of a second validation"
+    if found.refined:
+        return f"{up_to} of validation, then by those of a refinement that was not finished"
+    return f"{up_to} of validation"
+
+
+def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
+    """How rules came about and what they achieve, ready for JSON.
+
+    Args:
+        found: The aggregation.
+        command: That makes it again.
+
+    Returns:
+        `seeds` has the first seed of every part of the run. `validation_mean` and what is said of
+        a part are null where the run was stopped before.
+    """
+    import gymnasium
+    import sklearn
+
+    plan, rules = found.plan, found.rule_set
+    return {
+        "what": f"{_most_rules(found)} rules an action dimension for {found.env_id}",
+        "command": command,
+        "env_id": found.env_id,
+        "rules": len(rules),
+        "rules_per_dimension": [len(rules.of_dimension(i)) for i in range(len(rules.actions))],
+        "cut": rules.cut,
+        "mean_length": round(rules.mean_length, 2),
+        "fidelity": round(rules.fidelity, 4),
+        "budget": plan.max_rules,
+        "divider": plan.divider,
+        "projection": plan.projection,
+        "seed": plan.seed,
+        **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
+        "episodes_a_round": plan.episodes,
+        "generations": plan.generations,
+        "rounds": [_round(one) for one in found.rounds],
+        "chosen_round": found.chosen,
+        "refined": found.refined,
+        "chosen_by": chosen_by(found),
+        "validation_mean": None
+        if found.validation_mean is None
+        else round(found.validation_mean, 2),
+        "reported_on": f"{plan.report} episodes used for nothing else"
+        if found.is_finished
+        else None,
+        "reported": _reported(found),
+        "seeds": found.seeds._asdict(),
+        "demonstrations": {
+            "digest": rules.source.digest,
+            "steps": rules.source.steps,
+            "episodes": rules.source.episodes,
+        },
+        "versions": {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "gymnasium": gymnasium.__version__,
+            "scikit-learn": sklearn.__version__,
+        },
+        "made": datetime.now(UTC).date().isoformat(),
+    }
+
+
+def _most_rules(found: Aggregation) -> int:
+    rules = found.rule_set
+    return max(len(rules.of_dimension(index)) for index in range(len(rules.actions)))
+
+
+def _round(one: Round) -> dict[str, Any]:
+    spread = summarise(one.returns)
+    return {
+        "number": one.number,
+        "pairs": one.pairs,
+        "rules": one.rules,
+        "mean": round(spread.mean, 2),
+        "std": round(spread.std, 2),
+        "coverage": round(one.coverage, 4),
+        "disagreement": round(one.disagreement, 4),
+    }
+
+
+def _reported(found: Aggregation) -> dict[str, Any] | None:
+    episodes = found.reported
+    if episodes is None:
+        return None
+    spread = summarise(episodes.returns)
+    return {
+        "episodes": len(episodes),
+        "mean": round(spread.mean, 2),
+        "std": round(spread.std, 2),
+        "iqm": round(spread.iqm, 2),
+        "iqm_low": round(spread.low, 2),
+        "iqm_high": round(spread.high, 2),
+        "min": round(float(episodes.returns.min()), 2),
+        "max": round(float(episodes.returns.max()), 2),
+        **{
+            name: value if isinstance(value, int) else round(value, 4)
+            for name, value in episodes.summary().items()
+            if name.startswith("failure") or name in ("cut", "intervention_rate", "freedom")
+        },
+    }

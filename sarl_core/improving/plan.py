@@ -1,0 +1,74 @@
+"""What an aggregation is to do, and what cannot be done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sarl_core.errors import InputError
+from sarl_core.improving.refinement import EPISODES
+from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.mining.rules import Thresholds
+from sarl_core.rollouts.seeds import (
+    MOST_EPISODES_A_ROUND,
+    MOST_ROUNDS,
+    MOST_VALIDATION,
+    REFINEMENT,
+    REPORT,
+)
+from sarl_core.shielding.projection import Projection
+
+_MOST_GENERATIONS = (REPORT - REFINEMENT) // EPISODES - 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What an aggregation is to do.
+
+    Attributes:
+        max_rules: Most rules of each action dimension.
+        rounds: How often the rules act and the expert answers.
+        episodes: Episodes a round.
+        thresholds: Cut the trees there; None makes every leaf a rule.
+        divider: Number of intervals of continuous dimensions.
+        projection: How the shield replaces a continuous action.
+        generations: Of the refinement that follows; 0 for none.
+        validation: Episodes by which the best of all is chosen in the end.
+        report: Episodes of the final report.
+        seed: Another one gives other episodes.
+        max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where
+            None.
+    """
+
+    max_rules: int
+    rounds: int = 20
+    episodes: int = 40
+    thresholds: Thresholds | None = None
+    divider: int = 2
+    projection: Projection = "centre"
+    generations: int = 0
+    validation: int = 256
+    report: int = 100
+    seed: int = 0
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be done.
+
+        Raises:
+            InputError: If a number is out of range.
+        """
+        for name, value, least, most in (
+            ("budget of rules", self.max_rules, MIN_RULES, None),
+            ("number of rounds", self.rounds, 1, MOST_ROUNDS),
+            ("number of episodes a round", self.episodes, 1, MOST_EPISODES_A_ROUND),
+            ("number of generations", self.generations, 0, _MOST_GENERATIONS),
+            ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
+            ("number of report episodes", self.report, 1, None),
+            ("seed", self.seed, 0, None),
+            ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, None),
+        ):
+            if value < least:
+                raise InputError(f"the {name} is {value}; give {least} or more")
+            if most is not None and value > most:
+                # Beyond, what is chosen by would be what it is reported on.
+                raise InputError(f"the {name} is {value:,}; give {most:,} or fewer")

@@ -1,0 +1,185 @@
+"""What an expert says about states it is asked about, and how much each answer matters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.agents.agent import Agent, PolicyAgent
+from sarl_core.agents.spaces import Actions
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import in_order_of
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import InputError
+from sarl_core.rollouts.steps import StepTable
+
+# More states of one round are too alike to be worth their time.
+_PAIRS_A_ROUND = 25_000
+# Rules learn from what was shown at first and from where the latest rules led: what earlier ones
+# got into, the present ones may never meet.
+_ROUNDS_KEPT = 12
+# A label with less than 2 % is one the expert does not want; how much less says nothing.
+_LEAST_LOG_PROBABILITY = -4.0
+
+
+def ask(expert: Agent, observations: NDArray[np.float32]) -> Actions:
+    """What the expert would do.
+
+    Args:
+        expert: Deterministic.
+        observations: Shape (B, d), float32.
+
+    Returns:
+        Its actions with one column a dimension, (B, m).
+
+    Raises:
+        InputError: If it does not always do the same in the same state.
+    """
+    if expert.n_uniforms:
+        raise InputError(
+            f"the agent {expert.name!r} acts at random and cannot be asked what is right; "
+            "name a trained policy as the expert"
+        )
+    return expert.act(observations, None)
+
+
+def scores(expert: Agent, observations: NDArray[np.float32]) -> NDArray[np.float64] | None:
+    """How good the expert holds each label to be.
+
+    Args:
+        expert: An agent.
+        observations: Shape (B, d), float32.
+
+    Returns:
+        For a policy with one discrete dimension the log-probabilities, bounded below, or the
+        values of a greedy one relative to the best, (B, labels); None for any other.
+    """
+    if not isinstance(expert, PolicyAgent) or not expert.policy.is_discrete:
+        return None
+    if len(expert.policy.label_counts) != 1:
+        return None
+    if expert.policy.head == "greedy":
+        values = expert.policy.outputs(observations).astype(np.float64)
+        return np.asarray(values - values.max(axis=1, keepdims=True))
+    return np.maximum(expert.policy.log_probabilities(observations), _LEAST_LOG_PROBABILITY)
+
+
+def importance(label_scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much it matters what is done: the gap between the best and the worst label.
+
+    Args:
+        label_scores: As `scores` gives them, (B, labels).
+
+    Returns:
+        Shape (B,), with mean 1 where there is any gap at all.
+    """
+    gap = np.ptp(label_scores, axis=1)
+    mean = float(gap.mean())
+    return np.asarray(gap / mean) if mean > 0 else np.ones(len(gap))
+
+
+def answered(
+    env_id: str,
+    expert: Agent,
+    observations: NDArray[np.float32],
+    actions: Actions,
+    episodes: NDArray[np.int64],
+    steps: NDArray[np.int64],
+) -> Demonstrations:
+    """Demonstrations of the expert's answers in states that others have met.
+
+    Args:
+        env_id: The environment.
+        expert: Who answered.
+        observations: Shape (N, d), float32.
+        actions: Its answers, (N, m).
+        episodes: Of each state, ascending, (N,).
+        steps: Within the episode, (N,).
+
+    Returns:
+        With the environment's names and bounds.
+    """
+    description = describe_environment(env_id)
+    low, high = description.action_low, description.action_high
+    bounds: dict[str, Any] = {}
+    if low is not None and high is not None and np.isfinite([*low, *high]).all():
+        bounds = {"action_low": low, "action_high": high, "bounds_from": "action space"}
+    return Demonstrations(
+        observations=observations,
+        actions=actions[:, 0] if description.action_shape == () else actions,
+        episodes=episodes,
+        steps=steps,
+        feature_names=description.feature_names,
+        feature_units=description.feature_units,
+        action_names=description.action_names,
+        label_names=description.label_names,
+        label_first=description.label_first,
+        env_id=env_id,
+        agent=expert.name,
+        **bounds,
+    )
+
+
+class Answers:
+    """What an expert said, at first and round by round."""
+
+    def __init__(self, env_id: str, expert: Agent, start: Demonstrations) -> None:
+        """Ask about the states that were demonstrated.
+
+        Args:
+            env_id: The environment.
+            expert: Who is asked.
+            start: What was shown so far; the expert answers anew.
+
+        Raises:
+            InputError: If the expert does not always do the same in the same state, or the
+                demonstrations are of other features.
+        """
+        start = in_order_of(start, describe_environment(env_id)).demonstrations
+        self._env_id, self._expert = env_id, expert
+        self._observations = [start.observations]
+        self._actions: list[Actions] = [ask(expert, start.observations)]
+        self._episodes = [start.episodes]
+        self._steps = [np.arange(len(start)) if start.steps is None else start.steps]
+
+    def add(self, table: StepTable, actions: Actions, *, seed: int) -> None:
+        """Take up the states of one more round.
+
+        Args:
+            table: The N steps of its episodes.
+            actions: What the expert says about them, (N, m).
+            seed: For choosing some of them, where they are too many.
+        """
+        rows = np.arange(len(table))
+        if len(rows) > _PAIRS_A_ROUND:
+            generator = np.random.default_rng(seed)
+            rows = np.sort(generator.choice(rows, _PAIRS_A_ROUND, replace=False))
+        self._observations.append(table.observation[rows])
+        self._actions.append(actions[rows])
+        self._episodes.append(self._episodes[-1][-1] + 1 + table.episode[rows])
+        self._steps.append(table.step[rows])
+
+    def pairs(self, rounds: int) -> Demonstrations:
+        """What is learned from after so many rounds.
+
+        Args:
+            rounds: How many have been taken up by then.
+
+        Returns:
+            The pairs of the start and of the latest rounds.
+        """
+        kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
+
+        def column(parts: list[Any]) -> Any:
+            return np.concatenate([parts[index] for index in kept])
+
+        return answered(
+            self._env_id,
+            self._expert,
+            column(self._observations),
+            column(self._actions),
+            column(self._episodes),
+            column(self._steps),
+        )

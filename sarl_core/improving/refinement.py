@@ -1,0 +1,237 @@
+"""Moving the thresholds and labels of a few rules to where they achieve more.
+
+A tree that imitates its expert is not yet the best tree of its size. An evolution strategy
+(Salimans et al. 2017) shakes all thresholds and labels at once, in pairs of opposite directions
+and on the same episodes, and follows those that bring more return. The queries' features and
+their order stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.agents.agent import Agent
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
+from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.progress import Progress, report
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.seeds import REFINEMENT, of_run
+from sarl_core.rollouts.workers import parallel
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Shield
+
+PAIRS = 12  # of opposite directions a generation
+EPISODES = 16  # for each direction, the same for all of a generation
+
+_SHAKE = 0.15  # in units of half the spread of a feature where it is asked about
+_STEP = 0.15  # of a generation, in units of the shake
+_MEMORY = (0.9, 0.99)  # of the step's direction and of its size (Adam)
+_SPREAD = (0.1, 0.9)  # quantiles
+_LEAST_SHARE = 0.02  # a label that is shown less often is no alternative
+_FEW = 2_000  # rows that tell a shield nothing but that its rules exist
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    """What is moved: thresholds in units of their spread, and a score a label at each leaf."""
+
+    trees: tuple[PolicyTree, ...]
+    spreads: tuple[NDArray[np.float64], ...]
+
+    def start(self) -> NDArray[np.float64]:
+        parts = []
+        for tree in self.trees:
+            leaves = tree.feature == LEAF
+            shares = tree.counts[leaves] / np.maximum(tree.samples[leaves], 1)[:, None]
+            likely = np.log(np.maximum(shares, _LEAST_SHARE))
+            # What the leaf says is ahead, if only by nothing.
+            said = tree.label[leaves][:, None]
+            best = likely.max(axis=1, keepdims=True)
+            np.put_along_axis(likely, said, best, axis=1)
+            parts += [np.zeros(int((~leaves).sum())), (likely - best).reshape(-1)]
+        return np.concatenate(parts)
+
+    def structures(self, values: NDArray[np.float64]) -> list[TreeStructure]:
+        found = []
+        at = 0
+        for tree, spread in zip(self.trees, self.spreads, strict=True):
+            leaves = tree.feature == LEAF
+            inner, labels = ~leaves, tree.dimension.n_labels
+            threshold, label = tree.threshold.copy(), tree.label.copy()
+            threshold[inner] += values[at : at + inner.sum()] * spread[inner]
+            at += int(inner.sum())
+            count = int(leaves.sum()) * labels
+            label[leaves] = values[at : at + count].reshape(-1, labels).argmax(axis=1)
+            at += count
+            found.append(
+                without_idle_queries(
+                    TreeStructure(
+                        tree.feature, threshold, tree.children_left, tree.children_right, label
+                    )
+                )
+            )
+        return found
+
+
+def refine(
+    env_id: str,
+    trees: Sequence[PolicyTree],
+    pairs: Demonstrations,
+    *,
+    agent: Agent,
+    projection: Projection = "centre",
+    generations: int,
+    marks: int,
+    max_steps: int | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+    better: Callable[[tuple[PolicyTree, ...]], None] | None = None,
+) -> list[tuple[PolicyTree, ...]]:
+    """Search around trees for better ones of the same shape.
+
+    Args:
+        env_id: The environment.
+        trees: One an action dimension; every leaf is a rule.
+        pairs: What they were grown from.
+        agent: Who is shielded.
+        projection: How the shield replaces a continuous action.
+        generations: How many steps to go.
+        marks: How many points on the way to give back.
+        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
+        seed: Another one gives another way.
+        jobs: Processes; changes the speed, never the result.
+        progress: Called with (episodes done, in all); returning False stops.
+        better: Called with the trees of a point on the way whenever the episodes around it
+            brought more than those around any point before, the start included; so that
+            something is there when the way is not gone to its end.
+
+    Returns:
+        The trees at `marks` points, the last at the end of the way. Which is best is not known:
+        choose by episodes.
+
+    Raises:
+        CancelledError: If `progress` returned False.
+    """
+    from joblib import delayed
+
+    parameters = _Parameters(tuple(trees), tuple(_spread(tree, pairs) for tree in trees))
+    few = pairs_of(pairs, _FEW)
+    generator = np.random.default_rng(seed)
+    here = parameters.start()
+    momentum, size = np.zeros_like(here), np.zeros_like(here)
+    found = []
+    stops = {round(generations * (number + 1) / marks) for number in range(marks)}
+    total = generations * generation_cost()
+    most = -np.inf
+
+    def trees_at(point: NDArray[np.float64]) -> tuple[PolicyTree, ...]:
+        return tuple(
+            count_tree(structure, pairs, index, divider=trees[0].divider)
+            for index, structure in enumerate(parameters.structures(point))
+        )
+
+    with parallel(jobs) as work:
+        for number in range(1, generations + 1):
+            directions = generator.normal(size=(PAIRS, len(here)))
+            first = generation_seed(seed, number)
+            shaken = [
+                parameters.structures(here + side * _SHAKE * direction)
+                for direction in directions
+                for side in (1, -1)
+            ]
+            means = work(
+                delayed(_mean_return)(
+                    env_id, structures, few, trees[0].divider, agent, projection, first, max_steps
+                )
+                for structures in shaken
+            )
+            if float(np.mean(means)) > most:
+                most = float(np.mean(means))
+                if better is not None and number > 1:
+                    better(trees_at(here))
+            ranks = _ranks(np.array(means))
+            slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
+            momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
+            size = _MEMORY[1] * size + (1 - _MEMORY[1]) * slope**2
+            steady = momentum / (1 - _MEMORY[0] ** number)
+            scale = np.sqrt(size / (1 - _MEMORY[1] ** number)) + 1e-12
+            here = here + _STEP * _SHAKE * steady / scale
+            report(progress, number * generation_cost(), total)
+            if number in stops:
+                found.append(trees_at(here))
+    return found
+
+
+def generation_cost() -> int:
+    """Episodes of one generation."""
+    return 2 * PAIRS * EPISODES
+
+
+def generation_seed(seed: int, number: int) -> int:
+    """First seed of the episodes of one generation.
+
+    Args:
+        seed: Of the run.
+        number: Of the generation, counted from 1.
+    """
+    return of_run(REFINEMENT, seed) + number * EPISODES
+
+
+def pairs_of(pairs: Demonstrations, most: int) -> Demonstrations:
+    """The first pairs, whole episodes, at least `most` of them where there are as many."""
+    ends = np.cumsum(pairs.episode_lengths)
+    return pairs.select(np.arange(1 + int(np.searchsorted(ends, min(most, len(pairs))))))
+
+
+def _ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places from -0.5, the least, to 0.5."""
+    # Equal means share theirs, so that nothing is followed where all do as well as can be.
+    ladder = np.empty(len(means))
+    ladder[np.argsort(means)] = np.linspace(-0.5, 0.5, len(means))
+    _, group, size = np.unique(means, return_inverse=True, return_counts=True)
+    shared: NDArray[np.float64] = (np.bincount(group, weights=ladder) / size)[group]
+    return shared
+
+
+def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
+    """Half the spread of the asked feature among the pairs that reach each inner node, (n,)."""
+    spread = np.zeros(tree.n_nodes)
+    for node in np.flatnonzero(tree.feature != LEAF).tolist():
+        values = pairs.observations[tree.rows(node), tree.feature[node]]
+        if len(values):
+            low, high = np.quantile(values, _SPREAD)
+            spread[node] = 0.5 * float(high - low)
+    return spread
+
+
+def _mean_return(
+    env_id: str,
+    structures: Sequence[TreeStructure],
+    few: Demonstrations,
+    divider: int,
+    agent: Agent,
+    projection: Projection,
+    seed: int,
+    max_steps: int | None,
+) -> float:
+    trees = [
+        count_tree(structure, few, index, divider=divider)
+        for index, structure in enumerate(structures)
+    ]
+    shield = Shield(leaf_rules(trees), projection=projection)
+    found = rollout(
+        env_id,
+        agent,
+        shield=shield,
+        episodes=EPISODES,
+        seed=seed,
+        keep_steps=False,
+        max_steps=max_steps,
+    )
+    return float(found.returns.mean())

@@ -1,0 +1,1 @@
+"""Learners under a shield, and experts."""

@@ -1,0 +1,287 @@
+"""Arms and seeds, one after the other: begun, stopped, resumed, summed up."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sarl_core.errors import InputError, WorkError
+from sarl_core.learning.arms import LearningArm, check_learning
+from sarl_core.learning.curves import NO_EPISODES, LearningCurve
+from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn, rules_digest
+from sarl_core.learning.study_files import (
+    FORMAT,
+    PLAN,
+    VERSION,
+    LearningRun,
+    LearningStudy,
+    load_run,
+    load_study,
+    make_folder,
+    policy_path,
+    read_json,
+    remove,
+    run_path,
+    save_run,
+    save_tables,
+    write_json,
+)
+from sarl_core.learning.summary import summarise_study
+from sarl_core.progress import CancelledError, Progress
+from sarl_core.shielding.projection import Projection
+
+if TYPE_CHECKING:
+    from sarl_core.mining.rules import RuleSet
+
+MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
+_WRITTEN_EVERY = 1.0  # seconds, for who looks on
+
+
+@dataclass(frozen=True, eq=False)
+class LearningPlan:
+    """What is to be learned.
+
+    Attributes:
+        env_id: What ``gymnasium.make`` takes.
+        rules: Of the shield; None where no arm needs one.
+        arms: Ways to learn.
+        steps: Environment steps of each run.
+        seeds: Of the learners.
+        projection: What becomes of a continuous action that breaks a rule.
+        episodes: Of each trial after learning.
+        max_steps: After which one of these is cut off; `episodes.MAX_STEPS` where None.
+    """
+
+    env_id: str
+    rules: RuleSet | None
+    arms: tuple[LearningArm, ...]
+    steps: int
+    seeds: tuple[int, ...]
+    projection: Projection = "centre"
+    episodes: int = TRIAL_EPISODES
+    max_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be learned.
+
+        Raises:
+            InputError: If something is missing or out of range, or arms, rules and environment
+                do not fit.
+        """
+        if not self.arms or not self.seeds:
+            raise InputError("there is nothing to learn; choose at least one arm and one seed")
+        if self.steps > MAX_STEPS:
+            raise InputError(
+                f"steps is {self.steps:,}, more than {MAX_STEPS:,}; give a smaller number"
+            )
+        if self.episodes < 1:
+            raise InputError(f"episodes is {self.episodes} and must be at least 1")
+        if self.max_steps is not None and self.max_steps < 1:
+            raise InputError(f"max_steps is {self.max_steps} and must be at least 1")
+        for arm in self.arms:
+            for seed in (min(self.seeds), max(self.seeds)):
+                check_learning(self.env_id, self.rules, arm, steps=self.steps, seed=seed)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of how rules and environment were matched, as clauses."""
+        from sarl_core.rollouts.player import check_environment
+        from sarl_core.shielding.shield import Shield
+
+        shield = None if self.rules is None else Shield(self.rules)
+        return check_environment(self.env_id, shield).notes
+
+    def settings(self) -> dict[str, Any]:
+        """What the runs share and what was asked for, ready for JSON."""
+        rules = self.rules
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "env_id": self.env_id,
+            "steps": self.steps,
+            "arms": [arm.name for arm in self.arms],
+            "seeds": list(self.seeds),
+            "projection": self.projection,
+            "trial_episodes": self.episodes,
+            "trial_max_steps": self.max_steps,
+            "rules": None
+            if rules is None
+            else {
+                "digest": rules_digest(rules),
+                "count": len(rules),
+                "support": rules.thresholds.support,
+                "confidence": rules.thresholds.confidence,
+                "demonstrations": rules.source.digest,
+                **({} if rules.cut == "thresholds" else {"cut": rules.cut}),
+            },
+        }
+
+
+def run_study(
+    plan: LearningPlan, folder: Path, *, progress: Progress | None = None
+) -> LearningStudy:
+    """Let every arm learn with every seed; go on where an earlier sitting stopped.
+
+    The folder is readable at any moment by `load_study`. It gets ``plan.json``,
+    ``rules.json``, a file for each run in ``runs``, what was learned in ``policies`` (`.npz`,
+    usable as an agent), and at the end or when stopped ``results.json`` and ``curves.csv`` of
+    what is finished.
+
+    Args:
+        plan: What is to be learned.
+        folder: Made if it is not there.
+        progress: Called with (steps done, in all, over all runs); returning False stops.
+
+    Returns:
+        The study, every run finished.
+
+    Raises:
+        InputError: If the folder cannot be written to, or holds another study.
+        CancelledError: If `progress` returned False. What is finished is in the folder, and the
+            unfinished run goes on from there the next time.
+        WorkError: If a file cannot be written.
+    """
+    make_folder(folder)
+    _claim(folder, plan)
+    todo = [(seed, arm) for seed in plan.seeds for arm in plan.arms]
+    total = len(todo) * plan.steps
+    diverged: list[str] = []
+    try:
+        for index, (seed, arm) in enumerate(todo):
+            before = index * plan.steps
+
+            def told(done: int, _: int, before: int = before) -> bool:
+                return progress is None or progress(before + done, total) is not False
+
+            if not _finished(folder, arm, seed):
+                try:
+                    _one(plan, folder, arm, seed, told)
+                except DivergedError as error:
+                    diverged.append(f"{arm.title}, seed {seed}: {error}")
+            elif not told(plan.steps, plan.steps):
+                raise CancelledError("stopped")
+    except CancelledError as error:
+        study = load_study(folder)
+        _sum_up(folder, study)
+        raise CancelledError(
+            f"stopped; {len(study.finished)} of {len(todo)} runs are finished and kept in {folder}"
+            ", and the same order goes on from there"
+        ) from error
+    except WorkError:
+        _sum_up(folder, load_study(folder))
+        raise
+    study = load_study(folder)
+    _sum_up(folder, study)
+    if diverged:
+        raise WorkError(
+            f"{len(study.finished)} of {len(todo)} runs are finished and kept in {folder}; "
+            f"{len(diverged)} failed ({diverged[0]})"
+        )
+    return study
+
+
+def _claim(folder: Path, plan: LearningPlan) -> None:
+    """Write the plan down, or check that it is the one that was begun here.
+
+    More arms, seeds or runs may be asked for later; what runs share must stay.
+    """
+    path, settings = folder / PLAN, plan.settings()
+    if path.is_file():
+        before = read_json(path)
+        free = ("arms", "seeds")
+        other = [
+            name for name in settings if name not in free and before.get(name) != settings[name]
+        ]
+        if other:
+            raise InputError(
+                f"the folder {folder} holds a study with another {' and '.join(other)}; choose "
+                "another folder, or delete this one"
+            )
+        if all(before.get(name) == settings[name] for name in free):
+            return
+    write_json(path, settings)
+    if plan.rules is not None:
+        plan.rules.save(folder / "rules.json")
+
+
+def _finished(folder: Path, arm: LearningArm, seed: int) -> bool:
+    path = run_path(folder, arm, seed)
+    return path.is_file() and load_run(path).finished and policy_path(folder, arm, seed).is_file()
+
+
+def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress: Progress) -> None:
+    """One run, from its checkpoint if there is one."""
+    checkpoint = run_path(folder, arm, seed).with_suffix(".pt")
+    written = -np.inf
+    latest = LearningRun(arm, seed, 0, NO_EPISODES)
+
+    def watch(curve: LearningCurve, done: int) -> None:
+        nonlocal written, latest
+        latest = LearningRun(arm, seed, min(done, plan.steps), curve)
+        if time.monotonic() - written > _WRITTEN_EVERY:
+            save_run(folder, latest)
+            written = time.monotonic()
+
+    try:
+        result = learn(
+            plan.env_id,
+            plan.rules,
+            arm,
+            steps=plan.steps,
+            seed=seed,
+            projection=plan.projection,
+            episodes=plan.episodes,
+            max_steps=plan.max_steps,
+            checkpoint=checkpoint,
+            progress=progress,
+            watch=watch,
+        )
+    except CancelledError:
+        save_run(folder, latest)
+        raise
+    result.policy.save(policy_path(folder, arm, seed))
+    save_run(
+        folder,
+        LearningRun(
+            arm,
+            seed,
+            plan.steps,
+            result.curve,
+            result.alone,
+            result.shielded,
+            result.seconds,
+            result.sittings,
+        ),
+    )
+    remove(checkpoint)
+
+
+def _sum_up(folder: Path, study: LearningStudy) -> None:
+    save_tables(
+        folder,
+        study,
+        {
+            "versions": _versions(),
+            "summary": [summary.to_dict() for summary in summarise_study(study)],
+        },
+    )
+
+
+def _versions() -> dict[str, str]:
+    import platform
+
+    import gymnasium
+    import stable_baselines3
+    import torch
+
+    return {
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "gymnasium": gymnasium.__version__,
+        "torch": torch.__version__,
+        "stable_baselines3": stable_baselines3.__version__,
+    }

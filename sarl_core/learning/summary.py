@@ -1,0 +1,253 @@
+"""What a study of learning says: each arm over its seeds, against learning without a shield."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from sarl_core.environments.failures import failure_known
+from sarl_core.learning.arms import ARMS, LearningArm
+from sarl_core.learning.curves import Trial
+from sarl_core.learning.study_files import LearningRun, LearningStudy
+from sarl_core.rollouts.statistics import Interval, summarise_groups
+
+SAFE_SHARE = 0.5
+"""An arm is called safe while learning if it crashes at most this share as often as the learner
+without a shield."""
+
+_LATE = 0.1  # the share of the steps, at the end, that shows what learning had come to
+
+
+@dataclass(frozen=True)
+class TrialSummary:
+    """The trials of an arm's R runs.
+
+    Attributes:
+        means: Mean return of each run, R entries.
+        halves: Mean return of the first and of the second half of each run's episodes: what is
+            chosen by the one can be told by the other.
+        returns: Of all their episodes: mean, and interquartile mean with its 95 % interval over
+            learners and episodes.
+        crash_rate: Share of all episodes that ended by failure.
+        intervention_rate: Mean share of the steps that the rules changed.
+        coverage: Mean share of the steps to which a rule applied.
+        episodes: How many there are, of all runs.
+        cut: How many of them were cut off before their end; none of them is among the crashes.
+    """
+
+    means: tuple[float, ...]
+    halves: tuple[float, float]
+    returns: Interval
+    crash_rate: float
+    intervention_rate: float
+    coverage: float
+    episodes: int
+    cut: int
+
+    @property
+    def mean(self) -> float:
+        """Mean over the runs."""
+        return float(np.mean(self.means))
+
+
+@dataclass(frozen=True)
+class ArmSummary:
+    """An arm over R finished runs.
+
+    Attributes:
+        arm: The way it learned.
+        seeds: R seeds.
+        crashes: Crashes of each run while learning, R entries.
+        episodes: Episodes of each run while learning, R entries.
+        learning_return: Mean return of all episodes while learning.
+        late_return: Mean return of the episodes that ended in the last tenth of the steps.
+        intervention_rate: Share of the steps, while learning, that the rules changed.
+        late_intervention_rate: Likewise in the last tenth.
+        alone: After learning, without a shield.
+        shielded: After learning, with the shield on; None without rules.
+        safe: Whether it crashed while learning at most `SAFE_SHARE` times as often as the same
+            learner without a shield; None where that did not run, or where it is not known which
+            ends of an episode are failures.
+        good: Whether, without a shield after learning, its mean return is at least that of the
+            same learner that never had one; likewise.
+        failures_known: Whether it is known which ends of an episode are failures; else nothing is
+            to be said of crashes.
+    """
+
+    arm: LearningArm
+    seeds: tuple[int, ...]
+    crashes: tuple[int, ...]
+    episodes: tuple[int, ...]
+    learning_return: float
+    late_return: float
+    intervention_rate: float
+    late_intervention_rate: float
+    alone: TrialSummary
+    shielded: TrialSummary | None
+    safe: bool | None = None
+    good: bool | None = None
+    failures_known: bool = True
+
+    @property
+    def mean_crashes(self) -> float:
+        """Crashes of a run while learning, on average."""
+        return float(np.mean(self.crashes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "arm": self.arm.name,
+            "title": self.arm.title,
+            "seeds": list(self.seeds),
+            "crashes": list(self.crashes) if self.failures_known else None,
+            "episodes": list(self.episodes),
+            "mean_crashes": self.mean_crashes if self.failures_known else None,
+            "learning_return": _number(self.learning_return),
+            "late_return": _number(self.late_return),
+            "intervention_rate": _number(self.intervention_rate),
+            "late_intervention_rate": _number(self.late_intervention_rate),
+            "alone": self._trials(self.alone),
+            "shielded": None if self.shielded is None else self._trials(self.shielded),
+            "safe": self.safe,
+            "good": self.good,
+        }
+
+    def _trials(self, trials: TrialSummary) -> dict[str, Any]:
+        found = _trial_dict(trials)
+        return found if self.failures_known else found | {"crash_rate": None}
+
+
+def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
+    """Sum up the finished runs.
+
+    Args:
+        study: With the runs there are.
+
+    Returns:
+        One entry an arm that has a finished run, in the study's order.
+    """
+    found = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
+    if not failure_known(study.env_id):
+        return tuple(replace(summary, failures_known=False) for summary in found.values())
+    return tuple(_judged(summary, found.get(summary.arm.alone)) for summary in found.values())
+
+
+def best(summaries: Sequence[ArmSummary]) -> ArmSummary | None:
+    """The arm that is safe while learning and good afterwards.
+
+    Args:
+        summaries: Of `summarise_study`.
+
+    Returns:
+        Of those that are both, the one with the highest mean return afterwards, without a
+        shield, in the first half of the episodes; None if there is none.
+    """
+    both = [summary for summary in summaries if summary.safe and summary.good]
+    return max(both, key=lambda summary: summary.alone.halves[0], default=None)
+
+
+def _summary(study: LearningStudy, arm: LearningArm) -> ArmSummary:
+    runs = study.of(arm)
+    late = round(study.steps * (1 - _LATE))
+
+    def over(column: str, after: int = 0) -> float:
+        """Sum of a column over the episodes of all runs that ended after some steps."""
+        return sum(float(getattr(run.curve, column)[run.curve.ends > after].sum()) for run in runs)
+
+    def count(after: int = 0) -> int:
+        return sum(int((run.curve.ends > after).sum()) for run in runs)
+
+    return ArmSummary(
+        arm=arm,
+        seeds=tuple(run.seed for run in runs),
+        crashes=tuple(run.curve.crashes for run in runs),
+        episodes=tuple(len(run.curve) for run in runs),
+        learning_return=_ratio(over("returns"), count()),
+        late_return=_ratio(over("returns", late), count(late)),
+        intervention_rate=_ratio(over("interventions"), over("lengths")),
+        late_intervention_rate=_ratio(over("interventions", late), over("lengths", late)),
+        alone=_trials([run.alone for run in runs if run.alone is not None]),
+        shielded=_shielded(runs),
+    )
+
+
+def _shielded(runs: Sequence[LearningRun]) -> TrialSummary | None:
+    trials = [run.shielded for run in runs if run.shielded is not None]
+    return _trials(trials) if trials else None
+
+
+def _trials(trials: Sequence[Trial]) -> TrialSummary:
+    episodes = sum(len(trial.returns) for trial in trials)
+    return TrialSummary(
+        means=tuple(trial.mean for trial in trials),
+        halves=(
+            float(np.mean([trial.returns[: (len(trial.returns) + 1) // 2] for trial in trials])),
+            float(np.mean([trial.returns[len(trial.returns) // 2 :] for trial in trials])),
+        ),
+        returns=_returns(tuple(trial.returns for trial in trials)),
+        crash_rate=sum(trial.crashes for trial in trials) / episodes,
+        intervention_rate=float(np.mean([trial.intervention_rate for trial in trials])),
+        coverage=float(np.mean([trial.coverage for trial in trials])),
+        episodes=episodes,
+        cut=sum(trial.cut for trial in trials),
+    )
+
+
+@lru_cache(maxsize=256)
+def _returns(groups: tuple[tuple[float, ...], ...]) -> Interval:
+    """Kept, because who watches a study asks every second, and what is finished stays."""
+    return summarise_groups(groups)
+
+
+def _judged(summary: ArmSummary, alone: ArmSummary | None) -> ArmSummary:
+    if alone is None or not summary.arm.shielded:
+        return summary
+    return replace(
+        summary,
+        safe=summary.mean_crashes <= SAFE_SHARE * alone.mean_crashes,
+        good=summary.alone.mean >= alone.alone.mean,
+    )
+
+
+def reference(summaries: Sequence[ArmSummary], arm: LearningArm) -> ArmSummary | None:
+    """The same learner without a shield.
+
+    Args:
+        summaries: Of `summarise_study`.
+        arm: Any.
+
+    Returns:
+        Its summary; None if it did not run.
+    """
+    wanted = ARMS[arm.alone]
+    return next((summary for summary in summaries if summary.arm == wanted), None)
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")
+
+
+def _number(value: float) -> float | None:
+    """For JSON, which has no NaN."""
+    return value if np.isfinite(value) else None
+
+
+def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
+    returns = trials.returns
+    return {
+        "means": list(trials.means),
+        "halves": list(trials.halves),
+        "mean": trials.mean,
+        "std": returns.std,
+        "iqm": returns.iqm,
+        "iqm_low": returns.low,
+        "iqm_high": returns.high,
+        "crash_rate": trials.crash_rate,
+        "intervention_rate": trials.intervention_rate,
+        "coverage": trials.coverage,
+        **({"cut": trials.cut} if trials.cut else {}),
+    }

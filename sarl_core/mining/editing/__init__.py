@@ -1,0 +1,1 @@
+"""Rules that a person changed, and what that changed."""

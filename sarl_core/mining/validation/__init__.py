@@ -1,0 +1,1 @@
+"""What rules are worth in states that they were not mined from."""

@@ -1,0 +1,270 @@
+"""What a whole rule set is worth on episodes that it was not mined from, none being held out.
+
+The episodes are dealt into a few folds. For each fold trees are grown from all other episodes, and
+its own are sent down them. So every episode is judged by rules mined without it, at whatever
+thresholds: trees do not depend on those, and one growing serves all of them.
+
+It judges the way of mining, with so many episodes and at these thresholds, and not the very rules
+that all episodes together give. Rules that a person wrote or moved cannot be mined again, so for
+them there is `hold_out` alone.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.mining.tasks import run_each
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.validation.episode_counts import (
+    EpisodeCounts,
+    Influence,
+    count_nodes,
+    most_influential,
+)
+from sarl_core.mining.validation.evidence import HeldOut, held_out_of
+from sarl_core.progress import Progress
+
+FOLDS = 10
+"""Enough that each tree is grown from nearly as many episodes as all together are."""
+FEWER_FOLDS, MANY_STEPS = 5, 100_000
+"""Of so many steps a tree takes its time and its room, and a fifth less of them are still many."""
+PARTING = 0.03
+"""From so much on, the number on what was mined from is said to part from the other."""
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Trees, and the episodes that they were grown without.
+
+    Attributes:
+        trees: One an action dimension.
+        counts: Those episodes at their nodes.
+    """
+
+    trees: tuple[PolicyTree, ...]
+    counts: tuple[EpisodeCounts, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CrossFit:
+    """Rule sets of every pair of thresholds, on episodes that they were not mined from.
+
+    Attributes:
+        folds: Each with other episodes; together, all there are.
+        whole_episodes: Whether these are episodes; else there was one only, and they are
+            stretches of it, which are alike.
+    """
+
+    folds: tuple[Fold, ...]
+    whole_episodes: bool
+
+    def at(self, thresholds: Thresholds) -> Judged:
+        """What is known of the rules at some thresholds.
+
+        Args:
+            thresholds: Of the rules.
+
+        Returns:
+            The same as mining at them once for each fold gives.
+        """
+        found: list[tuple[Integers, ...]] = []
+        for fold in self.folds:
+            first = fold.counts[0]
+            samples, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
+            for tree, counts in zip(fold.trees, fold.counts, strict=True):
+                chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
+                chosen[
+                    cut_nodes(
+                        tree,
+                        supp_min=thresholds.support,
+                        conf_min=thresholds.confidence,
+                        lift_min=thresholds.lift,
+                        max_depth=thresholds.max_depth,
+                    )
+                ] = True
+                some, right = counts.together(chosen)
+                samples, correct = samples + some, correct + right
+            found.append((first.numbers, first.lengths, samples, correct))
+        numbers, lengths, samples, correct = map(np.concatenate, zip(*found, strict=True))
+        return Judged(
+            numbers=numbers,
+            lengths=lengths,
+            decisions=lengths * len(self.folds[0].trees),
+            covered=samples,
+            correct=correct,
+            folds=len(self.folds),
+            whole_episodes=self.whole_episodes,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A rule set on E episodes that it was not mined from.
+
+    Attributes:
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+        decisions: Steps times action dimensions, (E,).
+        covered: In how many of those a rule applied, (E,).
+        correct: In how many of these the expert did what it says, (E,).
+        folds: How many rule sets it took, each judged on other episodes; 0 where it was one.
+        whole_episodes: As of `CrossFit`.
+    """
+
+    numbers: Integers
+    lengths: Integers
+    decisions: Integers
+    covered: Integers
+    correct: Integers
+    folds: int = 0
+    whole_episodes: bool = True
+
+    @property
+    def fidelity(self) -> HeldOut:
+        """How often the expert did what the rules say, where one applied."""
+        return self._counted(self.covered, self.correct)
+
+    @property
+    def coverage(self) -> HeldOut:
+        """How often a rule applied."""
+        return self._counted(self.decisions, self.covered)
+
+    def _counted(self, whole: Integers, part: Integers) -> HeldOut:
+        # Any two of the rule sets share nearly all that they were mined from, so what an episode
+        # says of one depends on the episodes of the others. The mean of K such folds varies about
+        # 1 + K / (K - 1) times as much as that of as many independent numbers (Nadeau and Bengio,
+        # "Inference for the generalization error", 2003).
+        widened = (1.0 + self.folds / (self.folds - 1)) ** 0.5 if self.folds > 1 else 1.0
+        found = held_out_of(whole, part, whole_set=True, widened=widened)
+        return found if self.whole_episodes else found._replace(low=None, high=None)
+
+    @property
+    def influence(self) -> Influence | None:
+        """The episode that moves `fidelity` most."""
+        return most_influential(self.covered, self.correct, self.numbers, self.lengths)
+
+    @property
+    def influence_by_states(self) -> Influence | None:
+        """The episode that would move it most if every state counted for itself."""
+        return most_influential(self.covered, self.correct, self.numbers, self.lengths, by="states")
+
+
+def judge(rule_set: RuleSet, counts: EpisodeCounts) -> Judged:
+    """A whole rule set on episodes that were held out.
+
+    Args:
+        rule_set: Rules of one action dimension do not overlap, as mined ones do not.
+        counts: What `count_rules` counted of them.
+
+    Returns:
+        What these episodes say of it.
+    """
+    covered, correct = counts.together(np.ones(counts.size, dtype=np.bool_))
+    return Judged(
+        numbers=counts.numbers,
+        lengths=counts.lengths,
+        decisions=counts.lengths * len(rule_set.actions),
+        covered=covered,
+        correct=correct,
+    )
+
+
+def cross_fit(
+    demonstrations: Demonstrations,
+    *,
+    divider: int = 2,
+    folds: int | None = None,
+    seed: int = 0,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> CrossFit:
+    """Grow trees without each fold of the episodes, and send the fold down them.
+
+    Args:
+        demonstrations: E episodes. A single one is cut into stretches: rules that know one
+            stretch know the next, so what comes of it flatters, and no interval is given.
+        divider: Number of intervals of continuous dimensions.
+        folds: How many; one an episode where there are fewer. Where not given `FOLDS`, or
+            `FEWER_FOLDS` from `MANY_STEPS` on.
+        seed: Same seed, same folds.
+        executor: Its processes grow the trees.
+        progress: Told how many folds are done; may stop the rest.
+
+    Returns:
+        What `CrossFit.at` asks at any thresholds.
+
+    Raises:
+        InputError: If there are fewer than two folds, or too few steps for two.
+        CancelledError: If the caller wants no more.
+    """
+    if folds is None:
+        folds = FOLDS if len(demonstrations) < MANY_STEPS else FEWER_FOLDS
+    if folds < 2:
+        raise InputError(f"{folds} folds leave nothing to mine from; give at least 2")
+    whole = demonstrations.n_episodes > 1
+    parted = demonstrations if whole else _in_stretches(demonstrations, folds)
+    count = parted.n_episodes
+    if count < 2 or len(parted) < 4:
+        raise InputError(
+            "the demonstrations are too short to be parted; give at least two episodes"
+        )
+    episodes = parted.episodes[parted.episode_starts]
+    order = episodes[np.random.default_rng(seed).permutation(count)]
+    dealt = [order[first :: min(folds, count)] for first in range(min(folds, count))]
+    found = run_each(
+        fold_of,
+        [(parted, some, divider) for some in dealt],
+        executor=executor,
+        progress=progress,
+    )
+    return CrossFit(tuple(found), whole)
+
+
+def fold_of(demonstrations: Demonstrations, episodes: Integers, divider: int) -> Fold:
+    """Grow trees without some episodes, and send those down them.
+
+    Args:
+        demonstrations: E episodes.
+        episodes: Numbers of those that the trees are not to know.
+        divider: Number of intervals of continuous dimensions.
+
+    Returns:
+        Both.
+    """
+    others = np.setdiff1d(demonstrations.episodes, episodes)
+    trees = grow_policy_trees(demonstrations.select(others), divider=divider)
+    judged = demonstrations.select(episodes)
+    return Fold(trees, tuple(count_nodes(tree, judged) for tree in trees))
+
+
+def _in_stretches(demonstrations: Demonstrations, count: int) -> Demonstrations:
+    """One episode, cut into so many stretches of about the same length."""
+    episodes = np.arange(len(demonstrations)) * count // len(demonstrations)
+    return replace(
+        demonstrations, episodes=episodes, steps=None, rewards=None, terminated=None, truncated=None
+    )
+
+
+def parts(mined: float, elsewhere: HeldOut) -> bool:
+    """Whether what was mined from says clearly more than other episodes do.
+
+    Args:
+        mined: A share on what was mined from; NaN where there is none.
+        elsewhere: The same on other episodes.
+
+    Returns:
+        True if the other number lies lower by more than `PARTING`, its whole interval included;
+        where it has none, the number itself.
+    """
+    high = elsewhere.high if elsewhere.high is not None else elsewhere.share
+    return high is not None and mined - high > PARTING

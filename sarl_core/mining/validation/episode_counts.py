@@ -1,0 +1,254 @@
+"""In which episodes something applies, how often, and how often it is right there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.applying import applications, labels_of
+from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.validation.evidence import EpisodeSums, HeldOut, held_outs
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeCounts:
+    """Things (rules, or nodes of a tree) in E episodes; K entries, where a thing applies at all.
+
+    Attributes:
+        size: Number of things.
+        thing: Which one, (K,), ascending.
+        episode: In which episode, 0 to E - 1, (K,), ascending within a thing.
+        samples: Pairs of the episode to which it applies, at least 1, (K,).
+        correct: Those of them that it is right about, (K,).
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+    """
+
+    size: int
+    thing: Integers
+    episode: Integers
+    samples: Integers
+    correct: Integers
+    numbers: Integers
+    lengths: Integers
+
+    def held_out(self) -> list[HeldOut]:
+        """What all episodes say of each thing.
+
+        Returns:
+            One entry a thing.
+        """
+        shares = self.correct / self.samples
+        samples, correct = (
+            np.bincount(self.thing, weights, minlength=self.size).astype(np.int64)
+            for weights in (self.samples, self.correct)
+        )
+        sums = EpisodeSums(
+            np.bincount(self.thing, minlength=self.size),
+            samples,
+            np.bincount(self.thing, shares, minlength=self.size).astype(np.float64),
+            np.bincount(self.thing, np.square(shares), minlength=self.size).astype(np.float64),
+        )
+        return held_outs(correct.tolist(), sums)
+
+    def together(self, chosen: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+        """Some things that do not overlap, taken as one.
+
+        Args:
+            chosen: Which, (size,).
+
+        Returns:
+            Pairs of each episode to which they apply, and those they are right about, (E,) each.
+        """
+        inside = chosen[self.thing]
+        samples, correct = (
+            np.bincount(self.episode[inside], weights[inside], minlength=len(self.numbers))
+            for weights in (self.samples, self.correct)
+        )
+        return samples.astype(np.int64), correct.astype(np.int64)
+
+    def of(self, thing: int) -> tuple[Integers, Integers]:
+        """One thing alone, as `together`.
+
+        Args:
+            thing: Which.
+
+        Returns:
+            Pairs of each episode to which it applies, and those it is right about, (E,) each.
+        """
+        first, last = np.searchsorted(self.thing, [thing, thing + 1]).tolist()
+        found = np.zeros((2, len(self.numbers)), dtype=np.int64)
+        found[:, self.episode[first:last]] = self.samples[first:last], self.correct[first:last]
+        return found[0], found[1]
+
+
+def episode_of_each(demonstrations: Demonstrations) -> Integers:
+    """Which episode each of N pairs belongs to, counted from 0, (N,)."""
+    return np.repeat(np.arange(demonstrations.n_episodes), demonstrations.episode_lengths)
+
+
+def count_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> EpisodeCounts:
+    """Try every rule on pairs, whether or not another rule would come first.
+
+    Args:
+        rule_set: R rules.
+        demonstrations: N pairs.
+
+    Returns:
+        The counts, a rule's place in the set being its number.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    shown = labels_of(rule_set, demonstrations)
+    found = applications(rule_set, demonstrations.observations)
+    dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
+    says = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
+    right = shown[found.row, dimension[found.rule]] == says[found.rule]
+    return count_applied(len(rule_set.rules), found.rule, found.row, right, demonstrations)
+
+
+def count_applied(
+    size: int,
+    thing: Integers,
+    row: Integers,
+    right: NDArray[np.bool_],
+    demonstrations: Demonstrations,
+) -> EpisodeCounts:
+    """Count what is known to apply to which pair.
+
+    Args:
+        size: Number of things.
+        thing: Which one applies, (K,).
+        row: To which pair, (K,).
+        right: Whether it is right about it, (K,).
+        demonstrations: The pairs.
+
+    Returns:
+        The counts.
+    """
+    each = np.ones(len(row), dtype=np.int64)
+    episode = episode_of_each(demonstrations)[row]
+    return _counted(size, thing, episode, each, right.astype(np.int64), demonstrations)
+
+
+def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCounts:
+    """Send pairs down a tree and count them at every node on their way.
+
+    Args:
+        tree: With n nodes.
+        demonstrations: N pairs, of the same features and actions.
+
+    Returns:
+        The counts, by node number.
+    """
+    n_labels, episodes = tree.dimension.n_labels, demonstrations.n_episodes
+    shown = tree.dimension.labels_of(demonstrations.action_columns[:, tree.index])
+    leaf = tree.apply(demonstrations.observations)
+    # The pairs of one leaf, episode and label go up together.
+    key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + shown
+    key, samples = np.unique(key, return_counts=True)
+    above, shown = np.divmod(key, n_labels)
+    node, episode = np.divmod(above, episodes)
+    parts: list[tuple[Integers, ...]] = []
+    while len(node):
+        parts.append((node, episode, samples, samples * (tree.label[node] == shown)))
+        inner = tree.parent[node] >= 0
+        node, episode = tree.parent[node[inner]], episode[inner]
+        samples, shown = samples[inner], shown[inner]
+    columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
+    return _counted(tree.n_nodes, columns[0], columns[1], columns[2], columns[3], demonstrations)
+
+
+def _counted(
+    size: int,
+    thing: Integers,
+    episode: Integers,
+    samples: Integers,
+    correct: Integers,
+    demonstrations: Demonstrations,
+) -> EpisodeCounts:
+    """Add up what belongs to one thing and one episode."""
+    key = thing * demonstrations.n_episodes + episode
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    if len(first):
+        samples = np.add.reduceat(samples[order], first)
+        correct = np.add.reduceat(correct[order], first)
+    thing, episode = np.divmod(key[first], demonstrations.n_episodes)
+    return EpisodeCounts(
+        size,
+        thing,
+        episode,
+        samples,
+        correct,
+        numbers=demonstrations.episodes[demonstrations.episode_starts],
+        lengths=demonstrations.episode_lengths,
+    )
+
+
+# --- an episode that alone moves a number --------------------------------------------------------
+
+
+class Influence(NamedTuple):
+    """The episode without which a share would differ most.
+
+    Attributes:
+        episode: What it is called.
+        steps: How long it is.
+        share: The share with it.
+        without: The share without it.
+    """
+
+    episode: int
+    steps: int
+    share: float
+    without: float
+
+    @property
+    def moves(self) -> float:
+        """How far it moves the share, 0 to 1."""
+        return abs(self.share - self.without)
+
+
+def most_influential(
+    samples: ArrayLike,
+    correct: ArrayLike,
+    numbers: Integers,
+    lengths: Integers,
+    *,
+    by: Literal["episodes", "states"] = "episodes",
+) -> Influence | None:
+    """Leave out each episode in turn.
+
+    Args:
+        samples: Pairs that count in each episode, (E,).
+        correct: Those of them that are right, (E,).
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+        by: Whether each episode counts once, or each state.
+
+    Returns:
+        The episode that moves the share most, the first of several; None where fewer than two
+        count.
+    """
+    pairs, right = np.asarray(samples, dtype=np.float64), np.asarray(correct, dtype=np.float64)
+    counting = np.flatnonzero(pairs > 0)
+    if len(counting) < 2:
+        return None
+    whole, part = pairs[counting], right[counting]
+    if by == "episodes":
+        whole, part = np.ones(len(counting)), part / whole
+    share = part.sum() / whole.sum()
+    without = (part.sum() - part) / (whole.sum() - whole)
+    most = int(np.argmax(np.abs(without - share)))
+    place = counting[most]
+    return Influence(int(numbers[place]), int(lengths[place]), float(share), float(without[most]))

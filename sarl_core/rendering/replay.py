@@ -1,0 +1,310 @@
+"""An episode as a moving picture: rendered once, looked at step by step, saved as GIF or MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.environments.description import EnvironmentDescription, describe_environment
+from sarl_core.errors import InputError
+from sarl_core.files import whole_file
+from sarl_core.mining.written import limit_texts
+from sarl_core.progress import Progress, report
+from sarl_core.rendering.canvas import OVERLAY_COLOURS
+from sarl_core.rendering.film import Film, Palette
+from sarl_core.rendering.filming import film_episode, picture_speed
+from sarl_core.rendering.gif_and_mp4 import encode_gif, encode_mp4, gif_bytes
+from sarl_core.rendering.overlay import Panel, side_by_side_picture
+from sarl_core.rollouts.episodes import Episodes
+
+if TYPE_CHECKING:
+    from sarl_core.mining.rules import RuleSet
+    from sarl_core.shielding.shield import Shield
+
+__all__ = ["Replay", "encode_gif", "encode_mp4", "render_episode", "side_by_side"]
+
+DescribeRule = Callable[[int], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One episode, or two side by side, ready to be looked at or saved.
+
+    Attributes:
+        episodes: One `Episodes` of a single episode, with its steps, for each panel.
+        panels: What is drawn, in the order of `episodes`.
+        fps: Pictures a second, real time.
+    """
+
+    episodes: tuple[Episodes, ...]
+    panels: tuple[Panel, ...]
+    fps: float
+
+    def named(self, description: EnvironmentDescription) -> Replay:
+        """The same pictures under other names of the actions.
+
+        Args:
+            description: Of the same environment.
+        """
+        panels = tuple(replace(panel, description=description) for panel in self.panels)
+        return Replay(self.episodes, panels, self.fps)
+
+    def __len__(self) -> int:
+        """Number of pictures: one before each step, and the last state."""
+        return 1 + max(len(panel.steps) for panel in self.panels)
+
+    @property
+    def seconds(self) -> float:
+        """How long it runs."""
+        return len(self) / self.fps
+
+    def frame(self, number: int) -> NDArray[np.uint8]:
+        """The picture in which step `number` is decided; its text is about exactly that step.
+
+        Args:
+            number: 0 to the number of steps; there, the last state.
+
+        Returns:
+            Shape (height, width, 3).
+        """
+        return self._coloured(side_by_side_picture(self.panels, number))
+
+    def png(self, number: int) -> bytes:
+        """The same picture as a PNG file; small and fast, since its colours are few and known.
+
+        Args:
+            number: As for `frame`.
+
+        Returns:
+            The file's content.
+        """
+        from PIL import Image
+
+        image = Image.fromarray(side_by_side_picture(self.panels, number))
+        image.putpalette(self._colours.tobytes())
+        file = BytesIO()
+        image.save(file, format="PNG", compress_level=1)
+        return file.getvalue()
+
+    def animation(self) -> Iterator[NDArray[np.uint8]]:
+        """All pictures, in order, as they are saved."""
+        for number in range(len(self)):
+            yield self.frame(number)
+
+    @cached_property
+    def _colours(self) -> NDArray[np.uint8]:
+        return self.panels[0].film.palette.colours
+
+    def _coloured(self, indexes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        return np.asarray(self._colours[indexes])
+
+    def gif(self, *, progress: Progress | None = None) -> bytes:
+        """Encode as a GIF; done once, however often it is asked for.
+
+        Args:
+            progress: Called with (pictures done, in all); returning False stops.
+
+        Returns:
+            The file's content.
+        """
+        if "_gif" not in self.__dict__:
+            self.__dict__["_gif"] = gif_bytes(
+                len(self),
+                lambda number: side_by_side_picture(self.panels, number),
+                self._colours,
+                self.fps,
+                progress=progress,
+            )
+        content: bytes = self.__dict__["_gif"]
+        return content
+
+    def save(self, path: str | Path, *, progress: Progress | None = None) -> None:
+        """Write `.gif` or `.mp4`, by the name's ending.
+
+        Args:
+            path: The file; it appears whole or not at all.
+            progress: Called with (pictures done, in all); returning False stops.
+
+        Raises:
+            InputError: If the ending is another, or the folder does not exist.
+            WorkError: If it cannot be written.
+        """
+        target = Path(path)
+        check_picture_path(target)
+        if target.suffix.lower() == ".mp4":
+            encode_mp4(self.animation(), self.fps, target, count=len(self), progress=progress)
+            return
+        with whole_file(target) as unfinished:
+            unfinished.write_bytes(self.gif(progress=progress))
+
+
+def check_picture_path(path: Path) -> None:
+    """Refuse a file name that no picture can be saved under, before long work begins.
+
+    Args:
+        path: The file to write.
+
+    Raises:
+        InputError: If it ends neither in .gif nor .mp4, or its folder does not exist.
+    """
+    if path.suffix.lower() not in (".gif", ".mp4"):
+        raise InputError(f"{path} is neither a .gif nor a .mp4; give it one of these endings")
+    if not path.parent.is_dir():
+        raise InputError(f"the folder {path.parent} does not exist; make it or choose another")
+
+
+def render_episode(
+    env_id: str,
+    agent: str | Path | Agent,
+    *,
+    shield: Shield | None = None,
+    seed: int = 0,
+    stochastic: bool = False,
+    describe_rule: DescribeRule | None = None,
+    max_steps: int | None = None,
+    progress: Progress | None = None,
+) -> Replay:
+    """Render one episode, the same as `rollout` plays it with that seed.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: An agent, or what `make_agent` takes.
+        shield: Checks every action; None for none.
+        seed: Of the episode.
+        stochastic: Whether a trained policy is sampled.
+        describe_rule: A sentence for the index of a rule; its conditions where not given.
+        max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
+        progress: Called with (steps done, most steps); returning False stops.
+
+    Returns:
+        The replay.
+
+    Raises:
+        InputError: If something does not fit, or the environment draws no pictures.
+        WorkError: If drawing fails.
+        CancelledError: If `progress` returned False.
+    """
+    return _replay(env_id, agent, (shield,), seed, stochastic, describe_rule, max_steps, progress)
+
+
+def side_by_side(
+    env_id: str,
+    agent: str | Path | Agent,
+    shield: Shield,
+    *,
+    seed: int = 0,
+    stochastic: bool = False,
+    describe_rule: DescribeRule | None = None,
+    max_steps: int | None = None,
+    progress: Progress | None = None,
+) -> Replay:
+    """Render an agent with the shield (left) and without (right), on one seed.
+
+    The shorter episode stays on its last state and says how it ended.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: An agent, or what `make_agent` takes.
+        shield: Of the left panel.
+        seed: Of both episodes.
+        stochastic: Whether a trained policy is sampled.
+        describe_rule: A sentence for the index of a rule; its conditions where not given.
+        max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
+        progress: Called with (steps done, most steps); returning False stops.
+
+    Returns:
+        The replay; `episodes` holds the shielded one first.
+
+    Raises:
+        InputError: If something does not fit, or the environment draws no pictures.
+        WorkError: If drawing fails.
+        CancelledError: If `progress` returned False.
+    """
+    return _replay(
+        env_id, agent, (shield, None), seed, stochastic, describe_rule, max_steps, progress
+    )
+
+
+def _replay(
+    env_id: str,
+    agent: str | Path | Agent,
+    shields: tuple[Shield | None, ...],
+    seed: int,
+    stochastic: bool,
+    describe_rule: DescribeRule | None,
+    max_steps: int | None,
+    progress: Progress | None,
+) -> Replay:
+    if seed < 0:
+        raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
+    actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
+    fps, limit = picture_speed(env_id, max_steps)
+    palette = Palette(OVERLAY_COLOURS)
+    episodes: list[Episodes] = []
+    panels: list[Panel] = []
+    for part, shield in enumerate(shields):
+
+        def told(done: int, total: int, part: int = part) -> None:
+            report(progress, done + part * total, total * len(shields))
+
+        film = Film(palette)
+        episode = film_episode(env_id, actor, shield, seed, film, limit, told)
+        assert episode.steps is not None
+        episodes.append(episode)
+        describe = describe_rule
+        if describe is None and shield is not None:
+            describe = plain_descriptions(shield.rule_set)
+        ending = (
+            ""
+            if len(shields) == 1 and shield is None
+            else (", shielded" if shield is not None else ", unshielded")
+        )
+        panels.append(
+            Panel(
+                title=f"{actor.name}{ending}",
+                subtitle=f"{env_id.rsplit(':', 1)[-1]} · seed {seed}",
+                film=film,
+                steps=episode.steps,
+                shielded=shield is not None,
+                describe_rule=describe or str,
+                description=describe_environment(env_id),
+                fps=fps,
+            )
+        )
+    return Replay(tuple(episodes), tuple(panels), fps)
+
+
+def plain_descriptions(rule_set: RuleSet) -> DescribeRule:
+    """Sentences for rules, from names and bounds alone.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        A function from the index of a rule to "If angle ≤ 0.1: fire main engine".
+    """
+
+    def describe(index: int) -> str:
+        rule = rule_set.rules[index]
+        parts = []
+        for bounds in rule.bounds:
+            asked = rule_set.source.features[bounds.feature]
+            limits = [text.replace("-", "−") for text in limit_texts(bounds, asked)]
+            left = f"{limits[0]} < " if len(limits) > 1 else ""
+            right = f" {'≤' if np.isfinite(bounds.high) else '>'} {limits[-1]}"
+            parts.append(f"{left}{asked.name}{right}")
+        action = rule_set.actions[rule.dimension]
+        conclusion = action.label_names[rule.action]
+        if len(rule_set.actions) > 1 or action.is_interval:
+            conclusion = f"{action.name} {conclusion}"
+        return f"If {' and '.join(parts)}: {conclusion}" if parts else f"Always: {conclusion}"
+
+    return describe

@@ -1,0 +1,1 @@
+"""Many episodes against each other: comparison, ablation, divider."""

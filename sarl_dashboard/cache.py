@@ -1,0 +1,157 @@
+"""What pages keep of their work: bounded in bytes, and a visitor's part goes with the visitor."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import gc
+import inspect
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from threading import Lock, Thread
+from typing import Any, ParamSpec, TypeVar, cast
+
+import streamlit as st
+from streamlit.runtime.scriptrunner import get_script_run_ctx
+
+from sarl_dashboard.byte_cache import Kept
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_MOST_MEGABYTES = 512  # over all pages and visitors; SARL_CACHE_MB says otherwise
+
+RESULTS: Kept[object] = Kept(
+    None, int(float(os.environ.get("SARL_CACHE_MB") or _MOST_MEGABYTES) * 2**20)
+)
+_making: defaultdict[object, Lock] = defaultdict(Lock)
+
+
+def cached(*, show_spinner: str = "") -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Keep what a function gives, for all visitors, as long as there is room.
+
+    Arguments with a leading underscore are not part of the key; the others must be hashable.
+    Streamlit's own cache of resources counts entries; here bytes are counted, and what was made
+    from an upload goes when nobody holds it any more.
+
+    Args:
+        show_spinner: What is said while it works.
+
+    Returns:
+        A decorator.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+        code = cast(Any, function).__code__  # pages are scripts, and made anew at every run
+
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            bound = signature.bind(*args, **kwargs)
+            bound.apply_defaults()
+            named = (item for item in bound.arguments.items() if not item[0].startswith("_"))
+            key = (code.co_filename, code, tuple(named))
+            found = RESULTS.get(key)
+            if found is None:
+                with _making[key]:  # one visitor makes it, the others wait
+                    found = RESULTS.get(key)
+                    if found is None:
+                        with _telling(show_spinner):
+                            found = (function(*args, **kwargs),)
+                        keep(key, found, owner())
+                _making.pop(key, None)
+            return cast(tuple[R], found)[0]
+
+        return call
+
+    return decorate
+
+
+def keep(key: object, result: object, owner: str) -> None:
+    """Keep a result, if whoever brought what it was made from is still there.
+
+    Args:
+        key: What it is found by.
+        result: Anything.
+        owner: Digest of the upload that it was made from, "" where there is none.
+    """
+    RESULTS.put(key, result, owner=owner)
+    _give_back(owner)
+
+
+def _telling(text: str) -> AbstractContextManager[object]:
+    """Say what is going on, where there is a page to say it on."""
+    return st.spinner(text) if text and get_script_run_ctx() is not None else nullcontext()
+
+
+# --- what a visitor brought --------------------------------------------------------------------
+
+
+class Visit:
+    """A visitor's session, and the upload it holds.
+
+    Attributes:
+        upload: Digest of the demonstrations uploaded last, "" where there are none.
+    """
+
+    def __init__(self) -> None:
+        self.upload = ""
+
+    def bring(self, digest: str) -> None:
+        """Take an upload in the place of the one before, which is given back."""
+        before, self.upload = self.upload, digest
+        _give_back(before)
+
+
+_VISITS: set[Visit] = set()
+
+
+def _give_back(digest: str) -> None:
+    """Let go of what was made from an upload that no visitor holds any more."""
+    if digest and all(other.upload != digest for other in list(_VISITS)):
+        RESULTS.drop(digest)
+
+
+def _end(visit: Visit) -> None:
+    _VISITS.discard(visit)
+    _give_back(visit.upload)
+    Thread(target=_collect, daemon=True).start()
+
+
+def _collect() -> None:
+    """Find what holds itself together in circles, as a session that has ended does.
+
+    Pages take what they load out of the collector's sight (`settle`), and with it the sessions of
+    that moment: so it looks at everything, once.
+    """
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
+    _release()
+
+
+def _release() -> None:
+    """Give what is free to the system: what allocators keep looks like use to whoever watches."""
+    import pyarrow
+
+    pyarrow.default_memory_pool().release_unused()
+    if sys.platform == "linux":  # and there GNU's C library has it
+        getattr(ctypes.CDLL(None), "malloc_trim", int)(0)
+
+
+@st.cache_resource(scope="session", on_release=_end, show_spinner=False)
+def visit() -> Visit:
+    """The visit that this script runs for; it ends with the session."""
+    begun = Visit()
+    _VISITS.add(begun)
+    return begun
+
+
+def owner() -> str:
+    """Digest of the upload that the page works on, "" where it works on none."""
+    upload = st.session_state.get("_upload")
+    chosen = st.session_state.get("_data")
+    return str(upload.digest) if upload is not None and chosen == "upload" else ""

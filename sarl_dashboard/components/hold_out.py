@@ -1,0 +1,53 @@
+"""Which episodes are held out: told, and chosen."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.language import counted
+from sarl_dashboard.state.hold_out import chosen, leave_out, parted
+from sarl_dashboard.text import in_full
+
+
+def told(demonstrations: Demonstrations) -> list[str]:
+    """What is in force, for the sidebar.
+
+    Args:
+        demonstrations: All there are.
+
+    Returns:
+        Lines; none where nothing is left out or held out.
+    """
+    parts = parted(demonstrations)
+    lines = []
+    held = parts.held_out.n_episodes if parts.held_out is not None else 0
+    gone = demonstrations.n_episodes - parts.mined.n_episodes - held
+    if gone:
+        lines.append(f"**{counted(gone, 'episode')}** left out")
+    if held:
+        lines.append(f"**{counted(held, 'episode')}** held out")
+    return lines
+
+
+def leave_out_choice(demonstrations: Demonstrations) -> None:
+    """The widget that leaves episodes out.
+
+    Args:
+        demonstrations: All there are.
+    """
+    there = demonstrations.episodes[demonstrations.episode_starts].tolist()
+    gone = set(chosen().left_out)
+    # The widget follows the URL, so a link and the browser's "back" both reach it.
+    st.session_state["_left_out_choice"] = [episode for episode in there if episode in gone]
+    st.multiselect(
+        "Episodes left out",
+        there,
+        key="_left_out_choice",
+        format_func=lambda episode: f"episode {episode}",
+        placeholder="none: choose one, and every page follows",
+        on_change=lambda: leave_out(tuple(st.session_state["_left_out_choice"])),
+    )
+    problem = parted(demonstrations).problem
+    if problem:
+        st.warning(in_full(problem), icon=":material/warning:")

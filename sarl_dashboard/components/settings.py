@@ -1,0 +1,87 @@
+"""The settings that several pages ask for in the same words, each kept in the URL."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal, get_args
+
+import streamlit as st
+
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Outside
+from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.edits import offered as edits_offered
+from sarl_dashboard.state.environments import ENVIRONMENTS
+from sarl_dashboard.state.rule_choice import EDITED
+from sarl_dashboard.state.rule_files import COMPACT, compact_file
+from sarl_dashboard.state.url import with_own
+
+OUTSIDE: tuple[Outside, ...] = get_args(Outside)
+Width = Literal["stretch"] | int
+
+
+def environment_choice() -> str | None:
+    """The environment: a usual one, or any id that was typed (URL: env)."""
+    return st.selectbox(
+        "Environment",
+        with_own(ENVIRONMENTS, "env"),
+        key="env",
+        bind="query-params",
+        accept_new_options=True,
+        help="That of the demonstrations, or type any id that Gymnasium knows, such as "
+        "CartPole-v1.",
+    )
+
+
+def offered_rule_sets(names: Sequence[str]) -> list[str]:
+    """Those of some rule sets that can be had now."""
+    there = {COMPACT: compact_file().is_file(), EDITED: edits_offered()}
+    return [name for name in names if there.get(name, True)]
+
+
+def projection_choice(width: Width = "stretch") -> Projection:
+    """What a continuous action becomes (URL: projection)."""
+    return st.selectbox(
+        "Replace by",
+        PROJECTIONS,
+        key="projection",
+        bind="query-params",
+        width=width,
+        help="What a continuous action that breaks a rule becomes. Centre: the middle of the "
+        "rule's interval. Clip: the nearest value in it. Expert: what the expert typically "
+        "did there.",
+    )
+
+
+def outside_choice(width: Width = "stretch") -> Outside:
+    """What a rule does outside the data it was mined from (URL: outside)."""
+    return st.selectbox(
+        "Outside the data",
+        OUTSIDE,
+        key="outside",
+        bind="query-params",
+        width=width,
+        help="What a rule does in a state beyond the least and largest values seen where it "
+        "applies. Act: it changes the action all the same, and the step is marked. Abstain: "
+        "it leaves the action to the agent.",
+    )
+
+
+def notes_notice(notes: Iterable[str]) -> None:
+    """Say how it was found out which feature is which, and what else a visitor should know."""
+    for note in dict.fromkeys(notes):
+        st.info(f"{note[0].upper()}{note[1:]}.", icon=":material/info:")
+
+
+def no_boxes_notice(rule_sets: list[RuleSet], outside: Outside) -> None:
+    """Say where abstaining does nothing, because a rule file does not say where its data lay."""
+    if outside == "abstain" and any(
+        rule_set.rules and all(rule.box is None for rule in rule_set.rules)
+        for rule_set in rule_sets
+    ):
+        st.info(
+            "This rule file keeps no data boxes: its rules act everywhere, also with “abstain”. "
+            "Mine them again to have the boxes.",
+            icon=":material/frame_inspect:",
+        )

@@ -1,0 +1,117 @@
+"""The table of rules, as two pages show it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import streamlit as st
+
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.tables.evidence import held_out_columns
+from sarl_core.explaining.tables.rules import rule_columns
+from sarl_core.explaining.words.evidence import VERDICT_COLOURS, VERDICTS
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import action_text
+from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.validation.evidence import FEWEST_EPISODES
+
+ROW_HEIGHT = 33  # pixels, at the theme's font size
+_NAME = 62  # pixels: four digits
+
+
+def action_column(actions: Sequence[LabelledDimension], meaning: str) -> tuple[Any, int]:
+    """The column of what rules say, each action in its colour, and how many pixels wide it is."""
+    colours = {
+        action_text(label, dimension): label_colour(label)
+        for dimension in actions
+        for label in range(dimension.n_labels)
+    }
+    # About seven pixels a letter; what a long action takes, the conditions give.
+    width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    column = st.column_config.MultiselectColumn(
+        width=width, help=meaning, options=list(colours), color=list(colours.values())
+    )
+    return column, width
+
+
+def column_config(rule_set: RuleSet) -> dict[str, Any]:
+    """What the columns look like; all have help that says what they mean.
+
+    The widths sum to what is left of a window 1440 pixels wide; on a phone the name, the action
+    and the beginning of the conditions are seen.
+    """
+    column = st.column_config
+    action, action_width = action_column(rule_set.actions, "What the expert does there")
+    return {
+        "Rule": column.TextColumn(
+            width=_NAME, help="Its name: rules are numbered by their place in the set"
+        ),
+        "Action": action,
+        "When": column.TextColumn(
+            width=472 - _NAME - action_width, help="The conditions under which the rule applies"
+        ),
+        "Support": column.NumberColumn(
+            width=80, format="%.2f %%", help="Share of all states to which the rule applies"
+        ),
+        "Confidence": column.ProgressColumn(
+            width=112,
+            min_value=0.0,
+            max_value=100.0,
+            format="%.2f %%",
+            color="gray",
+            help="Share of those in which the expert did what the rule says",
+        ),
+        "Lift": column.NumberColumn(
+            width=58, format="%.2f", help="Confidence over the action's share of all states"
+        ),
+        "Joint support": column.NumberColumn(
+            width=100,
+            format="%.2f %%",
+            help="Share of all states to which the rule applies and in which it is right",
+        ),
+        "States": column.NumberColumn(
+            width=72, format="localized", help="Demonstrated states to which the rule applies"
+        ),
+        "Length": column.NumberColumn(width=68, help="Number of conditions on the way to the rule"),
+        "Held out": column.TextColumn(
+            width=130, help="How often it was right in an episode held out, on average over those"
+        ),
+        "Verdict": column.MultiselectColumn(
+            width=90,
+            help="Where the 95 % interval of the held-out confidence lies: at or above the minimum "
+            "confidence (reached), below it (too low), or on both sides (open); none with fewer "
+            f"than {FEWEST_EPISODES} episodes",
+            options=list(VERDICTS.values()),
+            color=[VERDICT_COLOURS[name] for name in VERDICTS],
+        ),
+        "Lower bound": column.NumberColumn(
+            width=95,
+            format="%.1f %%",
+            help="Lower end of the 95 % interval of the held-out confidence",
+        ),
+    }
+
+
+def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any:
+    """Rules as a data frame, in the order given, with what each is called."""
+    import pandas as pd
+
+    columns = rule_columns(rules, rule_set)
+    # A list of one, which the table shows in the action's colour.
+    columns["Action"] = [[action] for action in columns["Action"]]
+    columns["Rule"] = list(names)
+    order: tuple[str, ...] = ("Rule", "Action", "When")
+    tried = held_out_columns(rules, rule_set.thresholds.confidence)
+    if tried:
+        tried["Verdict"] = [[word] for word in tried["Verdict"]]
+        # Next to what they compare with; the rarer measures go to the end.
+        order = (*order, "Support", "Confidence", "Held out", "Verdict", "States")
+        columns |= tried
+    others = [name for name in columns if name not in order]
+    return pd.DataFrame({name: columns[name] for name in (*order, *others)})
+
+
+def table_height(rows: int, most: int) -> int | Literal["content"]:
+    """As high as its rows, or as so many of them."""
+    return "content" if rows <= most else (most + 1) * ROW_HEIGHT + ROW_HEIGHT // 2

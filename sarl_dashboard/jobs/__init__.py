@@ -1,0 +1,1 @@
+"""Long work: run, told of, cancelled, its result kept."""

@@ -1,0 +1,76 @@
+"""Ablations: run beside the page in processes, kept for whoever asks again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_core.agents.agent import Agent
+from sarl_core.shielding.shield import Shield
+from sarl_core.studies.ablation import Ablation
+from sarl_core.studies.ablation_run import AblationRecord
+from sarl_dashboard.byte_cache import Kept
+from sarl_dashboard.jobs.episodes import pool
+from sarl_dashboard.jobs.job import Job
+
+MOST_RECORDS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """An ablation that is asked for.
+
+    Attributes:
+        key: Digest of everything it depends on, its size left out.
+        env_id: Environment.
+        seed: Of the first episode.
+        episodes: How many.
+        most: Rules to take out at most.
+        agent: Makes the agent.
+        shield: With all its rules.
+    """
+
+    key: str
+    env_id: str
+    seed: int
+    episodes: int
+    most: int
+    agent: Callable[[], Agent]
+    shield: Callable[[], Shield]
+
+    @property
+    def known(self) -> Ablation | None:
+        """What has been run of it, by whomever."""
+        record = records().get(self.key)
+        return None if record is None else record.result(self.episodes, self.most)
+
+
+@st.cache_resource
+def records() -> Kept[AblationRecord]:
+    """What has been run of each ablation so far, by its key."""
+    return Kept(MOST_RECORDS)
+
+
+class Ablating(Job):
+    """The episodes of an ablation that are not known yet."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.key, self._wanted = wanted.key, wanted
+        # Streamlit's caches are asked here: the work's own thread has no session.
+        self._records, self._pool = records(), pool()
+        super().__init__(self._ablate, wanted.episodes)
+
+    def _ablate(self, _: Job) -> None:
+        wanted = self._wanted
+        record = self._records.get(wanted.key)
+        if record is None:
+            self.text = "Making the agent …"
+            record = AblationRecord(wanted.env_id, wanted.agent(), wanted.shield(), wanted.seed)
+            self._records.put(wanted.key, record)
+        work = record.run(wanted.episodes, wanted.most, self._pool.run)
+        for self.done, self.total, self.text in work:
+            if not self.wanted():
+                work.close()
+                return

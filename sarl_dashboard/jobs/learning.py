@@ -1,0 +1,332 @@
+"""Learning beside the pages: what is asked for, the process that does it, and where it is kept.
+
+A study learns in a process of its own, the `learn` command, which writes into a folder that can
+be read at any moment. The folder is found by what was asked for, so whoever asks the same again
+sees it at once, and what was stopped goes on. The process ends when nobody waits for it any
+more: it holds one end of a pipe, and stops in good order when the other end is let go of, were it
+because the dashboard has died.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+
+import streamlit as st
+
+import sarl_core
+from sarl_core.errors import InputError, SarlError, WorkError
+from sarl_core.files import shared_temporary_folder
+from sarl_core.learning.arms import LearningArm
+from sarl_core.learning.study_files import (
+    LearningStudy,
+    load_run,
+    load_study,
+    make_folder,
+    policy_path,
+)
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.shield import Projection
+from sarl_core.shipped import DATA
+from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.text import digest_of
+
+ROOT = Path(sarl_core.__file__).parents[1]  # where a process of its own finds the library
+STUDIES = DATA / "learning"
+MOST_TRAININGS = 2  # at once, of all visitors: each takes a core
+MOST_FOLDERS = 24  # the oldest go first; one takes a few MB
+LEFT_ALONE = 6 * 3600.0  # seconds without a look before a folder may go
+PATIENCE = 30.0  # seconds that a process gets to save what it has learned
+_LOOKED_AT_EVERY = 0.5  # seconds
+_NICE = 10  # the dashboard answers first
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A study that a visitor asks for.
+
+    Attributes:
+        env_id: Environment.
+        rules: Of the shield, or None.
+        rules_digest: Tells them from all others.
+        arms: Ways to learn.
+        steps: Of each run.
+        seeds: How many learners of each kind.
+        projection: What becomes of a continuous action that breaks a rule.
+    """
+
+    env_id: str
+    rules: RuleSet | None
+    rules_digest: str
+    arms: tuple[LearningArm, ...]
+    steps: int
+    seeds: int
+    projection: Projection
+
+    @property
+    def conditions(self) -> str:
+        """Digest of what all runs share."""
+        shared = (self.env_id, self.rules_digest, self.steps, self.projection)
+        return digest_of(repr(shared).encode())[:16]
+
+    @property
+    def folder(self) -> Path:
+        """Where the study is, or will be."""
+        names = tuple(arm.name for arm in self.arms)
+        return base() / f"{self.conditions}-{digest_of(repr((names, self.seeds)).encode())[:16]}"
+
+    @property
+    def steps_in_all(self) -> int:
+        """Over all runs."""
+        return self.steps * self.seeds * len(self.arms)
+
+
+def base() -> Path:
+    """The folder of all studies that visitors asked for; SARL_LEARNING names another one."""
+    name = f"sarl-explorer-{os.getuid()}" if hasattr(os, "getuid") else "sarl-explorer"
+    return Path(os.environ.get("SARL_LEARNING", "") or shared_temporary_folder() / name)
+
+
+def study_of(order: Order) -> LearningStudy | None:
+    """What there is of a study.
+
+    Args:
+        order: What was asked for.
+
+    Returns:
+        None if it was never begun.
+
+    Raises:
+        InputError: If its folder is damaged.
+    """
+    if not (order.folder / "plan.json").is_file():
+        return None
+    with suppress(OSError):
+        os.utime(order.folder)  # somebody looks at it: it stays
+    return load_study(order.folder)
+
+
+class Training:
+    """The process of one study, and how many wait for it."""
+
+    def __init__(self, order: Order, keep: set[Path]) -> None:
+        """Start it.
+
+        Args:
+            order: What is asked for.
+            keep: Folders that are in use.
+
+        Raises:
+            SarlError: If the folder or the process cannot be made.
+        """
+        self.waiting, self.fresh = 0, True
+        self.folder = order.folder
+        _tidy_up(keep | {self.folder})
+        make_folder(self.folder)
+        _own(self.folder.parent)
+        with suppress(OSError):
+            self.folder.parent.chmod(0o700)
+        _take_over_finished(order)
+        rules = ["--rules", str(self.folder / "asked.json")] if order.rules is not None else []
+        if order.rules is not None:
+            order.rules.save(self.folder / "asked.json")
+        self.log = self.folder / "log.txt"
+        with self.log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [
+                    *(sys.executable, "-m", "sarl_core", "learn", "--stop-with-input"),
+                    *("--env", order.env_id, *rules, "--steps", str(order.steps)),
+                    *(part for arm in order.arms for part in ("--arm", arm.name)),
+                    *("--seeds", str(order.seeds), "--projection", order.projection),
+                    *("--out", str(self.folder)),
+                ],
+                cwd=ROOT,
+                env=os.environ | {"OMP_NUM_THREADS": "1"},
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+                start_new_session=True,  # Ctrl-C in the dashboard's terminal is for the dashboard
+            )
+        with suppress(
+            OSError, AttributeError
+        ):  # where there are no priorities, it learns all the same
+            os.setpriority(os.PRIO_PROCESS, self.process.pid, _NICE)
+
+    @property
+    def running(self) -> bool:
+        """Whether it is at work."""
+        return self.process.poll() is None
+
+    def stop(self) -> None:
+        """Let go of it, and wait until it is gone."""
+        assert self.process.stdin is not None
+        with suppress(OSError):
+            self.process.stdin.close()
+        for end in (self.process.terminate, self.process.kill):
+            try:
+                self.process.wait(PATIENCE)
+                return
+            except subprocess.TimeoutExpired:
+                end()
+        self.process.wait()
+
+    def problem(self) -> str:
+        """Why it ended early, in its one sentence; "" if it did not."""
+        if not self.process.returncode:
+            return ""
+        lines = self.log.read_text(errors="replace").strip().splitlines()
+        said = next((line for line in reversed(lines) if line.startswith("error: ")), "")
+        return said.removeprefix("error: ") or "learning ended unexpectedly; start it again"
+
+
+class Trainings:
+    """The processes at work, shared between visitors."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._at_work: dict[Path, Training] = {}
+
+    def join(self, order: Order) -> Training:
+        """Wait for a study with others, or start it.
+
+        Raises:
+            SarlError: If it cannot be started.
+        """
+        while True:
+            with self._lock:
+                training = self._at_work.get(order.folder)
+                if training is None or not (training.waiting or training.running):
+                    training = self._at_work[order.folder] = self._start(order)
+                if training.waiting or training.fresh:
+                    training.fresh = False
+                    training.waiting += 1
+                    return training
+            time.sleep(_LOOKED_AT_EVERY)  # it is stopping; two must not write into a folder
+
+    def _start(self, order: Order) -> Training:
+        busy = sum(other.running for other in self._at_work.values())
+        if busy >= MOST_TRAININGS:
+            raise WorkError(
+                f"{busy} studies are learning on this machine already, which is as many as it "
+                "takes; try again when one has ended"
+            )
+        try:
+            return Training(order, keep=set(self._at_work))
+        except OSError as error:
+            raise WorkError(
+                f"learning cannot be started ({error.strerror or error}); make room in {base()}"
+            ) from error
+
+    def leave(self, training: Training) -> None:
+        """Wait no longer; the last one stops the process."""
+        with self._lock:
+            training.waiting -= 1
+            if training.waiting:
+                return
+        training.stop()
+        with self._lock:
+            if self._at_work.get(training.folder) is training:
+                del self._at_work[training.folder]
+
+
+@st.cache_resource
+def trainings() -> Trainings:
+    """All of them."""
+    return Trainings()
+
+
+class Learning(Job):
+    """A study that a visitor waits for.
+
+    Attributes:
+        order: What was asked for.
+        began: When, on the clock of `time.monotonic`.
+        already: Steps that had been made before.
+    """
+
+    def __init__(self, order: Order) -> None:
+        """Begin, or go on.
+
+        Args:
+            order: What is asked for.
+        """
+        self.order = order
+        self.began = time.monotonic()
+        self.already = steps_made(order)
+        everyone = trainings()
+        super().__init__(lambda job: _wait(job, order, everyone), order.steps_in_all)
+
+
+def steps_made(order: Order) -> int:
+    """How many steps of a study have been made.
+
+    Args:
+        order: What was asked for.
+    """
+    try:
+        study = study_of(order)
+    except SarlError:
+        return 0
+    return sum(run.done for run in study.runs) if study is not None else 0
+
+
+def _wait(job: Job, order: Order, everyone: Trainings) -> None:
+    training = everyone.join(order)
+    try:
+        while job.wanted() and training.running:
+            time.sleep(_LOOKED_AT_EVERY)
+        ended = not training.running
+    finally:
+        everyone.leave(training)
+    if ended and job.wanted() and (problem := training.problem()):
+        raise WorkError(problem)
+
+
+def _take_over_finished(order: Order) -> None:
+    """Copy finished runs of other studies under the same conditions; they would be the same."""
+    for sibling in sorted(base().glob(f"{order.conditions}-*")):
+        if sibling == order.folder:
+            continue
+        for arm in order.arms:
+            for seed in range(order.seeds):
+                _take_over(sibling, order.folder, arm, seed)
+
+
+def _take_over(source: Path, target: Path, arm: LearningArm, seed: int) -> None:
+    name = f"runs/{arm.name}-{seed}.json"
+    policy = policy_path(source, arm, seed)
+    if (target / name).exists() or not (source / name).is_file() or not policy.is_file():
+        return
+    with suppress(InputError, OSError):  # what cannot be read is learned again
+        if load_run(source / name).finished:
+            shutil.copyfile(policy, policy_path(target, arm, seed))
+            shutil.copyfile(source / name, target / name)
+
+
+def _tidy_up(keep: set[Path]) -> None:
+    """Remove the studies that nobody has looked at for longest, and not within the last hours."""
+    folders = [folder for folder in base().glob("*-*") if folder.is_dir() and folder not in keep]
+    ages = {folder: time.time() - folder.stat().st_mtime for folder in folders}
+    folders.sort(key=lambda folder: -ages[folder])
+    for folder in folders[: max(0, len(folders) + 1 - MOST_FOLDERS)]:
+        if ages[folder] > LEFT_ALONE:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _own(folder: Path) -> None:
+    """Refuse a folder for all studies that somebody else on this machine has made.
+
+    Raises:
+        WorkError: If it is not this user's.
+    """
+    if hasattr(os, "getuid") and folder.exists() and folder.stat().st_uid != os.getuid():
+        raise WorkError(
+            f"the folder {folder} belongs to another user; name another one in SARL_LEARNING"
+        )

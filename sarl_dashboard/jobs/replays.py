@@ -1,0 +1,324 @@
+"""What a replay depends on, how it is run, and where the latest few are kept.
+
+A module and not part of the page: a page is run anew each time, and would not recognise its own
+requests from the time before.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TypeVar
+
+import streamlit as st
+from streamlit.delta_generator import DeltaGenerator
+
+from sarl_core.agents.agent import Agent
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.environments.description import EnvironmentDescription
+from sarl_core.errors import SarlError
+from sarl_core.explaining.html.lit_path import PathFinder
+from sarl_core.explaining.replay import environment_dimensions
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import sentence
+from sarl_core.mining.rules import RuleSet
+from sarl_core.rendering.forking import Fork, Rest, fork
+from sarl_core.rendering.replay import Replay as Film
+from sarl_core.rendering.replay import render_episode, side_by_side
+from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.steps import StepTable
+from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.byte_cache import Kept
+from sarl_dashboard.text import in_full
+
+EPISODES = (20, 50, 100, 200)
+WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
+KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
+KEPT_PICTURES = 64  # of a replay, some 30 kB each
+
+Told = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Request:
+    """Everything that a replay depends on; equal requests give equal replays."""
+
+    env_id: str
+    agent: str
+    agent_digest: str
+    rules: str
+    rules_digest: str
+    projection: Projection
+    seed: int
+    outside: Outside = "act"
+    names: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One episode without the rules and, where there are any, one with them."""
+
+    key: Request
+    film: Film
+    rule_set: RuleSet | None
+    dimensions: tuple[LabelledDimension, ...]
+    features: tuple[Feature, ...]
+
+    @property
+    def plain(self) -> Episodes:
+        """The episode without the rules."""
+        return self.film.episodes[-1]
+
+    @property
+    def shielded(self) -> Episodes | None:
+        """The episode with the rules."""
+        return self.film.episodes[0] if len(self.film.episodes) > 1 else None
+
+    @property
+    def shown(self) -> Episodes:
+        """The episode that is gone through step by step."""
+        return self.film.episodes[0]
+
+    @property
+    def steps(self) -> StepTable:
+        """The steps of that episode."""
+        assert self.shown.steps is not None  # a replay records them
+        return self.shown.steps
+
+    @cached_property
+    def png(self) -> Callable[[int], bytes]:
+        """Gives the picture of a step as a file; the latest are kept."""
+        return lru_cache(KEPT_PICTURES)(self.film.png)
+
+    @cached_property
+    def finder(self) -> PathFinder | None:
+        """Follows a state through the rules; None without rules."""
+        return None if self.rule_set is None else PathFinder(self.rule_set)
+
+
+@st.cache_resource
+def kept_replays() -> Kept[Replay]:
+    """Replays by their request."""
+    return Kept(KEPT_REPLAYS)
+
+
+@st.cache_resource
+def kept_comparisons() -> Kept[tuple[tuple[str, Episodes], ...]]:
+    """Comparisons by their request and number of episodes."""
+    return Kept(KEPT_COMPARISONS)
+
+
+@st.cache_resource
+def kept_forks() -> Kept[Fork]:
+    """Forks by the request, the step, and what the shield does after it."""
+    return Kept(KEPT_FORKS)
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A request, and what it takes to fulfil it.
+
+    Attributes:
+        request: What is asked for.
+        agent: Makes the agent.
+        rule_set: The rules in force, or None.
+        description: Of the environment, under the names in force.
+    """
+
+    request: Request
+    agent: Callable[[], Agent]
+    rule_set: RuleSet | None
+    description: EnvironmentDescription
+
+    @property
+    def shield(self) -> Shield | None:
+        """The rules in force, or None."""
+        if self.rule_set is None:
+            return None
+        return Shield(
+            self.rule_set, projection=self.request.projection, outside=self.request.outside
+        )
+
+    def of_seed(self, seed: int) -> Order:
+        """The same agent and rules on another seed, as in a comparison over several."""
+        request = self.request
+        # Fresh weights depend on a seed too: those of the first episode act in all.
+        made_for = f" made for {request.seed}" if request.agent == "untrained" else ""
+        told = request.agent_digest + (made_for if seed != request.seed else "")
+        return replace(self, request=replace(request, seed=seed, agent_digest=told))
+
+
+def compared(order: Order) -> tuple[Order, int] | None:
+    """The comparison that the visitor ran last, if an order is one of its episodes.
+
+    Args:
+        order: Of the episode on screen.
+
+    Returns:
+        Its own order and number of episodes, or None.
+    """
+    latest: tuple[Order, int] | None = st.session_state.get("_compared")
+    if latest is None:
+        return None
+    first, episodes = latest
+    number = order.request.seed - first.request.seed
+    inside = 0 <= number < episodes
+    return latest if inside and first.of_seed(order.request.seed).request == order.request else None
+
+
+# --- running -----------------------------------------------------------------------------------
+
+
+def run(order: Order, tell: Told) -> Replay:
+    """Run the episode, without the rules and with them, and draw it.
+
+    Raises:
+        SarlError: If it cannot be run.
+    """
+    request, shield, rule_set = order.request, order.shield, order.rule_set
+    tell(0.0, "Making the agent …")
+    agent = order.agent()
+
+    def playing(done: int, total: int) -> None:
+        tell(0.7 * done / total, "Playing the episode and drawing it …")
+
+    if shield is None or rule_set is None:
+        film = render_episode(request.env_id, agent, seed=request.seed, progress=playing)
+    else:
+        film = side_by_side(
+            request.env_id,
+            agent,
+            shield,
+            seed=request.seed,
+            progress=playing,
+            describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
+        )
+
+    def encoding(done: int, total: int) -> None:
+        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
+
+    description = order.description
+    film = film.named(description)
+    film.gif(progress=encoding)
+    return Replay(
+        key=request,
+        film=film,
+        rule_set=rule_set,
+        dimensions=environment_dimensions(description, rule_set),
+        features=tuple(
+            Feature(name, unit)
+            for name, unit in zip(description.feature_names, description.feature_units, strict=True)
+        ),
+    )
+
+
+def compare(order: Order, episodes: int, tell: Told) -> tuple[tuple[str, Episodes], ...]:
+    """Run several episodes with the rules and without; of the first run the steps are kept.
+
+    Args:
+        order: Of the first of them.
+        episodes: How many.
+        tell: How far it is.
+
+    Raises:
+        SarlError: If they cannot be run.
+    """
+    agent, shield = order.agent(), order.shield
+    runs: list[tuple[str, Episodes]] = []
+    wanted = [(ALONE, None)] if shield is None else [(WITH, shield), (WITHOUT, None)]
+    for part, (name, guard) in enumerate(wanted):
+
+        def told(done: int, total: int, name: str = name, part: int = part) -> None:
+            tell((part + done / total) / len(wanted), f"{done} of {total} episodes, {name} …")
+
+        runs.append(
+            (
+                name,
+                rollout(
+                    order.request.env_id,
+                    agent,
+                    shield=guard,
+                    episodes=episodes,
+                    seed=order.request.seed,
+                    keep_steps=part == 0,
+                    progress=told,
+                ),
+            )
+        )
+    return tuple(runs)
+
+
+def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
+    """Run the episode with what the shield changed at a step, and without it, and draw both.
+
+    Args:
+        order: Of the episode; it has rules.
+        step: At which the change is withheld.
+        rest: What the shield does after it.
+        tell: How far it is.
+
+    Raises:
+        SarlError: If it cannot be run.
+    """
+    request, shield, rule_set = order.request, order.shield, order.rule_set
+    assert shield is not None
+    assert rule_set is not None
+    tell(0.0, "Making the agent …")
+    agent = order.agent()
+
+    def playing(done: int, total: int) -> None:
+        tell(0.7 * done / total, "Playing both and drawing them …")
+
+    def encoding(done: int, total: int) -> None:
+        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
+
+    found = fork(
+        request.env_id,
+        agent,
+        shield,
+        step=step,
+        rest=rest,
+        seed=request.seed,
+        describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
+        progress=playing,
+    )
+    found = replace(found, replay=found.replay.named(order.description))
+    found.gif(progress=encoding)
+    return found
+
+
+def movie(replay: Replay) -> bytes:
+    """The replay as MP4."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "replay.mp4"
+        replay.film.save(path)
+        return path.read_bytes()
+
+
+Result = TypeVar("Result")
+
+
+def with_progress(work: Callable[[Told], Result]) -> Result | None:
+    """Do long work under a progress bar; say what is wrong where it fails."""
+    slot = st.empty()
+    bar = slot.progress(0.0, "Starting …")
+    try:
+        return work(lambda share, text: set_bar(bar, share, text))
+    except SarlError as error:
+        refuse(error)
+        return None
+    finally:
+        slot.empty()
+
+
+def refuse(error: SarlError) -> None:
+    """Say what is wrong, in its one sentence."""
+    st.error(in_full(str(error)), icon=":material/error:")
+
+
+def set_bar(bar: DeltaGenerator, share: float, text: str) -> None:
+    """Move the bar."""
+    bar.progress(min(max(share, 0.0), 1.0), text)

@@ -1,0 +1,174 @@
+"""What a visitor may choose on several pages: environment, agents, rules; and what it stands for.
+
+The words on screen are those in the URL.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.agents.agent import (
+    EXPERT_FOLDER,
+    Agent,
+    PolicyAgent,
+    make_agent,
+    shipped_experts,
+)
+from sarl_core.errors import InputError, SarlError
+from sarl_core.rollouts.seeds import FRESH
+from sarl_core.shielding.shield import Projection
+from sarl_dashboard.state.environments import environment_of
+from sarl_dashboard.state.rule_files import OWN_FILE
+from sarl_dashboard.text import digest_of
+
+AGENTS = ("novice", "untrained", "expert", OWN_FILE)
+PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
+FRESH_SEED = FRESH  # far from those the demonstrations were recorded with
+
+
+def _latest_expert() -> int:
+    return max((path.stat().st_mtime_ns for path in EXPERT_FOLDER.glob("*.npz")), default=0)
+
+
+@st.cache_data(max_entries=64, show_spinner=False)
+def _expert_digest(env_id: str, stamp: int) -> str:
+    path = shipped_experts().get(env_id)
+    return digest_of(path.read_bytes()) if path is not None else ""
+
+
+def named_agent(choice: str, env_id: str) -> str:
+    """What tells an agent of a known name from others, by content.
+
+    Args:
+        choice: One of `AGENTS`, not a file.
+        env_id: Environment.
+    """
+    return f"{choice} {_expert_digest(env_id, _latest_expert()) if choice == 'expert' else ''}"
+
+
+def has_expert(env_id: str) -> bool:
+    """Whether an expert is shipped for an environment."""
+    return bool(_expert_digest(env_id, _latest_expert()))
+
+
+@dataclass(frozen=True)
+class PolicyFile:
+    """A policy that a visitor uploaded, and the statistics of its observations, if it has any."""
+
+    policy: UploadedFile
+    statistics: UploadedFile | None = None
+
+    @property
+    def name(self) -> str:
+        """As the visitor knows it."""
+        return str(self.policy.name)
+
+
+def policy_upload(label: str, key: str, env: str | None) -> PolicyFile | None:
+    """Ask for a policy, and for the statistics that belong to it; say what looks odd in them."""
+    policy = st.file_uploader(f"{label}: .npz, or a Stable-Baselines3 .zip", key=key)
+    if policy is None:
+        return None
+    statistics = None
+    if policy.name.lower().endswith(".zip"):
+        statistics = st.file_uploader(
+            "Statistics of its observations (.pkl)",
+            key=f"{key}_statistics",
+            help="Of a policy that was trained under VecNormalize: what VecNormalize.save() wrote.",
+        )
+    found = PolicyFile(policy, statistics)
+    say_notes(found, env)
+    return found
+
+
+def policy_uploads(label: str, key: str, env: str | None) -> list[PolicyFile]:
+    """Ask for policies; statistics (.pkl) among the files go to the .zip whose name they have."""
+    files = st.file_uploader(
+        f"{label}: .npz, or Stable-Baselines3 .zip (with NAME_vecnormalize.pkl, if NAME.zip was "
+        "trained under VecNormalize)",
+        accept_multiple_files=True,
+        key=key,
+    )
+    statistics = [file for file in files if file.name.lower().endswith(".pkl")]
+    policies = [file for file in files if file not in statistics]
+    zips = [file for file in policies if file.name.lower().endswith(".zip")]
+
+    def of(policy: UploadedFile) -> UploadedFile | None:
+        if policy not in zips:
+            return None
+        if len(zips) == len(statistics) == 1:
+            return statistics[0]
+        stem = Path(policy.name).stem
+        names = (f"{stem}_vecnormalize.pkl", f"{stem}_vec_normalize.pkl")
+        return next((file for file in statistics if file.name in names), None)
+
+    found = [PolicyFile(policy, of(policy)) for policy in policies]
+    used = [file.statistics for file in found]
+    for file in statistics:
+        if file not in used:
+            st.warning(
+                f"{file.name} was not used: call it NAME_vecnormalize.pkl if it belongs to NAME.zip"
+            )
+    for policy in found:
+        say_notes(policy, env)
+    return found
+
+
+def say_notes(file: PolicyFile, env: str | None) -> None:
+    """Say on the page how a policy was read, and what looks odd in it."""
+    try:
+        env_id = environment_of(env)
+        make, digest = agent_for(OWN_FILE, file, env_id, 0)
+        notes = _notes(digest, env_id, make)
+    except SarlError:
+        return  # the page says so where the policy is used
+    for note in notes:
+        st.warning(f"{note}.")
+
+
+@st.cache_data(max_entries=16, show_spinner=False)
+def _notes(digest: str, env_id: str, _make: Callable[[], Agent]) -> tuple[str, ...]:
+    agent = _make()
+    return agent.notes if isinstance(agent, PolicyAgent) else ()
+
+
+def agent_for(
+    choice: str, uploaded: PolicyFile | None, env_id: str, seed: int
+) -> tuple[Callable[[], Agent], str]:
+    """How to make the agent, and what tells it from others of its name.
+
+    Raises:
+        InputError: If there is no such agent.
+    """
+    if choice != OWN_FILE:
+        return lambda: make_agent(choice, env_id, seed=seed), named_agent(choice, env_id)
+    if uploaded is None:
+        raise InputError("no policy has been uploaded; upload one, or choose another agent")
+    files = [file for file in (uploaded.policy, uploaded.statistics) if file is not None]
+    contents = [file.getvalue() for file in files]
+
+    def make() -> Agent:
+        with tempfile.TemporaryDirectory() as folder:
+            paths = [Path(folder) / Path(file.name).name for file in files]
+            for path, content in zip(paths, contents, strict=True):
+                path.write_bytes(content)
+            try:
+                agent = make_agent(
+                    paths[0], env_id, seed=seed, normalise=next(iter(paths[1:]), None)
+                )
+            except SarlError as error:
+                # The folder is ours; the person knows the file by its name.
+                raise InputError(str(error).replace(f"{folder}/", "")) from error
+            if not isinstance(agent, PolicyAgent):
+                return agent
+            return replace(
+                agent, notes=tuple(note.replace(f"{folder}/", "") for note in agent.notes)
+            )
+
+    return make, " ".join(digest_of(content) for content in contents)

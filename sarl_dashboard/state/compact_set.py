@@ -1,0 +1,95 @@
+"""The compact rules as the set in force: in the URL, and counted on the chosen demonstrations.
+
+They come as a file, built from other pairs than those on screen. What stands behind a rule is
+shown of the demonstrations that were chosen, so the rules are made a tree again and counted there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
+from sarl_core.mining.budgeted_trees import leaf_rules
+from sarl_core.mining.rule_tree import recount
+from sarl_core.mining.rules import Condition, Rule, RuleSet
+from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.cache import cached
+from sarl_dashboard.state.rule_files import COMPACT, compact_file, compact_rules
+from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.text import in_full
+
+THRESHOLDS = "thresholds"
+
+
+@dataclass(frozen=True, eq=False)
+class Compact:
+    """The compact rules of the chosen data.
+
+    Attributes:
+        digest: Of the file and of the demonstrations that were counted.
+        shipped: The rules as they are in the file.
+        trees: The same rules as trees, one an action dimension, counted on the demonstrations.
+        counted: The rules with what was counted.
+    """
+
+    digest: str
+    shipped: RuleSet
+    trees: tuple[PolicyTree, ...]
+    counted: RuleSet
+
+    @cached_property
+    def _in_file(self) -> dict[tuple[int, tuple[Condition, ...]], Rule]:
+        return {(rule.dimension, rule.conditions): rule for rule in self.shipped.rules}
+
+    def as_shipped(self, rule: Rule) -> Rule:
+        """A counted rule as it is in the file."""
+        return self._in_file[rule.dimension, rule.conditions]
+
+
+def offered() -> bool:
+    """Whether there are compact rules for the chosen data."""
+    return compact_file().is_file()
+
+
+def in_force() -> bool:
+    """Whether they were chosen (URL: set)."""
+    return url_choice("set", (THRESHOLDS, COMPACT)[: 1 + offered()], THRESHOLDS) == COMPACT
+
+
+def choose(compact: bool) -> None:
+    """Choose the compact rules, or those at the thresholds; for callbacks."""
+    set_url_choice("set", COMPACT if compact else THRESHOLDS, THRESHOLDS)
+
+
+def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
+    """The compact rules, if they are in force.
+
+    Args:
+        demonstrations: N pairs to count.
+
+    Returns:
+        None where the thresholds are in force. Rules that cannot be used are said on the page,
+        and the thresholds are in force.
+    """
+    if not in_force():
+        return None
+    try:
+        shipped, digest = compact_rules()
+        return _counted(f"{digest} {demonstrations.digest}", shipped, demonstrations)
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+        return None
+
+
+@cached(show_spinner="Counting the compact rules …")
+def _counted(digest: str, _shipped: RuleSet, _demonstrations: Demonstrations) -> Compact:
+    trees = recount(_shipped, _demonstrations)
+    found = leaf_rules(trees)
+    compact = Compact(digest, _shipped, trees, found)
+    # The box is of the pairs that the rules were built from, whatever they are counted on.
+    boxed = tuple(replace(rule, box=compact.as_shipped(rule).box) for rule in found.rules)
+    return replace(compact, counted=replace(found, rules=boxed))

@@ -1,0 +1,83 @@
+"""The names that a visitor gave to features, units, actions and labels; kept in the session.
+
+They belong to the data as they were read, whatever episodes are left out or held out of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import cast
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import Names, check_names, names_of, renamed, tidy
+from sarl_core.errors import InputError
+from sarl_dashboard.cache import cached
+
+
+def _given() -> dict[str, Names]:
+    return cast("dict[str, Names]", st.session_state.setdefault("_names", {}))
+
+
+def _drafts() -> dict[str, Names]:
+    return cast("dict[str, Names]", st.session_state.setdefault("_name_drafts", {}))
+
+
+def named(raw: Demonstrations) -> Demonstrations:
+    """Demonstrations under the names that were given to them.
+
+    Args:
+        raw: As they were read.
+
+    Returns:
+        The same object where nothing was renamed.
+    """
+    names = _given().get(raw.digest)
+    return raw if names is None else _renamed(raw.digest, names, raw)
+
+
+def given_names(raw: Demonstrations | None) -> Names | None:
+    """The names in force; None where nothing was renamed."""
+    return None if raw is None else _given().get(raw.digest)
+
+
+def draft(raw: Demonstrations) -> Names:
+    """What stands in the tables, which may not be in force yet."""
+    return _drafts().get(raw.digest) or _given().get(raw.digest) or names_of(raw)
+
+
+def problem(raw: Demonstrations) -> str:
+    """Why what stands in the tables is not in force; "" where it is."""
+    try:
+        check_names(tidy(draft(raw)))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def give(raw: Demonstrations, names: Names) -> None:
+    """Keep what was typed, and put it in force if it can be; for callbacks."""
+    _drafts()[raw.digest] = names
+    if not problem(raw):
+        put = tidy(names)
+        if put == names_of(raw):
+            _given().pop(raw.digest, None)
+        else:
+            _given()[raw.digest] = put
+
+
+def reset(raw: Demonstrations) -> None:
+    """Go back to the names that the data came with; for callbacks."""
+    _drafts().pop(raw.digest, None)
+    _given().pop(raw.digest, None)
+
+
+def digest_of_names(names: Names | None) -> str:
+    """What tells names from others; "" for none."""
+    return "" if names is None else hashlib.blake2b(repr(names).encode()).hexdigest()[:16]
+
+
+@cached()
+def _renamed(digest: str, names: Names, _raw: Demonstrations) -> Demonstrations:
+    return renamed(_raw, names)

@@ -1,0 +1,65 @@
+"""The chosen thresholds and divider, kept in the URL."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.mining.rules import FILTERED, Thresholds
+
+MIN_DIVIDER, MAX_DIVIDER = 2, 16
+MAX_LIFT = 20.0
+MAX_DEPTH = 64  # 0 is no limit
+
+
+def _number(name: str, default: float, low: float, high: float) -> float:
+    """A number that a widget of some page holds; else the URL's; else the default."""
+    value: Any = st.session_state.get(name)
+    if value is None:
+        value = st.query_params.get(name, default)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = default
+    if not (math.isfinite(number) and low <= number <= high):
+        number = default
+    return number
+
+
+def chosen_limits() -> tuple[float, int | None]:
+    """Minimum lift and maximum depth in force (URL: lift, depth; depth 0 is no limit)."""
+    return _number("lift", 0.0, 0.0, MAX_LIFT), int(_number("depth", 0, 0, MAX_DEPTH)) or None
+
+
+def chosen_thresholds() -> Thresholds:
+    """The thresholds in force (URL: support, confidence, and those of `chosen_limits`)."""
+    return Thresholds(
+        _number("support", FILTERED.support, 0.0, 1.0),
+        _number("confidence", FILTERED.confidence, 0.0, 1.0),
+        *chosen_limits(),
+    )
+
+
+def choose_thresholds(thresholds: Thresholds) -> None:
+    """Put thresholds in force; for callbacks, and before the sliders are drawn."""
+    for name, value in (
+        ("support", thresholds.support),
+        ("confidence", thresholds.confidence),
+        ("lift", thresholds.lift),
+        ("depth", thresholds.max_depth or 0),
+    ):
+        if st.session_state.get(name) != value:
+            st.session_state[name] = value
+
+
+def chosen_divider() -> int:
+    """Number of intervals of continuous actions (URL: divider)."""
+    return int(_number("divider", MIN_DIVIDER, MIN_DIVIDER, MAX_DIVIDER))
+
+
+def choose_divider(divider: int) -> None:
+    """Choose a divider; for callbacks, and before its slider is drawn."""
+    if st.session_state.get("divider") != divider:
+        st.session_state["divider"] = divider

@@ -1,0 +1,122 @@
+"""Choices that the URL holds, and that survive a change of page without a widget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+
+import streamlit as st
+
+from sarl_dashboard.text import escaped
+
+_MOST = 2.0**53  # beyond it a browser's numbers are not whole any more
+
+
+def url_choice(name: str, options: Sequence[str], default: str) -> str:
+    """A choice that the URL holds and that survives a change of page.
+
+    Args:
+        name: URL parameter.
+        options: What it may be.
+        default: Taken where the URL says nothing, or something else.
+
+    Returns:
+        One of `options`.
+    """
+    return url_text(name, default, lambda text: text in options)
+
+
+def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
+    """A text that the URL holds and that survives a change of page.
+
+    Args:
+        name: URL parameter.
+        default: Taken where the URL says nothing, or nothing valid.
+        valid: Whether a text may be meant.
+
+    Returns:
+        The default, or a valid text.
+    """
+    value = st.query_params.get(name)
+    if value is None or not valid(value):  # a change of page takes the parameters away
+        value = str(st.session_state.get(f"_{name}", default))
+    if not valid(value):
+        value = default
+    set_url_choice(name, value, default)
+    return value
+
+
+def set_url_choice(name: str, value: str, default: str = "") -> None:
+    """Choose, from a widget's callback or by `url_choice`.
+
+    Args:
+        name: URL parameter.
+        value: Its new value.
+        default: Value that needs no place in the URL.
+    """
+    st.session_state[f"_{name}"] = value
+    if value != default:
+        if st.query_params.get(name) != value:
+            st.query_params[name] = value
+    elif name in st.query_params:
+        del st.query_params[name]
+
+
+def absurd_parameters() -> tuple[str, ...]:
+    """URL parameters with a number that nothing here can be, as 1e999 or four hundred nines."""
+    return tuple(
+        name
+        for name in st.query_params
+        if any(_is_absurd(text) for text in st.query_params.get_all(name))
+    )
+
+
+def _is_absurd(text: str) -> bool:
+    try:
+        number = float(text)
+    except ValueError:
+        return False
+    return not (math.isfinite(number) and abs(number) <= _MOST)
+
+
+def without(names: Collection[str]) -> dict[str, list[str]]:
+    """The URL parameters but for some of them."""
+    return {name: st.query_params.get_all(name) for name in st.query_params if name not in names}
+
+
+def say_left_out(names: Sequence[str], page: str) -> None:
+    """Remember that parameters of a link were left out, to be said on its page.
+
+    Args:
+        names: Of the URL parameters.
+        page: Title of the page that the link opens.
+    """
+    st.session_state["_left_out_of_link"] = (tuple(names), page)
+
+
+def show_left_out(page: str) -> None:
+    """Say what was left out of the link that opened a page, as long as one stays on it."""
+    names, told = st.session_state.get("_left_out_of_link", ((), page))
+    if told != page:
+        del st.session_state["_left_out_of_link"]
+    elif names:
+        listed = ", ".join(escaped(name[:40]) for name in names[:5])
+        st.warning(
+            f"The link gives a number that cannot be used for {listed}, so the usual one was "
+            "taken; check the address, or choose on this page.",
+            icon=":material/link_off:",
+        )
+
+
+def with_own(options: tuple[str, ...], key: str) -> tuple[str, ...]:
+    """Options of a select box that also takes typed ones, with the typed one among them.
+
+    Args:
+        options: The usual ones.
+        key: Of the widget; it is bound to the URL.
+
+    Returns:
+        The options, and what was typed or came with the URL.
+    """
+    own = st.session_state.get(key) or st.query_params.get(key)
+    return options if own is None or own in options else (*options, str(own))

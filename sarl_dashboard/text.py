@@ -1,0 +1,38 @@
+"""Text for the screen."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+
+_SIGNS = r"\`*_{}[]<>#$~|:&!^+-"
+# What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
+_JOINER = "\u2060"
+_BREAKS = re.compile(r"(?<=:)(?=//|[\w+-]+:)|(?<=@)|(?<=www)(?=\.)", re.IGNORECASE)
+
+
+def in_full(text: str) -> str:
+    """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
+    first = text.split(" ", 1)[0]
+    return escaped(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
+
+
+def escaped(text: str) -> str:
+    """Text that Markdown leaves alone: names come from files."""
+    broken = _BREAKS.sub(_JOINER, text)
+    return "".join(f"\\{sign}" if sign in _SIGNS else sign for sign in broken)
+
+
+def together(text: str) -> str:
+    """A sentence in which no line ends between a number and its percent sign."""
+    return re.sub(r"(?<=\d) (?=%)", "\N{NO-BREAK SPACE}", text)
+
+
+def file_name(env_id: str) -> str:
+    """An environment's id as the beginning of a file's name."""
+    return re.sub(r"[^\w.-]+", "-", env_id).strip("-.") or "unnamed"
+
+
+def digest_of(content: bytes) -> str:
+    """Fingerprint of a file."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()

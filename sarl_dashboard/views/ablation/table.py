@@ -1,0 +1,195 @@
+"""What the page Ablation shows: what it comes to, a figure, a table, and the chosen rule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.environments.failures import no_failures_text
+from sarl_core.explaining.figures.ablation import (
+    FIGURE_ROWS,
+    METHOD,
+    VERDICT_COLOURS,
+    ablation_columns,
+    ablation_figure,
+    ablation_text,
+    left_out_text,
+)
+from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
+from sarl_core.mining.language import sentence
+from sarl_core.studies.ablation import Ablation
+from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.components.tables import action_column
+from sarl_dashboard.jobs.ablation import Wanted
+from sarl_dashboard.text import escaped
+
+PLAIN = {"displayModeBar": False}
+TABLE_ROWS = 14
+ROW_HEIGHT = 33  # pixels
+
+
+def show(found: Ablation, wanted: Wanted, *, at_work: bool, linked: str | None) -> None:
+    """An ablation, as far as it is finished.
+
+    Args:
+        found: To show.
+        wanted: What was asked for.
+        at_work: Whether more is on its way.
+        linked: The set under which its rules are found on the Rules page; None if they are not.
+    """
+    why = no_failures_text(found.base.env_id)
+    notes_notice(note for note in found.remarks if note not in found.base.notes)
+    with st.grid(4, min_column_width=150):
+        st.metric("Return, all rules", f"{found.base.returns.mean():,.1f}", border=True)
+        st.metric(
+            "Failures, all rules",
+            f"{found.base_failures:,} of {len(found.base):,}" if found.failures_known else "–",
+            border=True,
+            help=None if found.failures_known else f"{why[0].upper()}{why[1:]}.",
+        )
+        st.metric("Rules taken out", f"{len(found.rules):,}", border=True)
+        st.metric(
+            "Episodes run for it",
+            f"{found.played:,}",
+            border=True,
+            help=f"Of {len(found.rules) * len(found.base):,}: in the others the rule that is taken "
+            "out changed nothing, so they are the same without it.",
+        )
+    if not at_work:
+        st.markdown("\n".join(f"- {escaped(text)}" for text in ablation_text(found)))
+        if left := left_out_text(found):
+            st.info(left, icon=":material/filter_list:")
+    if not found.rules:
+        if not at_work:
+            st.info(
+                "No rule changed an action in these episodes, so none can be told from the others. "
+                "Choose another agent, as the novice, or rules that apply more often.",
+                icon=":material/rule:",
+            )
+        return
+    figure(found)
+    table(found, wanted, linked)
+    st.caption(METHOD)
+
+
+def figure(found: Ablation) -> None:
+    """The rules with the largest differences."""
+    ranked = sorted(found.effects, key=lambda effect: effect.difference.mean)
+    if len(ranked) > FIGURE_ROWS:
+        largest = sorted(ranked, key=lambda effect: -abs(effect.difference.mean))[:FIGURE_ROWS]
+        ranked = [effect for effect in ranked if effect in largest]
+        st.caption(f"The {FIGURE_ROWS} rules whose removal moves the return most.")
+    st.plotly_chart(
+        ablation_figure(found, ranked),
+        config=PLAIN,
+        key="ablation_figure",
+        alt="For each rule, the change of the return without it, with its 95 % interval",
+    )
+
+
+def table(found: Ablation, wanted: Wanted, linked: str | None) -> None:
+    """All rules that were taken out; one can be chosen."""
+    import pandas as pd
+
+    columns = ablation_columns(found)
+    columns["Verdict"] = [[verdict] for verdict in columns["Verdict"]]
+    columns["Action"] = [[action] for action in columns["Action"]]
+    rows = len(found.rules)
+    chosen = st.dataframe(
+        pd.DataFrame(columns),
+        hide_index=True,
+        height="content" if rows <= TABLE_ROWS else (TABLE_ROWS + 1) * ROW_HEIGHT,
+        column_config=column_config(found),
+        key="ablation_table",
+        on_select="rerun",
+        selection_mode="single-row",
+        alt="What became of the episodes without each rule",
+    )
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.caption(
+            "Click a heading to sort, the box at the left of a row to read the rule.",
+            width="content",
+        )
+        name = wanted.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+        st.download_button(
+            "Download CSV",
+            lambda: csv(found),
+            f"ablation-{name}-{wanted.seed}.csv",
+            "text/csv",
+            key="ablation_csv",
+            on_click="ignore",
+            icon=":material/download:",
+        )
+    picked = chosen["selection"]["rows"]
+    if picked and picked[0] < rows:
+        rule_set = found.shield.rule_set
+        rule = rule_set.rules[found.rules[picked[0]]]
+        with st.container(border=True):
+            st.markdown(f"**{rule_set.name_of(rule)}.** {escaped(sentence(rule, rule_set))}")
+            if linked is not None:
+                st.page_link(
+                    "rules.py",
+                    label="Open this rule",
+                    icon=":material/rule:",
+                    query_params={**query(), "set": linked, "rule": rule.id},
+                )
+
+
+def query() -> Mapping[str, str]:
+    """What the URL says now."""
+    found: dict[str, str] = st.query_params.to_dict()
+    return found
+
+
+def column_config(found: Ablation) -> dict[str, Any]:
+    """What the columns look like, and what they mean."""
+    column = st.column_config
+    action, action_width = action_column(found.shield.rule_set.actions, "What the rule says")
+    failures = (
+        f"Of {len(found.base):,} episodes; with all rules it is {found.base_failures:,}"
+        if found.failures_known
+        else no_failures_text(found.base.env_id)
+    )
+    return {
+        "Rule": column.TextColumn(pinned=True, width=76),
+        "Verdict": column.MultiselectColumn(
+            options=[verdict.capitalize() for verdict in VERDICT_COLOURS],
+            color=list(VERDICT_COLOURS.values()),
+            width=160,
+            help="Load-bearing: without it the return is lower, or more episodes fail. Harmful: "
+            "the other way round.",
+        ),
+        "Return without it": column.NumberColumn(
+            format="%+.1f",
+            width=136,
+            help="Return without the rule less the return with it, mean over all episodes",
+        ),
+        "95 % interval": column.TextColumn(
+            alignment="right", width=136, help="Of that mean difference, of this rule alone"
+        ),
+        "Failures without it": column.NumberColumn(format="%d", width=140, help=failures),
+        "Changed": column.NumberColumn(
+            format="localized", width=86, help="Steps at which it changed the action"
+        ),
+        "In force": column.NumberColumn(
+            format="localized", width=80, help="Steps at which it applied"
+        ),
+        "Episodes": column.NumberColumn(
+            format="localized", width=86, help="In which it made a difference to an action"
+        ),
+        "Action": action,
+        "When": column.TextColumn(
+            width=450 - action_width, help="The conditions under which the rule applies"
+        ),
+    }
+
+
+def csv(found: Ablation) -> bytes:
+    """The table as a file, every number in full."""
+    frame = found.to_frame()
+    frame.insert(0, "seed", int(found.base.seeds[0]))
+    frame.insert(0, "agent", found.base.agent)
+    frame.insert(0, "environment", found.base.env_id)
+    return str(safe_cells(frame).to_csv(index=False)).encode()

@@ -1,0 +1,176 @@
+"""Uploading demonstrations: files, the environment they are from, and which column is what."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+import streamlit as st
+
+from sarl_core.demonstrations.formats import (
+    ColumnMap,
+    guess_columns,
+    read_demonstrations,
+    table_columns,
+)
+from sarl_core.errors import InputError, SarlError
+from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations, set_upload
+from sarl_dashboard.state.environments import registered
+from sarl_dashboard.state.url import with_own
+from sarl_dashboard.text import in_full
+
+_LOGGER = logging.getLogger(__name__)
+ENVIRONMENTS = tuple(env_id for _, env_id in SHIPPED_SETS.values())
+
+
+def uploaded_files() -> list[tuple[memoryview, str]]:
+    """Content and name of each file in the uploader."""
+    return [(file.getbuffer(), file.name) for file in st.session_state.get("upload_files") or []]
+
+
+def read_upload(columns: ColumnMap | None = None) -> None:
+    """Read what was uploaded; keep what was chosen before where that fails.
+
+    Args:
+        columns: Which column is what; guessed where not given.
+    """
+    st.session_state.pop("_upload_error", None)
+    files = uploaded_files()
+    if not files:
+        return
+    try:
+        if len(files) > 2:
+            raise InputError(
+                f"{len(files)} files were given; give one, or the pair of observations and actions"
+            )
+        (content, name), *others = files
+        with st.spinner("Reading and checking …"):
+            demonstrations = read_demonstrations(
+                content,
+                name,
+                env_id=environment() or None,
+                columns=columns,
+                companion=others[0] if others else None,
+            )
+    except SarlError as error:
+        st.session_state["_upload_error"] = str(error)
+        return
+    except Exception as error:  # whatever a reader did not foresee, what was chosen before stays
+        _LOGGER.exception("An upload could not be read")
+        st.session_state["_upload_error"] = str(
+            InputError(
+                f"{files[0][1]}: it cannot be read, and this program does not know why "
+                f"({type(error).__name__}); save it again in another format"
+            )
+        )
+        return
+    set_upload(demonstrations, file_name=", ".join(name for _, name in files))
+    st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
+
+
+def environment() -> str:
+    """The environment that names and bounds are taken from, "" for none.
+
+    Raises:
+        InputError: If the dashboard does not take it.
+    """
+    env_id = str(st.session_state.get("upload_env") or "").strip()
+    return registered(env_id) if env_id else ""
+
+
+def read_mapped() -> None:
+    """Read again, with the columns as they stand in the form."""
+    chosen = st.session_state
+    read_upload(
+        ColumnMap(
+            observations=tuple(chosen["map_observations"]),
+            actions=tuple(chosen["map_actions"]),
+            **{role: chosen[f"map_{role}"] for role in SINGLE_COLUMNS},
+        )
+    )
+
+
+SINGLE_COLUMNS = {
+    "episode": "Episode",
+    "step": "Step",
+    "reward": "Reward",
+    "terminated": "Ended by itself",
+    "truncated": "Ended by a limit",
+}
+
+
+def mapping_form(names: tuple[str, ...]) -> None:
+    """Ask which column is what.
+
+    Args:
+        names: Columns of the uploaded table.
+    """
+    guess = guess_columns(names)
+    with st.form("columns", border=True):
+        st.markdown("**Which column is what?**")
+        st.multiselect(
+            "Observations, in their order",
+            names,
+            default=guess.observations,
+            key="map_observations",
+        )
+        st.multiselect("Actions", names, default=guess.actions, key="map_actions")
+        with st.grid("auto", min_column_width=150):
+            for role, label in SINGLE_COLUMNS.items():
+                guessed = getattr(guess, role)
+                st.selectbox(
+                    label,
+                    names,
+                    key=f"map_{role}",
+                    placeholder="none",
+                    index=names.index(guessed) if guessed in names else None,
+                )
+        st.form_submit_button("Read with these columns", on_click=read_mapped, type="primary")
+
+
+def upload_section(*, expanded: bool) -> None:
+    """Upload files, say what is wrong with them, map their columns."""
+    with st.expander(
+        "Use your own demonstrations", icon=":material/upload_file:", expanded=expanded
+    ):
+        left, right = st.columns([3, 2], gap="medium")
+        left.file_uploader(
+            "Parquet, CSV or NPZ, or the pair obs.csv and actions.csv",
+            accept_multiple_files=True,
+            key="upload_files",
+            on_change=read_upload,
+            help="One row a step: episode, step, obs_<name> …, action or action_<name> …, and "
+            "if there are any reward, terminated, truncated.",
+        )
+        right.selectbox(
+            "Environment (optional)",
+            with_own(ENVIRONMENTS, "upload_env"),
+            index=None,
+            accept_new_options=True,
+            placeholder="none",
+            key="upload_env",
+            on_change=read_upload,
+            bind="query-params",
+            help="Names, units and bounds are taken from it where the file has none. Any id "
+            "that Gymnasium knows.",
+        )
+        error = st.session_state.get("_upload_error")
+        if error:
+            st.error(in_full(error), icon=":material/error:")
+            if chosen_demonstrations() is not None:
+                st.caption("Nothing has changed: the set below is still the one chosen.")
+        files = uploaded_files()
+        if len(files) == 1:
+            names = columns_of(*files[0])
+            # An error about a row is not mended by another map; one about columns is.
+            asked = error is not None and "column" in error and not re.search(r"\brow \d", error)
+            if names and (asked or st.toggle("Map the columns myself", key="map_columns")):
+                mapping_form(names)
+
+
+def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
+    """Columns of an uploaded table, () where it has none that can be read."""
+    try:
+        return table_columns(content, name)
+    except Exception:  # `read_upload` has said why
+        return ()

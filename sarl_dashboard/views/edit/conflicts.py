@@ -1,0 +1,68 @@
+"""Placed rules that overrule others: in words, and with an example state of each."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import streamlit as st
+
+from sarl_core.explaining.words.edits import conflict_text
+from sarl_core.mining.language import action_text
+from sarl_core.shielding.effects import Verdicts
+from sarl_dashboard.components.tables import table_height
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.edits import Base
+from sarl_dashboard.text import escaped
+
+CONFLICTS_SHOWN = 4
+
+
+def conflicts(of: Base, found: Verdicts) -> None:
+    """Placed rules that overrule others, with an example of each."""
+    import pandas as pd
+
+    st.subheader("Conflicts")
+    if not found.conflicts:
+        st.caption("No placed rule takes a state from another rule that says something else.")
+        return
+    rule_set, noun = found.rule_set, of.basis.noun
+    lines = [conflict_text(one, rule_set, states=noun) for one in found.conflicts]
+    st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:CONFLICTS_SHOWN]))
+    if len(lines) > CONFLICTS_SHOWN:
+        st.caption(f"The largest {CONFLICTS_SHOWN} of {len(lines):,}; the table has them all.")
+    st.dataframe(
+        pd.DataFrame(_conflict_rows(of, found)),
+        hide_index=True,
+        height=table_height(len(lines), 6),
+        key="conflicts",
+        alt="Rules that are overruled, with an example state of each",
+        column_config={
+            "States": st.column_config.NumberColumn(format="localized", width=70),
+            "Rule": st.column_config.TextColumn(width=90, help="The placed rule, which decides"),
+            "Takes from": st.column_config.TextColumn(
+                width=90, help="The rule that would decide without it"
+            ),
+        },
+    )
+
+
+def _conflict_rows(of: Base, found: Verdicts) -> dict[str, list[Any]]:
+    rule_set, basis = found.rule_set, of.basis
+    rows: dict[str, list[Any]] = {"Rule": [], "Says": [], "Takes from": [], "Which says": []}
+    rows["States"] = [one.states for one in found.conflicts]
+    for one in found.conflicts:
+        for who, says, at in (("Rule", "Says", one.rule), ("Takes from", "Which says", one.other)):
+            rule = rule_set.rules[at]
+            rows[who].append(rule_set.name_of(rule))
+            rows[says].append(action_text(rule.action, rule_set.actions[rule.dimension]))
+    if basis.expert is not None:
+        rows["Expert as the rule"] = [one.right for one in found.conflicts]
+        rows["Expert as the other"] = [one.other_right for one in found.conflicts]
+        shown = cast(Any, edits.demonstrations_for(of.rule_set))
+        examples = [one.example for one in found.conflicts]
+        rows["Example episode"] = shown.episodes[examples].tolist()
+        rows["Example step"] = shown.steps[examples].tolist()
+    examples = [one.example for one in found.conflicts]
+    for at, feature in enumerate(rule_set.source.features):
+        rows[feature.name] = basis.ground.states[examples, at].tolist()
+    return rows

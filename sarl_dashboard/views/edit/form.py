@@ -1,0 +1,280 @@
+"""The form for a rule by hand, with what the rule would change while it is filled in.
+
+What is filled in stays in the session, like the edits, so that neither an error nor a visit to
+another page loses it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import cast
+
+import streamlit as st
+
+from sarl_core.errors import SarlError
+from sarl_core.explaining.words.edits import change_text, conflict_text
+from sarl_core.mining.editing.edits import Add, Change, next_manual_id
+from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
+from sarl_core.mining.language import action_text, number_text, sentence
+from sarl_core.mining.rules import Operator, Rule, RuleSet
+from sarl_core.shielding.effects import Verdicts, change
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state.url import set_url_choice
+from sarl_dashboard.text import escaped
+from sarl_dashboard.views.edit.table import refuse
+
+ABOVE, AT_MOST = "above", "at most"
+SIGNS: dict[str, Operator] = {ABOVE: ">", AT_MOST: "<="}
+CONFLICTS_SHOWN = 3
+
+
+@dataclass
+class Draft:
+    """What the form is about.
+
+    Attributes:
+        number: Tells its widgets from those of other drafts.
+        rows: Numbers of the conditions.
+        latest: The largest number given to one.
+        changing: Id of the manual rule that is changed, "" for a new one.
+    """
+
+    number: int = 0
+    rows: list[int] = field(default_factory=lambda: [0])
+    latest: int = 0
+    changing: str = ""
+
+    def key(self, name: str, row: int | None = None) -> str:
+        """The key of a widget."""
+        return f"draft{self.number}_{name}" + ("" if row is None else f"_{row}")
+
+
+def _drafts() -> dict[str, Draft]:
+    return cast("dict[str, Draft]", st.session_state.setdefault("_drafts", {}))
+
+
+def draft_of(of: Base) -> Draft:
+    """What is being filled in for some rules."""
+    found = _drafts().get(of.key)
+    return found if found is not None else begin(of)
+
+
+def _clear(of: Base) -> None:
+    begin(of)
+
+
+def begin(of: Base, rule: Rule | None = None, *, changing: bool = False) -> Draft:
+    """Begin with an empty form, or with what a rule asks and says."""
+    number = int(st.session_state.get("_draft_number", 0)) + 1
+    st.session_state["_draft_number"] = number
+    draft = Draft(number)
+    if rule is not None:
+        asks = asks_of(rule, of.rule_set)
+        names = [feature.name for feature in of.rule_set.source.features]
+        draft = Draft(number, list(range(len(asks))), len(asks), rule.id if changing else "")
+        for row, ask in enumerate(asks):
+            sign = next(word for word, op in SIGNS.items() if op == ask.op)
+            place = names.index(ask.feature)
+            for name, value in (("feature", place), ("sign", sign), ("at", ask.threshold)):
+                st.session_state[draft.key(name, row)] = value
+        st.session_state[draft.key("dimension")] = rule.dimension
+        st.session_state[draft.key("action")] = rule.action
+    _drafts()[of.key] = draft
+    return draft
+
+
+def _more(draft: Draft) -> None:
+    draft.latest += 1
+    draft.rows.append(draft.latest)
+
+
+def _fewer(draft: Draft, row: int) -> None:
+    draft.rows.remove(row)
+
+
+def form(of: Base, now: Verdicts) -> None:
+    """The form and the preview."""
+    draft, rule_set = draft_of(of), now.rule_set
+    editing = draft.changing and any(rule.id == draft.changing for rule in rule_set.rules)
+    if draft.changing and not editing:
+        draft.changing = ""  # it was removed meanwhile: what was filled in makes a new one
+    st.subheader(f"Change {escaped(draft.changing)}" if editing else "Add a rule by hand")
+    with st.container(border=True, key="manual"):
+        asks = [_condition(of, draft, row) for row in list(draft.rows)]
+        st.button(
+            "Another condition" if draft.rows else "Add a condition",
+            on_click=_more,
+            args=(draft,),
+            icon=":material/add:",
+            key=draft.key("more"),
+            type="tertiary",
+        )
+        dimension, action = _says(draft, rule_set)
+        rule = _rule(of, now, draft, asks, dimension, action)
+        if rule is not None:
+            preview(of, now, rule, changing=bool(editing))
+        with st.container(horizontal=True, gap="small"):
+            edit = None if rule is None else Change(rule) if editing else Add(rule)
+            st.button(
+                "Save the change" if editing else "Add the rule",
+                on_click=_save,
+                args=(of, edit),
+                type="primary",
+                disabled=edit is None,
+                icon=":material/check:",
+                key=draft.key("save"),
+            )
+            st.button(
+                "Clear",
+                on_click=_clear,
+                args=(of,),
+                icon=":material/clear:",
+                key=draft.key("clear"),
+            )
+
+
+def _save(of: Base, edit: Add | Change) -> None:
+    edits.do(of, edit)
+    if not st.session_state.get("_edit_error"):
+        begin(of)
+
+        set_url_choice("rule", edit.rule_id)
+
+
+def _condition(of: Base, draft: Draft, row: int) -> Ask:
+    features = of.rule_set.source.features
+
+    def named(at: int) -> str:
+        name, unit = features[at].name, features[at].unit
+        return f"{name} ({unit})" if unit else name
+
+    with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
+        feature = st.selectbox(
+            "Feature",
+            range(len(features)),  # and not names, which a visitor may change meanwhile
+            format_func=named,
+            key=draft.key("feature", row),
+            persist_state="session",
+            label_visibility="collapsed",
+            width=260,
+        )
+        sign = st.selectbox(
+            "Is",
+            list(SIGNS),
+            key=draft.key("sign", row),
+            persist_state="session",
+            label_visibility="collapsed",
+            width=110,
+        )
+        values = of.basis.ground.states[:, feature]
+        least, most = float(values.min()), float(values.max())
+        low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
+        threshold = st.number_input(
+            "Number",
+            value=None,
+            step=None,
+            format="%.17g",  # every digit, and no more than tell the number from all others
+            key=draft.key("at", row),
+            persist_state="session",
+            label_visibility="collapsed",
+            placeholder=f"{low} to {high}",
+            width=190,
+        )
+        st.button(
+            "Remove the condition",
+            on_click=_fewer,
+            args=(draft, row),
+            icon=":material/close:",
+            key=draft.key("fewer", row),
+            type="tertiary",
+        )
+    return Ask(features[feature].name, SIGNS[sign], threshold)
+
+
+def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:
+    """The widgets for what the rule says."""
+    dimension = 0
+    with st.container(horizontal=True, gap="small"):
+        if len(rule_set.actions) > 1:
+            dimension = st.selectbox(
+                "Of the action",
+                range(len(rule_set.actions)),
+                format_func=lambda at: rule_set.actions[at].name,
+                key=draft.key("dimension"),
+                persist_state="session",
+                width=260,
+            )
+        action = st.selectbox(
+            "Then",
+            range(rule_set.actions[dimension].n_labels),
+            index=None,
+            format_func=lambda label: action_text(label, rule_set.actions[dimension]),
+            key=draft.key("action"),
+            persist_state="session",
+            placeholder="choose what the rule says",
+            width=310,
+        )
+    return dimension, action
+
+
+def _rule(
+    of: Base, now: Verdicts, draft: Draft, asks: list[Ask], dimension: int, action: int | None
+) -> Rule | None:
+    """The rule as it is filled in; None, with a sentence, while it is none."""
+    blank = action is None and all(ask.threshold is None for ask in asks)
+    if blank and asks:
+        st.caption("Fill in a condition and an action to see here what the rule would change.")
+        return None
+    try:
+        return manual_rule(
+            now.rule_set,
+            asks,
+            rule_id=draft.changing or next_manual_id(now.rule_set, edits.history(of)),
+            action=action,
+            dimension=dimension,
+            demonstrations=edits.demonstrations_for(of.rule_set),
+        )
+    except SarlError as error:
+        refuse(error)
+        return None
+
+
+def preview(of: Base, now: Verdicts, rule: Rule, *, changing: bool) -> None:
+    """What the rule would change, before it is there."""
+    edit = Change(rule) if changing else Add(rule)
+    then = edits.verdicts_of(of, (*edits.history(of).edits, edit))
+    noun = of.basis.noun
+    st.markdown(f"**{escaped(sentence(rule, then.rule_set, evidence=False))}**")
+    if not rule.conditions:
+        st.warning(
+            "Without conditions the rule applies always, and comes before every mined rule of its "
+            "action.",
+            icon=":material/warning:",
+        )
+    index = next(at for at, one in enumerate(then.rule_set.rules) if one.id == rule.id)
+    decides = int(then.decided[index])
+    told = [f"It would decide {decides:,} of {len(then.labels):,} {noun}s."]
+    if then.right is not None and decides:
+        told.append(f"The expert did as it says in {int(then.right[index]):,} of them.")
+    told.append(
+        "Against the set as it is now: "
+        + _lower(change_text(change(now, then), now, then, states=noun))
+    )
+    st.markdown(escaped(" ".join(told)))
+    own = [one for one in then.conflicts if one.rule == index]
+    if own:
+        states = sum(one.states for one in own)
+        rules = "one rule that says" if len(own) == 1 else f"{len(own):,} rules that say"
+        st.markdown(
+            f"Conflicts: it takes {states:,} {noun}{'s' if states != 1 else ''} from {rules} "
+            "something else.\n"
+            + "\n".join(
+                f"- {escaped(conflict_text(one, then.rule_set, states=noun))}"
+                for one in own[:CONFLICTS_SHOWN]
+            )
+        )
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]

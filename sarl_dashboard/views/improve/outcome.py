@@ -1,0 +1,437 @@
+"""What the Improve page shows: rounds, the report, what can be taken away; what is shipped."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.demonstrations.formats import save_demonstrations
+from sarl_core.documents import parse_json
+from sarl_core.environments.failures import no_failures_text
+from sarl_core.errors import InputError, SarlError
+from sarl_core.explaining.figures.aggregation import (
+    RoundPoint,
+    budget_figure,
+    budget_points,
+    card_points,
+    points_of,
+    rounds_figure,
+)
+from sarl_core.explaining.words.comparison import POLICY_TEXT
+from sarl_core.improving.aggregation import Aggregation
+from sarl_core.improving.aggregation_files import aggregation_card, card_path
+from sarl_core.limits import limited_bytes
+from sarl_core.mining.language import at_least_text, counted, share_text
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.rollouts.episodes import Episodes
+from sarl_dashboard.components.tables import table_height
+from sarl_dashboard.jobs.improving import Outcome
+from sarl_dashboard.state.data import (
+    SHIPPED_SETS,
+    UPLOAD,
+    chosen_dataset,
+    set_upload,
+    uploaded_demonstrations,
+)
+from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.improve.gaps import show_gaps
+
+PLAIN = {"displayModeBar": False}
+BUDGETS = "budgets.json"
+
+
+def show_outcome(outcome: Outcome, *, at_work: bool, changed: bool) -> None:
+    """Everything that is known of a run.
+
+    Args:
+        outcome: Not empty.
+        at_work: Whether more is on its way.
+        changed: Whether the settings ask for something else by now.
+    """
+    if changed:
+        used = uploaded_demonstrations()
+        improved = outcome.improved
+        if improved is not None and used is not None and used is improved.demonstrations:
+            st.success(
+                "These demonstrations are now the ones chosen, on every page. Run asks for more "
+                "where their rules lead.",
+                icon=":material/check:",
+            )
+        else:
+            st.markdown(":orange[:material/info: The settings have changed since: press Run.]")
+    if outcome.gaps is not None:
+        show_gaps(outcome, outcome.gaps, at_work=at_work)
+        return
+    if outcome.improved is not None:
+        show_report(outcome, outcome.improved)
+        take_away(outcome, outcome.improved)
+    show_rounds(
+        points_of(outcome.rounds),
+        planned=outcome.order.plan.rounds if at_work else None,
+        improved=outcome.improved,
+    )
+
+
+# --- what came of it ---------------------------------------------------------------------------
+
+
+def show_report(outcome: Outcome, improved: Aggregation) -> None:
+    """What the best rules achieve, in plain words."""
+    rules = improved.rule_set
+    size = size_text([len(rules.of_dimension(index)) for index in range(len(rules.actions))])
+    steps = counted(improved.plan.generations, "step")
+    refined = f", refined in {steps}" if improved.refined else ""
+    if improved.reported is None:
+        st.markdown(
+            f"The best so far are the {size} of round {improved.chosen}"
+            f"{', partly refined' if improved.refined else ''}. {how_chosen(improved)} Nothing was "
+            "reported on fresh episodes."
+        )
+        return
+    returns = improved.reported.returns
+    spread = improved.reported.statistics
+    shown = improved.demonstrations
+    st.markdown(
+        f"A novice that acts at random, kept to the {size} of round "
+        f"{improved.chosen}{refined}, reached a mean return of **{spread.mean:,.1f}** over "
+        f"{counted(len(returns), 'fresh episode')}, with a standard deviation of "
+        f"{spread.std:,.1f} and a least of {float(returns.min()):,.1f}. The rules were chosen on "
+        "other episodes"
+        + (
+            f", where their mean was {improved.validation_mean:,.1f}: the best of several is lucky "
+            "too, so that number counts for less."
+            if improved.validation_mean is not None
+            else "."
+        )
+        + (
+            " The first round was the best, so its rules come from the demonstrations as they "
+            "were; more rounds, or more rules, may change that."
+            if improved.chosen == 1 and len(improved.rounds) > 1
+            else ""
+        )
+    )
+    if improved.reported.summary().get("freedom") == 0.0:
+        changed = share_text(improved.reported.summary()["intervention_rate"])
+        st.markdown(f"{POLICY_TEXT}: they changed {changed} of the novice's steps.")
+    with st.grid(7, min_column_width=130):
+        for label, value, hint in (
+            ("Mean return", f"{spread.mean:,.1f}", "Over the fresh episodes"),
+            ("Deviation", f"{spread.std:,.1f}", "Standard deviation over the fresh episodes"),
+            ("Least return", f"{float(returns.min()):,.1f}", "Of the fresh episodes"),
+            (
+                "Typical return",
+                f"{spread.iqm:,.1f}",
+                "Mean of the middle half of the episodes (IQM), 95 % interval "
+                f"{spread.low:,.1f} to {spread.high:,.1f}",
+            ),
+            ("Failures", *failures_of(improved.reported)),
+            ("Rules", f"{len(rules):,}", "Over all actions"),
+            (
+                "Demonstrations",
+                f"{len(shown):,}",
+                "State-action pairs that they were made of, all answered by the expert",
+            ),
+        ):
+            st.metric(label, value, border=True, height="stretch", help=hint)
+
+
+def failures_of(episodes: Episodes) -> tuple[str, str]:
+    """The share of episodes that ended in failure, and what it tells."""
+    found = episodes.failures
+    if found is None:
+        why = no_failures_text(episodes.env_id)
+        return "–", f"{why[0].upper()}{why[1:]}"
+    return (
+        at_least_text(found.rate, found.unknown),
+        f"{found.count:,} of {found.of:,} fresh episodes, 95 % interval {share_text(found.low)} to "
+        f"{share_text(found.high)}",
+    )
+
+
+def how_chosen(improved: Aggregation) -> str:
+    """By what the rules of a stopped run are the best, in a sentence."""
+    if improved.validation_mean is not None:
+        return (
+            "They were chosen by episodes played for that alone, with a mean return of "
+            f"{improved.validation_mean:,.1f}; that number is flattered by being the best."
+        )
+    if improved.refined:
+        return (
+            "The round was chosen by episodes played for that alone. How far its rules were "
+            "refined was judged by the episodes of the refinement: that is little."
+        )
+    best = improved.rounds[improved.chosen - 1]
+    return (
+        f"They are judged by the {counted(len(best.returns), 'episode')} of their round alone: "
+        "that is little, and the number is flattered by being the best."
+    )
+
+
+def size_text(per_action: Sequence[int]) -> str:
+    """How many rules there are, for Markdown.
+
+    Args:
+        per_action: Rules of each action dimension.
+    """
+    size = f"**{counted(sum(per_action), 'rule')}**"
+    if len(per_action) > 1:
+        size += f" (at most {max(per_action)} for each of {len(per_action)} actions)"
+    return size
+
+
+def show_rounds(
+    points: Sequence[RoundPoint],
+    *,
+    planned: int | None = None,
+    improved: Aggregation | None = None,
+    chosen: int | None = None,
+    reported: float | None = None,
+    key: str = "rounds",
+) -> None:
+    """The curve over the rounds, and a table of them."""
+    if improved is not None:
+        chosen = improved.chosen
+        if improved.reported is not None:
+            reported = improved.reported.statistics.mean
+    st.plotly_chart(
+        rounds_figure(points, planned=planned, chosen=chosen, reported=reported),
+        config=PLAIN,
+        key=f"{key}_figure",
+        alt="Return, coverage, disagreement with the expert and number of rules, round by round",
+    )
+    marks = []
+    if chosen is not None:
+        marks.append("The ring is the chosen round.")
+    if reported is not None:
+        marks.append("The diamond is what its rules achieve on fresh episodes.")
+    st.caption(
+        "Return: the mean of the round's episodes, shaded one standard deviation to either side. "
+        "Coverage: share of the states met in which some rule applied. " + " ".join(marks)
+    )
+    st.dataframe(
+        [
+            {
+                "Round": point.number,
+                "Mean return": point.mean,
+                "Deviation": point.std,
+                "Coverage": 100 * point.coverage,
+                "Expert disagrees": 100 * point.disagreement,
+                "Rules": point.rules,
+                "Demonstrations": point.pairs,
+                "Chosen": point.number == chosen,
+            }
+            for point in points
+        ],
+        hide_index=True,
+        height=table_height(len(points), 12),
+        key=f"{key}_table",
+        column_config={
+            "Mean return": st.column_config.NumberColumn(format="%.1f"),
+            "Deviation": st.column_config.NumberColumn(
+                format="%.1f", help="Standard deviation of the returns of its episodes"
+            ),
+            "Coverage": st.column_config.NumberColumn(
+                format="%.1f %%", help="Share of the states met in which some rule applied"
+            ),
+            "Expert disagrees": st.column_config.NumberColumn(
+                format="%.1f %%",
+                help="Share of the rules' decisions in which the expert would do otherwise",
+            ),
+            "Rules": st.column_config.NumberColumn(format="localized"),
+            "Demonstrations": st.column_config.NumberColumn(
+                format="localized", help="State-action pairs that its rules were made of"
+            ),
+        },
+    )
+
+
+def take_away(outcome: Outcome, improved: Aggregation) -> None:
+    """The rules, their card and the demonstrations, to keep and to go on with."""
+    name = f"{outcome.order.env_id.rsplit('/', 1)[-1]}-{len(improved.rule_set)}-rules"
+    if not improved.is_finished:
+        name += ".stopped"
+    in_use = uploaded_demonstrations() is improved.demonstrations
+    with st.container(horizontal=True):
+        st.button(
+            "Use these demonstrations",
+            type="primary",
+            icon=":material/dataset:",
+            key="use_improved",
+            on_click=use,
+            args=(improved, name),
+            disabled=in_use and chosen_dataset() == UPLOAD,
+            help="Every page then works on them, as if you had uploaded them.",
+        )
+        for label, file, mime, make in (
+            ("Rules", f"{name}.json", "application/json", lambda: rules_to_json(improved.rule_set)),
+            ("Card", f"{name}.card.json", "application/json", lambda: card_text(outcome, improved)),
+            (
+                "Demonstrations",
+                f"{name}.parquet",
+                "application/vnd.apache.parquet",
+                lambda: as_parquet(improved),
+            ),
+        ):
+            st.download_button(
+                label,
+                make,
+                file,
+                mime,
+                key=f"improve_{label.lower()}",
+                on_click="ignore",
+                icon=":material/download:",
+                help={
+                    "Rules": "The rule file (JSON), for evaluate and as own file on other pages",
+                    "Card": "How the rules came about and what they achieve (JSON)",
+                    "Demonstrations": "All pairs of the chosen round (Parquet)",
+                }[label],
+            )
+
+
+def use(improved: Aggregation, name: str) -> None:
+    """Work on the improved demonstrations from now on; for a callback."""
+    set_upload(improved.demonstrations, file_name=f"{name}.parquet")
+    st.rerun()  # the sidebar says what is chosen
+
+
+def card_text(outcome: Outcome, improved: Aggregation) -> str:
+    """The card as a file."""
+    return json.dumps(aggregation_card(improved, command=outcome.order.command), indent=2) + "\n"
+
+
+def as_parquet(improved: Aggregation) -> bytes:
+    """The demonstrations as a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "demonstrations.parquet"
+        save_demonstrations(improved.demonstrations, path)
+        return path.read_bytes()
+
+
+# --- before a run ------------------------------------------------------------------------------
+
+
+def show_shipped() -> None:
+    """What the page does, and what has been achieved with it."""
+    st.info(
+        "Choose how many rules there may be, then press Run. Each round the rules act in a "
+        "novice's place, and the expert says what it would have done in the states they lead to; "
+        "the best round is reported on fresh episodes. The work goes on while you look at other "
+        "pages, and what is finished stays when you cancel.",
+        icon=":material/play_circle:",
+    )
+    file = card_path(compact_file())
+    try:
+        card = read_document(file)
+        if card is not None:
+            show_card(card)
+        show_budgets()
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+
+
+def read_document(path: Path) -> dict[str, Any] | None:
+    """A JSON file; None if there is none.
+
+    Raises:
+        InputError: If it cannot be read.
+    """
+    if not path.is_file():
+        return None
+    try:
+        document = parse_json(limited_bytes(path))
+    except (OSError, ValueError, InputError) as error:
+        raise InputError(f"{path.name} cannot be read ({error}); write it again") from error
+    if not isinstance(document, dict):
+        raise InputError(f"{path.name} holds no JSON object; write it again")
+    return document
+
+
+def show_card(card: dict[str, Any]) -> None:
+    """How the shipped compact rules came about."""
+    points = card_points(card)
+    try:
+        told, chosen, command = card_sentence(card), int(card["chosen_round"]), str(card["command"])
+        reported = card["reported"]
+        mean = float(reported["mean"]) if reported else None
+        if not points:
+            raise KeyError("rounds")
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the card of the compact rules lacks {error}; make the rules again with aggregate"
+        ) from error
+    st.subheader("The compact rules that are shipped")
+    st.markdown(told)
+    with st.popover("The command that made them", icon=":material/terminal:"):
+        st.code(command, language="sh", wrap_lines=True)
+    show_rounds(points, chosen=chosen, reported=mean, key="card")
+
+
+def card_sentence(card: dict[str, Any]) -> str:
+    """What the rules of a card achieve, for Markdown."""
+    size = size_text([int(count) for count in card["rules_per_dimension"]])
+    afterwards = ""
+    if card["refined"]:
+        afterwards = f", refined in {counted(int(card['generations']), 'step')} afterwards"
+    origin = f"They are those of round {int(card['chosen_round'])}{afterwards}."
+    reported = card["reported"]
+    if not reported:
+        return f"These are {size}. {origin}"
+    return (
+        f"A novice that acts at random, kept to these {size}, reached a mean return of "
+        f"**{float(reported['mean']):,.1f}** over {int(reported['episodes']):,} fresh episodes "
+        f"(deviation {float(reported['std']):,.1f}, least {float(reported['min']):,.1f})"
+        f"{_failures_of_card(reported)}. {origin}{_policy_of_card(reported)}"
+    )
+
+
+def _failures_of_card(reported: dict[str, Any]) -> str:
+    """How many of a card's episodes failed; nothing where it does not say."""
+    if "failures" not in reported:
+        return ""
+    low, high = (share_text(float(reported[f"failure_{end}"])) for end in ("low", "high"))
+    cut = int(reported.get("cut", 0))
+    also = f", and {cut:,} were cut off before they could" if cut else ""
+    return f"; {int(reported['failures']):,} of them failed{also} (95 % interval {low} to {high})"
+
+
+def _policy_of_card(reported: dict[str, Any]) -> str:
+    """That a card's rules are a policy, where they leave nothing to choose from."""
+    if reported.get("freedom") != 0:
+        return ""
+    changed = share_text(float(reported["intervention_rate"]))
+    return f" {POLICY_TEXT}: they changed {changed} of the novice's steps."
+
+
+def show_budgets() -> None:
+    """Return against number of rules, an environment each."""
+    document = read_document(RULES_FOLDER / BUDGETS)
+    if document is None:
+        return
+    found = [
+        (label, points)
+        for label, env_id in SHIPPED_SETS.values()
+        if (points := budget_points(document, env_id))
+    ]
+    if not found:
+        return
+    st.subheader("How many rules it takes")
+    st.caption(
+        "What the best rules of each number achieve on fresh episodes, with a novice that acts at "
+        "random. A number of rules is the most of any one action."
+    )
+    with st.grid(min(len(found), 3), min_column_width=300) as grid:
+        for index, (label, points) in enumerate(found):
+            with grid.cell():
+                st.markdown(f"**{label}**")
+                st.plotly_chart(
+                    budget_figure(points),
+                    config=PLAIN,
+                    key=f"budget_{index}",
+                    alt=f"{label}: return against the number of rules",
+                )

@@ -1,0 +1,127 @@
+"""What the Learning page shows of a study: what it found, how it went, and what came of it."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import streamlit as st
+
+from sarl_core.explaining.figures.learning import (
+    afterwards_figure,
+    arm_colour,
+    curves_figure,
+    outcome_figure,
+)
+from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
+from sarl_core.learning.study_files import LearningStudy, policy_path
+from sarl_core.learning.summary import best, summarise_study
+from sarl_dashboard.text import escaped
+
+PLAIN = {"displayModeBar": False}
+
+
+def show_study(study: LearningStudy, name: str) -> None:
+    """All that is known of the finished runs of a study.
+
+    Args:
+        study: With finished runs.
+        name: Of the place on screen, for the charts' keys.
+    """
+    summaries = summarise_study(study)
+    answer, *more = finding(study, summaries)
+    found = best(summaries)
+    (st.success if found is not None else st.info)(
+        escaped(answer), icon=":material/verified_user:" if found is not None else ":material/info:"
+    )
+    picture, words = st.columns([3, 2], gap="large")
+    with picture:
+        st.markdown("**Crashes while learning, and what the learner is worth without its shield**")
+        st.plotly_chart(
+            outcome_figure(summaries),
+            config=PLAIN,
+            key=f"outcome_{name}",
+            alt="Crashes while learning against the return afterwards without a shield",
+        )
+        st.caption("Large points are means, small ones single learners. Squares learn by replay.")
+    with words:
+        for paragraph in more[:-1]:
+            st.markdown(escaped(paragraph))
+        st.caption(escaped(more[-1]) if more else "")
+    during, after, table, arms = st.tabs(
+        ["While learning", "Afterwards", "All numbers", "The ways to learn"]
+    )
+    with during:
+        show_curves(study, name)
+    with after:
+        st.plotly_chart(
+            afterwards_figure(summaries),
+            config=PLAIN,
+            key=f"after_{name}",
+            alt="Return after learning with the shield on and off",
+        )
+        st.caption(
+            f"{int(study.settings['trial_episodes'])} episodes of each learner, on seeds that "
+            "none has met, each action the one the learner thinks best. The dotted line is PPO "
+            "that never had a shield. The interval is over episodes; how much the learners "
+            "themselves differ, the table says."
+        )
+    with table:
+        st.dataframe(
+            [dict(zip(HEADINGS, row, strict=True)) for row in table_rows(summaries)],
+            hide_index=True,
+            height="content",
+        )
+        st.caption(
+            "Means of the learners, in brackets the least and the largest. Crashed: the episode "
+            "ended by failure. Changed: share of the steps at which the rules changed what the "
+            "learner wanted. After: the shield is off, but in the last column."
+        )
+    with arms:
+        for summary in summaries:
+            arm = summary.arm
+            st.markdown(
+                f'<span style="color:{arm_colour(arm)}">■</span> **{arm.title}.** {arm.what}',
+                unsafe_allow_html=True,
+            )
+
+
+def show_curves(study: LearningStudy, name: str) -> None:
+    """How learning goes, or went.
+
+    Args:
+        study: At work or finished.
+        name: Of the place on screen.
+    """
+    st.plotly_chart(
+        curves_figure(study),
+        config=PLAIN,
+        key=f"curves_{name}",
+        alt="Return, crashes so far and share of changed actions while learning",
+    )
+    many = " A band reaches from the lowest learner to the highest." if len(study.seeds) > 1 else ""
+    st.caption(
+        "Returns are without any penalty. Changed by the rules: how often the network wanted "
+        f"something else.{many} Click a name to hide it, double-click to see it alone."
+    )
+
+
+def archive(study: LearningStudy, folder: Path) -> bytes:
+    """Everything that is finished, as one file.
+
+    Args:
+        study: With finished runs.
+        folder: Where it is.
+
+    Returns:
+        A `.zip`: tables, rules, and each policy.
+    """
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
+        paths = [folder / name for name in ("results.json", "curves.csv", "rules.json")]
+        paths += [policy_path(folder, run.arm, run.seed) for run in study.finished]
+        for path in paths:
+            if path.is_file():
+                file.write(path, path.relative_to(folder))
+    return packed.getvalue()

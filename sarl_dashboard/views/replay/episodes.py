@@ -1,0 +1,131 @@
+"""Several episodes on the page Replay: returns with the rules and without, and how each ended."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.explaining.figures.replay import (
+    SHIELDED_COLOUR,
+    UNSHIELDED_COLOUR,
+    ReturnRow,
+    comparison_figure,
+)
+from sarl_core.explaining.words.fork import ending_text
+from sarl_core.mining.language import share_text
+from sarl_core.rendering.forking import endings
+from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.flips import pace_of
+from sarl_core.rollouts.statistics import summarise
+from sarl_dashboard.components.flips import flips_rate, flips_title
+from sarl_dashboard.jobs.replays import (
+    EPISODES,
+    WITH,
+    Order,
+    compare,
+    compared,
+    kept_comparisons,
+    with_progress,
+)
+
+PLAIN = {"displayModeBar": False}
+
+
+def comparison(order: Order) -> None:
+    """Several episodes instead of one, on request."""
+    st.subheader("Over several episodes")
+    found = compared(order)
+    if found is not None:
+        order = found[0]  # that of the first episode, whichever is on screen
+    episodes = int(
+        st.segmented_control(
+            "Episodes",
+            EPISODES,
+            default=EPISODES[0],
+            key="over",
+            bind="query-params",
+            required=True,
+        )
+        or EPISODES[0]
+    )
+    runs = kept_comparisons().get((order.request, episodes))
+    if runs is None:
+        st.caption("One episode may be luck. Run more of them, each on a seed of its own.")
+        if st.button(
+            f"Run {episodes} episodes", key="compare", icon=":material/stacked_bar_chart:"
+        ):
+            runs = with_progress(lambda tell: compare(order, episodes, tell))
+            if runs is not None:
+                kept_comparisons().put((order.request, episodes), runs)
+                st.session_state["_compared"] = (order, episodes)
+                st.rerun()
+        return
+    if found != (order, episodes):
+        st.session_state["_compared"] = (order, episodes)
+        st.rerun()  # the recorder above shows their steps
+    rows, table = [], []
+    for name, run in runs:
+        interval = summarise(run.returns)
+        rows.append(
+            ReturnRow(
+                name,
+                run.returns,
+                interval.iqm,
+                interval.low,
+                interval.high,
+                SHIELDED_COLOUR if name == WITH else UNSHIELDED_COLOUR,
+            )
+        )
+        table.append(
+            {
+                "Run": name.capitalize(),
+                "Mean return": f"{interval.mean:,.1f}",
+                "Typical return": f"{interval.iqm:,.1f}",
+                "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
+                "Mean length": f"{run.lengths.mean():,.1f}",
+                "Changed": share_text(float(run.interventions.sum()) / float(run.lengths.sum()))
+                if name == WITH
+                else "–",
+                flips_title(run.env_id): f"{flips_rate(run):.2f}" if name == WITH else "–",
+            }
+        )
+    st.plotly_chart(
+        comparison_figure(rows),
+        config=PLAIN,
+        key="comparison",
+        alt="Returns of the episodes with the rules and without",
+    )
+    st.dataframe(table, hide_index=True)
+    st.caption(
+        "A point is an episode. The diamond is the typical return, the mean of the middle "
+        "half of the episodes, which a few odd ones do not move, with its 95 % interval. The "
+        "steps of all episodes are in the flight recorder above."
+    )
+    every_episode(runs[0][1], shielded=runs[0][0] == WITH)
+
+
+def every_episode(episodes: Episodes, *, shielded: bool) -> None:
+    """A row an episode."""
+    pace = pace_of(episodes.env_id)
+    columns: dict[str, object] = {
+        "Seed": episodes.seeds,
+        "Return": episodes.returns,
+        "Steps": episodes.lengths,
+        "Ended": [ending_text(end, episodes.env_id) for end in endings(episodes)],
+    }
+    if shielded and episodes.flips is not None:
+        columns["Changed"] = episodes.interventions
+        columns[flips_title(episodes.env_id)] = [
+            pace.rate(*pair)
+            for pair in zip(episodes.flips.tolist(), episodes.lengths.tolist(), strict=True)
+        ]
+    with st.expander("Every episode"):
+        st.dataframe(
+            columns,
+            hide_index=True,
+            height=300,
+            column_config={
+                "Seed": st.column_config.NumberColumn(format="%d"),
+                "Return": st.column_config.NumberColumn(format="%.1f"),
+                flips_title(episodes.env_id): st.column_config.NumberColumn(format="%.2f"),
+            },
+        )

@@ -1,0 +1,295 @@
+"""What came of a replay: its numbers, and its steps one by one."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+from collections.abc import Callable
+
+import numpy as np
+import streamlit as st
+from streamlit.errors import StreamlitAPIException
+
+from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, label_colour
+from sarl_core.explaining.figures.replay import (
+    SHIELDED_COLOUR,
+    UNSHIELDED_COLOUR,
+    ReturnLine,
+    Timeline,
+    intervention_strip,
+    return_figure,
+)
+from sarl_core.explaining.html.lit_path import lit_paths_html
+from sarl_core.explaining.html.step_card import picture, step_card, swatch
+from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import counted, label_text, number_text, share_text
+from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.flips import pace_of
+from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Order, Replay
+from sarl_dashboard.views.replay.fork import fork_section
+from sarl_dashboard.views.replay.recorder import flight_recorder
+
+PLAIN = {"displayModeBar": False}
+FEW = 0.3  # share of the steps below which the rules say little about an episode
+
+
+def numbers(replay: Replay, unfiltered: Callable[[], None] | None) -> None:
+    """Returns, lengths and interventions.
+
+    Args:
+        replay: To show.
+        unfiltered: Runs it with the unfiltered rules; None where that is not to be offered.
+    """
+    plain, shielded = replay.plain, replay.shielded
+    alone = float(plain.returns[0])
+    if shielded is None:
+        with st.grid(6, min_column_width=130):
+            st.metric("Return", f"{alone:,.1f}", border=True)
+            st.metric("Length", f"{int(plain.lengths[0]):,} steps", border=True)
+        return
+    with_rules, length = float(shielded.returns[0]), int(shielded.lengths[0])
+    changed, covered = int(shielded.interventions[0]), int(shielded.covered[0])
+    with st.grid(6, min_column_width=140):
+        st.metric("Return with rules", f"{with_rules:,.1f}", border=True, height="stretch")
+        st.metric("Return without", f"{alone:,.1f}", border=True, height="stretch")
+        st.metric("Length with rules", f"{length:,}", border=True, height="stretch")
+        st.metric("Length without", f"{int(plain.lengths[0]):,}", border=True, height="stretch")
+        st.metric(
+            "Changed",
+            share_text(changed / length),
+            border=True,
+            height="stretch",
+            help=f"The rules changed the action at {changed:,} of {length:,} steps.",
+        )
+        st.metric(
+            "Covered",
+            share_text(covered / length),
+            border=True,
+            height="stretch",
+            help=f"Some rule applied at {covered:,} of {length:,} steps.",
+        )
+    beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
+    if beyond:
+        st.caption(
+            f":material/frame_inspect: At {counted(beyond, 'step')} a rule was broken outside the "
+            "data it was mined from"
+            + (
+                f"; at {withheld:,} of them it left the action as it is."
+                if withheld
+                else ": these interventions are marked as outside the data."
+            )
+        )
+    if covered < FEW * length:
+        followed = "" if changed else ", and the agent did what it says"
+        st.markdown(
+            ":material/info: :gray["
+            + (
+                f"A rule applied at {share_text(covered / length)} of the steps{followed}; "
+                "elsewhere the agent acted alone.]"
+                if covered
+                else "No rule applied at any step: the agent acted alone.]"
+            )
+        )
+        if unfiltered is not None:
+            st.button("Try the unfiltered rules", key="try_unfiltered", on_click=unfiltered)
+    elif not changed:
+        st.markdown(
+            ":material/info: :gray[The rules changed nothing in this episode: wherever one "
+            "applied, the agent did what it says.]"
+        )
+
+
+def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
+    """The colours of the strip."""
+    many = len(dimensions) > 1
+    entries = [
+        swatch(f"{dimension.name} {text}" if many else text, label_colour(label))
+        for dimension in dimensions
+        for label in range(min(dimension.n_labels, 24))
+        for text in [label_text(label, dimension)]
+    ]
+    if marks:
+        entries.append(swatch("changed by the rules", INTERVENTION_COLOUR))
+    entries.append('<span style="opacity:.7">Click a step to look at it.</span>')
+    gap = "display:flex;flex-wrap:wrap;column-gap:1.2em;font-size:.9rem"
+    st.html(f'<div style="{gap}">{"".join(entries)}</div>')
+
+
+def pick_step() -> None:
+    """Go to the step that was clicked in the strip; for a callback, and the last thing it does.
+
+    The slider is drawn by another fragment, which finds the step as it begins: what a callback
+    writes to a slider does not reach the browser when it asks for another run.
+    """
+    points = st.session_state["strip"].selection.points
+    if points:
+        step = points[0]["customdata"]
+        st.session_state["_step"] = int(step["0"] if isinstance(step, dict) else step[0])
+        # A click in a picture that is about to go finds no fragment: then the page runs as a whole.
+        with contextlib.suppress(StreamlitAPIException):
+            st.rerun("at_step")
+
+
+def go_to(step: int) -> None:
+    """Go to a step; for buttons beside the slider."""
+    st.session_state["step"] = step
+
+
+def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
+    """The strip and the return so far, and everything about the step that is looked at.
+
+    The figures hold all steps already, so that only the mark over them moves with the slider.
+
+    Args:
+        replay: To show.
+        order: Asked for it.
+        linked: The set under which its rules are found on the Rules page; None if they are not.
+    """
+    steps, shielded = replay.steps, replay.shielded is not None
+    st.subheader("Step by step")
+    legend(replay.dimensions, marks=shielded)
+    plain = replay.plain.steps
+    assert plain is not None  # a replay records them
+    rows = tracks(steps, replay.dimensions, shielded=shielded)
+    lines = [
+        ReturnLine(
+            WITHOUT if shielded else ALONE,
+            np.cumsum(plain.reward),
+            UNSHIELDED_COLOUR,
+        )
+    ]
+    if shielded:
+        lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
+    timeline = Timeline.of(rows, max(len(line.returns) for line in lines))
+    st.html(mark_style(timeline))
+    with st.container(key="timeline", gap="xxsmall"):
+        st.plotly_chart(
+            intervention_strip(
+                rows, step_texts(steps, replay.dimensions, replay.rule_set), timeline
+            ),
+            key="strip",
+            on_select=pick_step,
+            selection_mode="points",
+            config=PLAIN,
+            alt="What the agent wanted, what was done, and where the two differ, step by step",
+        )
+        st.plotly_chart(
+            return_figure(lines, timeline),
+            config=PLAIN,
+            key="return",
+            alt="Return so far, step by step",
+        )
+    at_step(replay, order, timeline, linked)
+
+
+def mark_style(timeline: Timeline) -> str:
+    """The mark over the figures, where `at_step` puts it."""
+    return (
+        "<style>"
+        ".st-key-timeline { position: relative; }"
+        ".st-key-timeline::after { content: ''; position: absolute; z-index: 2; top: 0;"
+        f" bottom: {timeline.bottom}px; width: 2px; pointer-events: none;"
+        f" left: calc({timeline.left - 1}px"
+        f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
+        # Of the page's ink, with a rim, so that it is seen on every colour.
+        " background: currentColor;"
+        " box-shadow: 0 0 0 1px rgba(140, 150, 160, 0.6); }"
+        "</style>"
+    )
+
+
+@st.fragment(key="at_step")
+def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None) -> None:
+    """The slider, and the step it stands at.
+
+    Args:
+        replay: To show.
+        order: Asked for it.
+        timeline: Of the figures above.
+        linked: The set under which its rules are found on the Rules page; None if they are not.
+    """
+    steps, shielded = replay.steps, replay.shielded is not None
+    last = len(steps) - 1
+    if "_step" in st.session_state:
+        st.session_state["step"] = st.session_state.pop("_step")
+    kept = st.session_state.get("step")
+    if kept is not None and not 0 <= kept <= last:
+        st.session_state["step"] = min(max(kept, 0), last)
+    current = 0
+    if last > 0:
+        current = int(st.slider("Step", 0, last, key="step", bind="query-params"))
+    mark = f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>"
+    if not shielded:
+        st.html(mark)
+    else:
+        changes = np.flatnonzero(steps.intervened)
+        before, after = changes[changes < current], changes[changes > current]
+        with st.container(horizontal=True, vertical_alignment="center"):
+            st.button(
+                "Previous change",
+                icon=":material/skip_previous:",
+                on_click=go_to,
+                args=(int(before[-1]) if len(before) else current,),
+                disabled=not len(before),
+                key="previous",
+            )
+            st.button(
+                "Next change",
+                icon=":material/skip_next:",
+                on_click=go_to,
+                args=(int(after[0]) if len(after) else current,),
+                disabled=not len(after),
+                key="next",
+            )
+            st.html(
+                f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changes):,} of '
+                f"{len(steps):,} steps were changed. {flips_text(replay.shown)}</span>"
+            )
+    view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
+    pictures, words = st.columns([3, 2], gap="medium")
+    with pictures:
+        seen = picture(replay.png(current), f"The environment at step {current}")
+        if replay.finder is not None:
+            tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
+            many = len(tables) > 1
+            seen += "".join(
+                f"<b>{html.escape(action.dimension)}</b>{table}" if many else table
+                for action, table in zip(view.actions, tables, strict=True)
+            )
+        st.html(seen)
+    with words:
+        st.html(step_card(view, shielded=shielded))
+        if linked is not None:
+            link_rules(view, linked)
+    if shielded:
+        fork_section(replay, order, current)
+    flight_recorder(replay, order, current)
+    # The pictures beside it are made while nobody waits for them.
+    for step in (current + 1, current - 1):
+        if 0 <= step <= last:
+            replay.png(step)
+
+
+def flips_text(episodes: Episodes) -> str:
+    """How often the shield switched on and off in some episodes, as a sentence."""
+    flips = int(episodes.flips.sum()) if episodes.flips is not None else 0
+    pace = pace_of(episodes.env_id)
+    rate = pace.rate(flips, int(episodes.lengths.sum()))
+    return (
+        f"The shield switched on or off {counted(flips, 'time')}: {number_text(rate)} {pace.each}."
+        if flips
+        else "The shield never switched on or off."
+    )
+
+
+def link_rules(view: StepView, linked: str) -> None:
+    """A way to each rule in force, on the Rules page under the set that is shown there."""
+    names = {action.rule_id: action.rule_name for action in view.actions if action.rule}
+    for rule_id, name in names.items():
+        st.page_link(
+            "rules.py",
+            label="Open this rule" if len(names) == 1 else f"Open {name}",
+            icon=":material/rule:",
+            query_params={**st.query_params.to_dict(), "set": linked, "rule": rule_id},
+        )

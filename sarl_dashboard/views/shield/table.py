@@ -1,0 +1,261 @@
+"""What the Shield page shows of a comparison: what it comes to, two figures, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.explaining.figures.comparison import ArmStyle, returns_figure, typical_figure
+from sarl_core.explaining.words.comparison import POLICY_TEXT, verdict_on_all
+from sarl_core.mining.language import at_least_text, share_text
+from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.flips import pace_of
+from sarl_core.studies.comparison import Arm, Comparison
+from sarl_dashboard.components.flips import flips_rate, flips_title
+from sarl_dashboard.jobs.episodes import Row
+from sarl_dashboard.state.agents import AGENTS
+from sarl_dashboard.text import escaped
+
+PLAIN = {"displayModeBar": False}
+HEIGHT = 400
+ROW = 46  # pixels a row of the first figure
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One agent with one shield.
+
+    Attributes:
+        row: What is run.
+        arm: What it is in a comparison.
+        style: How it is drawn.
+        agent: Name on screen.
+        shield: Name on screen.
+    """
+
+    row: Row
+    arm: Arm
+    style: ArmStyle
+    agent: str
+    shield: str
+
+
+Found = Sequence[tuple[Line, Episodes]]
+
+
+def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
+    """The comparison, or what to do where there is none.
+
+    Args:
+        found: What has been run of the present choices.
+        env_id: Environment.
+        seed: Of the first episode.
+        at_work: Whether more is on its way.
+    """
+    if not found:
+        if not at_work:
+            st.info(
+                "Choose agents and shields, then press Run. The work goes on while you look at "
+                "other pages, and what is finished stays when you cancel.",
+                icon=":material/play_circle:",
+            )
+        return
+    lines = [line for line, _ in found]
+    comparison = Comparison(
+        env_id, seed, tuple(line.arm for line in lines), tuple(episodes for _, episodes in found)
+    )
+    styles = [line.style for line in lines]
+    height = max(HEIGHT, 60 + ROW * len(lines))
+    if not at_work:
+        told = [*verdicts(found), *policies(found), *remarks(found)]
+        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in told))
+    left, right = st.columns([2, 3], gap="medium")
+    with left:
+        st.markdown("**Typical return**")
+        st.plotly_chart(
+            typical_figure(comparison, styles=styles, height=height),
+            config=PLAIN,
+            key="typical",
+            alt="Interquartile mean of the returns with its 95 % interval, for every agent and "
+            "shield",
+        )
+    with right:
+        st.markdown("**Every episode**")
+        st.plotly_chart(
+            returns_figure(comparison, styles=styles, height=height),
+            config=PLAIN,
+            key="returns",
+            alt="Return of every episode, for every agent and shield",
+        )
+    st.caption(
+        "The typical return is the mean of the middle half of the episodes, with its 95 % "
+        "interval. It leaves out the worst quarter of the episodes, and so hides crashes: read the "
+        "mean return and the crashes beside it. Click a name to hide its line, twice to see it "
+        "alone."
+    )
+    st.dataframe(
+        [table_row(line, episodes) for line, episodes in found],
+        hide_index=True,
+        height="content",
+        column_config=column_config(env_id),
+        key="comparison_table",
+    )
+    if not at_work:
+        name = env_id.rsplit("/", 1)[-1]
+        st.download_button(
+            "Download CSV",
+            lambda: csv(comparison),
+            f"comparison-{name}-{seed}.csv",
+            "text/csv",
+            key="comparison_csv",
+            on_click="ignore",
+            icon=":material/download:",
+        )
+
+
+def verdicts(found: Found) -> list[str]:
+    """For each agent, what every shield did to it."""
+    sentences = []
+    for agent in dict.fromkeys(line.agent for line, _ in found):
+        own = [(line, episodes) for line, episodes in found if line.agent == agent]
+        alone = next((episodes for line, episodes in own if line.arm.rules is None), None)
+        if alone is None:
+            continue
+        shielded = [
+            (f"the {rules_name(line.shield)}", episodes)
+            for line, episodes in own
+            if line.arm.rules is not None and len(episodes) == len(alone)
+        ]
+        if shielded:
+            sentences.append(verdict_on_all(agent_name(agent), alone, shielded))
+    return sentences
+
+
+def policies(found: Found) -> list[str]:
+    """Which of the rules leave an agent nothing to choose from."""
+    names = dict.fromkeys(
+        line.shield
+        for line, episodes in found
+        if line.arm.rules is not None and episodes.summary().get("freedom") == 0.0
+    )
+    return [f"The {rules_name(name)}: {POLICY_TEXT[0].lower()}{POLICY_TEXT[1:]}." for name in names]
+
+
+def remarks(found: Found) -> list[str]:
+    """What is to be said of how the episodes came about, each once."""
+    notes = dict.fromkeys(
+        (line.shield if line.arm.rules is not None else "", note)
+        for line, episodes in found
+        for note in episodes.remarks
+    )
+    return [
+        f"{f'With the {rules_name(shield)}, ' if shield else 'Without a shield, '}{note}."
+        for shield, note in notes
+    ]
+
+
+def agent_name(agent: str) -> str:
+    """An agent in the middle of a sentence, after "the"."""
+    if agent == "untrained":
+        return "untrained agent"
+    return agent if agent in AGENTS else f"agent {agent}"
+
+
+def rules_name(shield: str) -> str:
+    """A shield in the middle of a sentence."""
+    return f"rules {shield}" if shield.startswith("at ") else f"{shield} rules"
+
+
+def column_config(env_id: str) -> dict[str, Any]:
+    """What the columns look like, and what they mean."""
+    column = st.column_config
+    return {
+        "Agent": column.TextColumn(pinned=True),
+        "Shield": column.TextColumn(pinned=True),
+        "Rules": column.TextColumn(alignment="right", help="Rules in the set"),
+        "Episodes": column.NumberColumn(format="localized"),
+        "Typical return": column.NumberColumn(
+            format="%.1f", help="Mean of the middle half of the episodes (IQM)"
+        ),
+        "95 % interval": column.TextColumn(
+            alignment="right", help="Of the typical return, by bootstrap"
+        ),
+        "Mean return": column.NumberColumn(format="%.1f", help="Of all episodes"),
+        "Changed": column.TextColumn(
+            alignment="right", help="Share of the steps at which the shield changed the action"
+        ),
+        "Outside": column.TextColumn(
+            alignment="right",
+            help="Share of the interventions in states outside the data of the rule, those that "
+            "it left out with them; a dash where the rules keep no data boxes",
+        ),
+        "Covered": column.TextColumn(
+            alignment="right", help="Share of the steps at which some rule applied"
+        ),
+        "Freedom": column.TextColumn(
+            alignment="right",
+            help="What the rules leave the agent to choose from: 100 % where no rule applies, 0 % "
+            "where they decide everything and the agent nothing",
+        ),
+        flips_title(env_id): column.TextColumn(
+            alignment="right", help="How often the shield switches on or off"
+        ),
+        "Crashes": column.TextColumn(
+            alignment="right",
+            help="Share of the episodes that ended in failure: a fall, a crash, or whatever else "
+            "ends an episode of this environment before its time. A landing or an arrival is none. "
+            "A dash where it is not known which ends are failures, or none is.",
+        ),
+        "Crashes, 95 %": column.TextColumn(
+            alignment="right",
+            help="Where the share of crashes probably lies (95 % interval by Clopper and Pearson)",
+        ),
+    }
+
+
+def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
+    """What the table says of a line."""
+    numbers, summary, failures = episodes.statistics, episodes.summary(), episodes.failures
+    rules = line.arm.rules
+    return {
+        "Agent": line.agent,
+        "Shield": line.shield,
+        "Rules": f"{len(rules):,}" if rules is not None else "–",
+        "Episodes": len(episodes),
+        "Typical return": numbers.iqm,
+        "95 % interval": f"{numbers.low:,.1f} to {numbers.high:,.1f}",
+        "Mean return": numbers.mean,
+        "Changed": share_text(summary["intervention_rate"]) if rules is not None else "–",
+        "Outside": share_text(summary["outside_rate"])
+        if rules is not None and any(rule.box is not None for rule in rules.rules)
+        else "–",
+        "Covered": share_text(summary["coverage"]) if rules is not None else "–",
+        "Freedom": share_text(summary.get("freedom", float("nan"))) if rules is not None else "–",
+        flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
+        if rules is not None and episodes.flips is not None
+        else "–",
+        "Crashes": "–" if failures is None else at_least_text(failures.rate, failures.unknown),
+        "Crashes, 95 %": "–"
+        if failures is None
+        else f"{share_text(failures.low)} to {share_text(failures.high)}",
+    }
+
+
+def csv(comparison: Comparison) -> bytes:
+    """The table as a file, every number in full."""
+    frame = comparison.to_frame()
+    projections = [arm.projection if arm.rules is not None else "" for arm in comparison.arms]
+    frame.insert(2, "projection", projections)
+    ways = [arm.outside if arm.rules is not None else "" for arm in comparison.arms]
+    frame.insert(3, "outside", ways)
+    unit = pace_of(comparison.env_id).unit.replace(" ", "_")
+    frame[f"flips_per_{unit}"] = [
+        flips_rate(episodes) if arm.rules is not None and episodes.flips is not None else None
+        for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True)
+    ]
+    frame.insert(0, "seed", comparison.seed)
+    frame.insert(0, "environment", comparison.env_id)
+    return str(frame.to_csv(index=False)).encode()

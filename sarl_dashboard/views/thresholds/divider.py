@@ -1,0 +1,180 @@
+"""What the Thresholds page shows of the divider: what coarse intervals cost, before any rule."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.agents.agent import Agent
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
+from sarl_core.explaining.figures.divider import error_figure, occupancy_figure, snapped_figure
+from sarl_core.mining.quantisation import (
+    SNAPPINGS,
+    STUDIED_DIVIDERS,
+    Quantisation,
+    Snapping,
+    quantise,
+)
+from sarl_core.studies.divider import snapped_agents
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.run_bar import run_bar
+from sarl_dashboard.jobs.episodes import Row, known, row_key, working
+from sarl_dashboard.session import is_dark
+from sarl_dashboard.state.agents import FRESH_SEED, agent_for, has_expert, named_agent
+from sarl_dashboard.state.environments import environment_of
+from sarl_dashboard.text import escaped, in_full
+
+PLACE = "divider"
+MOST_EPISODES = 200
+PLAIN = {"displayModeBar": False}
+
+Divided = tuple[tuple[Quantisation, ...], ...]
+Combination = tuple[int, Snapping]
+
+
+@cached(show_spinner="Dividing the actions …")
+def _quantised(digest: str, _demonstrations: Demonstrations) -> Divided:
+    return quantise(_demonstrations)
+
+
+def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
+    """Where the actions lie, how far snapping moves them, and what that does to the expert.
+
+    Args:
+        demonstrations: With continuous actions.
+        dimension: Which action dimension is looked at; None for all.
+    """
+    divided = _quantised(demonstrations.digest, demonstrations)
+    some = divided if dimension is None else (divided[dimension],)
+    dark = is_dark()
+    st.caption(
+        "A rule for a continuous action names an interval, and no value. Here every action is "
+        "replaced by what stands for its own interval, with no rule in between: its centre, or "
+        "what the expert typically did in it. What is lost by that is lost to the divider alone."
+    )
+    left, right = st.columns(2, gap="medium")
+    with left:
+        st.markdown("**How far an action moves, as a share of its range**")
+        st.plotly_chart(
+            error_figure(some, dark=dark),
+            config=PLAIN,
+            key="divider_errors",
+            alt="Root mean square of what snapping changes, for every action and divider",
+        )
+    with right:
+        st.markdown("**What the expert still achieves**")
+        show_returns(demonstrations, divided)
+    st.markdown("**Where the demonstrated actions lie**")
+    with st.grid(min(len(some), 2), min_column_width=320):
+        for index, each in enumerate(some):
+            st.plotly_chart(
+                occupancy_figure(each, dark=dark),
+                config=PLAIN,
+                key=f"occupancy_{index}",
+                alt=f"Share of the steps in every interval of {each[0].dimension.name}",
+            )
+    unseen = [
+        f"{escaped(part.dimension.name)}: {len(part.never_seen)} of {part.divider}"
+        for each in some
+        for part in each
+        if part.never_seen
+    ]
+    st.caption(
+        "Intervals that were never shown are hatched; no rule can ask for them "
+        f"({'; '.join(unseen)})."
+        if unseen
+        else "Every interval was shown at least once."
+    )
+
+
+def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
+    """The returns of the snapped expert, and the way to run it."""
+    try:
+        env_id = environment_of(None)
+    except SarlError as error:
+        st.info(in_full(str(error)), icon=":material/info:")
+        return
+    if not has_expert(env_id):
+        st.info(
+            f"No expert is shipped for {escaped(env_id)}, so there is nobody whose actions could "
+            "be snapped.",
+            icon=":material/info:",
+        )
+        return
+    episodes = int(
+        st.number_input(
+            "Episodes for each combination",
+            1,
+            MOST_EPISODES,
+            20,
+            key="divider_episodes",
+            bind="query-params",
+            help=f"On the seeds from {FRESH_SEED:,}, the same for all.",
+        )
+    )
+    rows = snapped_rows(demonstrations, env_id, divided)
+    at_work = working(PLACE)
+
+    @st.fragment(run_every=1.0 if at_work else None)
+    def returns() -> None:
+        if at_work != working(PLACE):
+            st.rerun()  # as a whole: from now on every second, or no longer
+        run_bar(PLACE, list(rows.values()), episodes)
+        found = dict(zip(rows, known(list(rows.values()), episodes), strict=True))
+        cells = {
+            (divider, snapping): episodes
+            for divider in STUDIED_DIVIDERS
+            for snapping in SNAPPINGS
+            for episodes in [found[unchanged_as(divider, snapping)]]
+            if episodes is not None
+        }
+        if not cells:
+            return
+        st.plotly_chart(
+            snapped_figure(STUDIED_DIVIDERS, cells, dark=is_dark()),
+            config=PLAIN,
+            key="snapped_returns",
+            alt="Typical return of the expert with snapped actions, for every divider",
+        )
+        st.caption(
+            "The typical return, and its 95 % interval. Clip replaces an action by the nearest "
+            "value in its interval, which is the action itself: that row is the expert as it is."
+        )
+
+    returns()
+
+
+def unchanged_as(divider: int, snapping: Snapping) -> Combination:
+    """The combination that is run for this one: all that clip are the same."""
+    return (0, snapping) if snapping == "clip" else (divider, snapping)
+
+
+def snapped_rows(
+    demonstrations: Demonstrations, env_id: str, divided: Divided
+) -> dict[Combination, Row]:
+    """What is run, by divider and way to snap; the expert as it is first."""
+    make, _ = agent_for("expert", None, env_id, FRESH_SEED)
+    expert = named_agent("expert", env_id)
+    key = row_key(env_id, expert, "", "centre", FRESH_SEED)
+    rows = {
+        unchanged_as(0, "clip"): Row(key, "expert as it is", env_id, FRESH_SEED, make, lambda: None)
+    }
+    for column, divider in enumerate(STUDIED_DIVIDERS):
+        for snapping in SNAPPINGS:
+            if snapping == "clip":
+                continue
+
+            def snapped(column: int = column, snapping: Snapping = snapping) -> Agent:
+                own = [(each[column],) for each in divided]
+                return snapped_agents(env_id, make(), own, (snapping,))[0]
+
+            told = f"{expert}, {demonstrations.digest}, {divider} intervals, {snapping}"
+            rows[divider, snapping] = Row(
+                row_key(env_id, told, "", "centre", FRESH_SEED),
+                f"{divider} intervals, {snapping}",
+                env_id,
+                FRESH_SEED,
+                snapped,
+                lambda: None,
+            )
+    return rows

@@ -1,0 +1,42 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from sarl_core.agents.agent import shipped_experts
+from sarl_core.demonstrations.formats import load_demonstrations
+from sarl_core.errors import InputError
+from sarl_core.rollouts.recording import SHIPPED, ship_demonstrations
+
+FOLDER = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
+
+
+@pytest.mark.parametrize("env_id", list(SHIPPED))
+def test_shipped_demonstrations_are_what_their_cards_say(env_id: str) -> None:
+    path = FOLDER / f"{SHIPPED[env_id]}.parquet"
+    card = json.loads(path.with_suffix(".json").read_text())
+    demos = load_demonstrations(path)
+    summary = demos.summary()
+    assert (card["digest"], card["env_id"]) == (demos.digest, demos.env_id)
+    assert len(demos) == card["steps"] == 15_000
+    assert card["episodes"] == demos.n_episodes
+    assert card["mean_return"] == pytest.approx(summary.return_mean, abs=0.01)
+    assert (demos.agent, demos.seed) == ("expert", 0)
+    assert f"--env {env_id} --agent expert --stochastic --steps 15000" in card["command"]
+    assert card["command"].endswith(f"data/demonstrations/{path.name}")
+    assert demos.bounds_from == (None if demos.is_discrete else "action space")
+
+
+def test_what_is_shipped_has_an_expert() -> None:
+    assert {env_id: path.stem for env_id, path in shipped_experts().items()} == SHIPPED
+
+
+def test_ships_a_file_and_its_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sarl_core.rollouts.recording.SHIPPED_STEPS", 120)
+    card = ship_demonstrations("CartPole-v1", tmp_path)
+    assert json.loads((tmp_path / "cartpole.json").read_text()) == card
+    demos = load_demonstrations(tmp_path / "cartpole.parquet")
+    assert (len(demos), demos.digest, card["steps"]) == (120, card["digest"], 120)
+    assert (card["episodes"], card["episodes_finished"]) == (1, 0)
+    with pytest.raises(InputError, match="no demonstrations are shipped"):
+        ship_demonstrations("Acrobot-v1", tmp_path)

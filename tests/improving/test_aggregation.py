@@ -1,0 +1,197 @@
+"""The expert answers where the rules lead: rounds, choice, refinement, report."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sarl_core import InputError, load_demonstrations
+from sarl_core.agents.agent import EXPERT_FOLDER, make_agent
+from sarl_core.improving.aggregation import aggregate
+from sarl_core.improving.aggregation_files import card_path, save_aggregation
+from sarl_core.improving.plan import Plan
+from sarl_core.improving.questions import ask, importance, scores
+from sarl_core.improving.refinement import _ranks, refine
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.seeds import REPORT, ROUNDS
+from sarl_core.shielding.shield import Shield
+
+DATA = EXPERT_FOLDER.parent / "demonstrations"
+CART = "CartPole-v1"
+
+
+@pytest.fixture(scope="module")
+def cart():
+    return load_demonstrations(DATA / "cartpole.parquet").select(range(4))
+
+
+@pytest.fixture(scope="module")
+def small() -> Plan:
+    return Plan(max_rules=5, rounds=3, episodes=4, validation=16, report=8)
+
+
+@pytest.fixture(scope="module")
+def found(cart, small):
+    return aggregate(cart, small)
+
+
+def test_it_gives_rules_within_the_budget_and_tells_every_round(found, cart, small):
+    assert [one.number for one in found.rounds] == [1, 2, 3]
+    assert found.rounds[0].pairs == len(cart)
+    pairs = [one.pairs for one in found.rounds]
+    assert pairs == sorted(pairs)
+    assert pairs[2] > pairs[1] > pairs[0]
+    assert all(one.rules <= 5 and len(one.returns) == 4 for one in found.rounds)
+    assert all(one.coverage == 1.0 for one in found.rounds)
+    assert len(found.rule_set) <= 5
+    assert found.rule_set.cut == "leaves"
+    assert found.demonstrations.digest == found.rule_set.source.digest
+    assert len(found.demonstrations) == found.rounds[found.chosen - 1].pairs
+    # What comes out is better than what one comes from.
+    alone = rollout(CART, "novice", episodes=8, seed=REPORT).returns.mean()
+    assert found.reported.returns.mean() > 2 * alone
+
+
+def test_the_report_is_a_fresh_run_of_the_rules(found):
+    assert found.reported.seeds.tolist() == list(range(REPORT, REPORT + 8))
+    again = rollout(CART, "novice", shield=Shield(found.rule_set), episodes=8, seed=REPORT)
+    assert (again.returns == found.reported.returns).all()
+
+
+def test_what_is_told_of_a_round_can_be_checked_by_hand(cart, small, found):
+    (tree,) = grow_budgeted_trees(
+        cart_answers(cart),
+        max_rules=5,
+        weights=importance(scores(make_agent("expert", CART), cart.observations)),
+    )
+    rules = leaf_rules([tree])
+    run = rollout(CART, "novice", shield=Shield(rules), episodes=4, seed=ROUNDS)
+    first = found.rounds[0]
+    assert (first.returns == run.returns).all()
+    wanted = make_agent("expert", CART).act(run.steps.observation, None)[:, 0]
+    said = np.array([rule.action for rule in rules.rules])[run.steps.rules[:, 0]]
+    assert first.disagreement == pytest.approx((wanted != said).mean())
+    assert first.needed == pytest.approx(first.disagreement)  # one dimension, all covered
+
+
+def cart_answers(cart):
+    return replace(cart, actions=make_agent("expert", CART).act(cart.observations, None)[:, 0])
+
+
+def test_the_same_plan_gives_the_same_rules_whatever_the_processes(cart, small, found):
+    again = aggregate(cart, small, jobs=2)
+    assert again.rule_set == found.rule_set
+    assert (again.reported.returns == found.reported.returns).all()
+
+
+def test_another_seed_gives_other_episodes(cart, small, found):
+    other = aggregate(cart, replace(small, seed=1, rounds=1))
+    assert not np.array_equal(other.rounds[0].returns, found.rounds[0].returns)
+
+
+def test_thresholds_cut_the_trees(cart):
+    plan = Plan(
+        max_rules=8, rounds=2, episodes=2, validation=4, report=2, thresholds=Thresholds(0.05, 0.9)
+    )
+    found = aggregate(cart, plan)
+    assert found.rule_set.cut == "thresholds"
+    assert found.rule_set.thresholds == Thresholds(0.05, 0.9)
+    assert all(rule.confidence >= 0.9 and rule.support >= 0.05 for rule in found.rule_set.rules)
+    assert any(one.coverage < 1.0 for one in found.rounds)
+    assert all(one.needed >= 1.0 - one.coverage for one in found.rounds)
+
+
+def test_progress_counts_up_to_the_end(cart, small):
+    told = []
+    aggregate(cart, small, progress=lambda done, total: told.append((done, total)))
+    counts = [done for done, _ in told]
+    assert counts == sorted(counts)
+    assert told[-1][0] == told[-1][1]
+    assert len({total for _, total in told}) == 1
+
+
+def test_refinement_follows_the_returns(cart):
+    """Thresholds made wrong on purpose are moved back to where they serve."""
+    trees = grow_budgeted_trees(cart, max_rules=2)
+    rules = leaf_rules(trees)
+    before = mean_return(rules)
+    marks = refine(
+        CART,
+        trees,
+        cart,
+        agent=make_agent("novice", CART),
+        generations=4,
+        marks=2,
+        seed=0,
+    )
+    assert len(marks) == 2
+    assert [len(one) for one in marks] == [1, 1]
+    moved = marks[-1][0]
+    assert moved.feature.tolist() == trees[0].feature.tolist()
+    assert moved.threshold[0] != trees[0].threshold[0]
+    assert mean_return(leaf_rules(marks[-1])) > before - 5
+
+
+def test_where_all_do_alike_nothing_is_followed():
+    assert _ranks(np.array([3.0, 1.0, 2.0])).tolist() == [0.5, -0.5, 0.0]
+    assert np.allclose(_ranks(np.full(6, 500.0)), 0.0)
+    tied = _ranks(np.array([1.0, 7.0, 7.0, 0.0]))
+    assert tied[1] == tied[2] > tied[0] > tied[3]
+
+
+def mean_return(rules: RuleSet) -> float:
+    return float(rollout(CART, "novice", shield=Shield(rules), episodes=32, seed=77).returns.mean())
+
+
+def test_the_card_says_how_the_rules_came_about(found, tmp_path):
+    written, card = save_aggregation(found, tmp_path / "rules.json", command="typed so")
+    assert written == tmp_path / "rules.json"
+    assert json.loads(card_path(tmp_path / "rules.json").read_text()) == card
+    assert RuleSet.load(tmp_path / "rules.json") == found.rule_set
+    assert card["command"] == "typed so"
+    assert card["reported"]["mean"] == pytest.approx(found.reported.returns.mean(), abs=0.01)
+    assert [one["number"] for one in card["rounds"]] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"max_rules": 1}, "the budget of rules is 1; give 2 or more"),
+        ({"max_rules": -5}, "the budget of rules is -5; give 2 or more"),
+        ({"rounds": 0}, "the number of rounds is 0"),
+        ({"episodes": 0}, "the number of episodes a round is 0"),
+        ({"rounds": 1_001}, "the number of rounds is 1,001; give 1,000 or fewer"),
+        ({"episodes": 10_001}, "the number of episodes a round is 10,001; give 10,000 or fewer"),
+        ({"validation": 500_001}, "validation episodes is 500,001; give 500,000 or fewer"),
+        ({"generations": 10**6}, "the number of generations is 1,000,000; give"),
+        ({"generations": -1}, "the number of generations is -1"),
+        ({"seed": -1}, "the seed is -1"),
+    ],
+)
+def test_a_plan_that_cannot_be_done_is_refused(change, sentence):
+    with pytest.raises(InputError, match=sentence):
+        Plan(**{"max_rules": 4, **change})
+
+
+def test_who_acts_at_random_cannot_be_asked(cart, small):
+    with pytest.raises(InputError, match="'novice' acts at random and cannot be asked"):
+        aggregate(cart, small, expert="novice")
+    with pytest.raises(InputError, match="name no environment"):
+        aggregate(replace(cart, env_id=""), small)
+
+
+def test_scores_and_importance():
+    expert = make_agent("expert", CART)
+    states = np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
+    found = scores(expert, states)
+    assert found.shape == (50, 2)
+    assert (found.argmax(axis=1) == ask(expert, states)[:, 0]).all()
+    assert found.min() >= -4.0
+    assert importance(found).mean() == pytest.approx(1.0)
+    assert (importance(np.zeros((3, 2))) == 1.0).all()
+    assert scores(make_agent("expert", "Pendulum-v1"), np.zeros((2, 3), np.float32)) is None

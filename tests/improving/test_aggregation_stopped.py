@@ -1,0 +1,261 @@
+"""A run that is stopped gives every part that it has finished, and spoils nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import RuleSet, WorkError, load_demonstrations
+from sarl_core.agents.agent import EXPERT_FOLDER
+from sarl_core.improving import aggregation, refinement
+from sarl_core.improving.aggregation import aggregate
+from sarl_core.improving.aggregation_files import card_path, save_aggregation
+from sarl_core.improving.plan import Plan
+from sarl_core.mining.budgeted_trees import leaf_rules
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.progress import CancelledError
+
+PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=32, report=8)
+REFINED = Plan(max_rules=4, rounds=1, episodes=4, validation=4, report=3, generations=2, seed=3)
+SEEDS = ("rounds", "validation", "refinement", "second_validation", "report")
+
+
+@pytest.fixture(scope="module")
+def cart():
+    path = EXPERT_FOLDER.parent / "demonstrations" / "cartpole.parquet"
+    return load_demonstrations(path).select(range(4))
+
+
+@pytest.fixture(scope="module")
+def finished(cart):
+    return aggregate(cart, PLAN)
+
+
+@pytest.fixture
+def small_search(monkeypatch):
+    """A refinement of few episodes."""
+    monkeypatch.setattr(refinement, "PAIRS", 2)
+    monkeypatch.setattr(refinement, "EPISODES", 3)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Every rollout: (what asked for it, whether its steps are kept, seeds)."""
+    found = []
+
+    def spy(module):
+        rollout = module.rollout
+
+        def recorded(*arguments, **named):
+            seeds = range(named["seed"], named["seed"] + named["episodes"])
+            found.append((module, named["keep_steps"], seeds))
+            return rollout(*arguments, **named)
+
+        monkeypatch.setattr(module, "rollout", recorded)
+
+    for module in (aggregation, refinement):
+        spy(module)
+    return found
+
+
+def stop_in(monkeypatch, part):
+    """Ctrl-C in the middle of a part."""
+
+    def interrupted(*arguments, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(aggregation._Run, part, interrupted)
+
+
+# --- which episodes are used for what ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatch, seed):
+    monkeypatch.setattr(aggregation, "_FIRST_VALIDATION", 2)
+    plan = Plan(4, rounds=2, episodes=3, validation=5, generations=2, report=5, seed=seed)
+    found = aggregate(cart, plan)
+    searched = [index for index, (module, *_) in enumerate(calls) if module is refinement]
+    *others, (_, _, report) = calls
+    parts = {
+        "rounds": [seeds for _, keeps, seeds in others if keeps],
+        "validation": [s for _, keeps, s in others[: searched[0]] if not keeps],
+        "refinement": [calls[index][2] for index in searched],
+        "second_validation": [s for _, _, s in others[searched[-1] + 1 :]],
+        "report": [report],
+    }
+    used = {name: {one for part in ranges for one in part} for name, ranges in parts.items()}
+    assert sum(map(len, used.values())) == len(set.union(*used.values()))
+    assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
+    # None of the rounds shares an episode with another, nor any step of the search.
+    assert len(used["rounds"]) == 2 * 3
+    assert len(used["refinement"]) == 2 * 3
+    assert len(used["report"]) == 5
+    # And the record says where each begins.
+    assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}
+
+
+# --- what a stop leaves ------------------------------------------------------------------------
+
+
+def test_stopped_in_the_rounds(cart):
+    rounds = []
+    stopped = aggregate(
+        cart, PLAN, progress=lambda done, _: done < 6 or len(rounds) < 1, watch=rounds.append
+    )
+    assert len(stopped.rounds) == len(rounds) >= 1
+    assert not stopped.is_finished
+    assert stopped.validation_mean is None
+    assert len(stopped.rule_set) > 0
+    with pytest.raises(CancelledError):
+        aggregate(cart, PLAN, progress=lambda done, _: False)
+
+
+def test_stopped_in_the_choice_the_rounds_decide(cart, tmp_path):
+    stopped = aggregate(cart, PLAN, progress=lambda done, _: done < 20)  # the rounds have 12
+    means = [one.mean_return for one in stopped.rounds]
+    assert len(means) == 3
+    assert stopped.chosen == 1 + int(np.argmax(means))
+    assert stopped.validation_mean is None
+    card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
+    assert card["seeds"] == dict.fromkeys(SEEDS, None) | {"rounds": 20_000_000}
+    assert card["chosen_by"] == "the episodes of their round only"
+    assert card["reported_on"] is card["reported"] is card["validation_mean"] is None
+
+
+def test_stopped_in_the_report_the_choice_stands(cart, finished, tmp_path):
+    total = aggregation._Run(cart, PLAN, "CartPole-v1", None, _expert(), 1).planned_units()
+    stopped = aggregate(cart, PLAN, progress=lambda done, _: done < total - 3)
+    assert not stopped.is_finished
+    assert stopped.rule_set == finished.rule_set
+    assert stopped.chosen == finished.chosen
+    assert stopped.validation_mean == finished.validation_mean
+    card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
+    assert card["seeds"] == {**dict.fromkeys(SEEDS), "rounds": 20_000_000, "validation": 30_000_000}
+    assert card["chosen_by"] == "the mean of up to 32 episodes of validation"
+    assert card["reported_on"] is None
+
+
+def _expert():
+    from sarl_core.agents.agent import make_agent
+
+    return make_agent("expert", "CartPole-v1")
+
+
+def test_ctrl_c_in_the_report_keeps_the_refinement(cart, small_search, monkeypatch, tmp_path):
+    whole = aggregate(cart, REFINED)
+    stop_in(monkeypatch, "report")
+    stopped = aggregate(cart, REFINED)
+    assert stopped.rule_set == whole.rule_set
+    assert stopped.refined == whole.refined
+    assert stopped.validation_mean == whole.validation_mean is not None
+    card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
+    assert card["seeds"] == {
+        "rounds": 23_000_000,
+        "validation": 33_000_000,
+        "refinement": 43_000_003,  # three episodes a generation, counted from 1
+        "second_validation": 33_500_000,
+        "report": None,
+    }
+
+
+def returning(monkeypatch, means):
+    """Let the generations of a search bring these means, whatever is played."""
+    asked = []
+
+    def mean_return(*arguments):
+        asked.append(arguments)
+        generation = (len(asked) - 1) // (2 * refinement.PAIRS)
+        if generation == len(means):
+            raise KeyboardInterrupt
+        return means[generation]
+
+    monkeypatch.setattr(refinement, "_mean_return", mean_return)
+
+
+def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
+    cart, small_search, monkeypatch, tmp_path
+):
+    points = []
+    better = refinement.refine
+
+    def watched(*arguments, **named):
+        told = named["better"]
+        named["better"] = lambda trees: (points.append(trees), told(trees))
+        return better(*arguments, **named)
+
+    monkeypatch.setattr(aggregation, "refine", watched)
+    returning(monkeypatch, [100.0, 90.0, 130.0, 120.0])
+    stopped = aggregate(cart, replace(REFINED, generations=8))
+    assert len(points) == 1  # the third generation was better than the first, no other
+    assert stopped.refined
+    assert stopped.rule_set == with_boxes(leaf_rules(points[0]), stopped.demonstrations)
+    assert all(rule.box for rule in stopped.rule_set.rules if rule.samples)
+    assert stopped.validation_mean is None
+    card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
+    assert card["refined"]
+    assert card["seeds"]["validation"] == 33_000_000
+    assert card["seeds"]["refinement"] == 43_000_003
+    assert card["seeds"]["second_validation"] is card["seeds"]["report"] is None
+    assert "then by those of a refinement that was not finished" in card["chosen_by"]
+
+
+def test_stopped_in_a_refinement_that_brought_nothing_the_choice_stands(
+    cart, small_search, monkeypatch
+):
+    returning(monkeypatch, [100.0, 90.0])
+    stopped = aggregate(cart, replace(REFINED, generations=8))
+    assert not stopped.refined
+    assert stopped.validation_mean is not None
+    assert stopped.seeds.validation == 33_000_000
+    assert stopped.seeds.refinement is None
+
+
+# --- what it leaves on disk --------------------------------------------------------------------
+
+
+def test_a_stopped_run_takes_the_place_of_nothing(cart, finished, monkeypatch, tmp_path):
+    out = tmp_path / "rules.json"
+    save_aggregation(finished, out, command="the good one")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    stop_in(monkeypatch, "select")
+    stopped = aggregate(cart, PLAN)
+    written, card = save_aggregation(stopped, out, command="stopped")
+    assert written == tmp_path / "rules.stopped.json"
+    assert RuleSet.load(written) == stopped.rule_set
+    assert json.loads((tmp_path / "rules.stopped.card.json").read_text()) == card
+    assert {path: path.read_bytes() for path in before} == before
+    assert len(list(tmp_path.iterdir())) == 4
+    # A finished one does.
+    assert save_aggregation(finished, out, command="again").rules == out
+    assert json.loads(card_path(out).read_text())["command"] == "again"
+
+
+def test_rules_and_card_are_written_both_or_neither(finished, monkeypatch, tmp_path):
+    out = tmp_path / "rules.json"
+    out.write_text("old rules")
+    card_path(out).write_text("old card")
+    write_text = Path.write_text
+
+    def full_disk(path, text, **named):
+        if "card" in path.name:
+            raise OSError(28, "No space left on device")
+        return write_text(path, text, **named)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_text", full_disk)
+        with pytest.raises(WorkError, match=r"rules\.card\.json cannot be written \(No space"):
+            save_aggregation(finished, out, command="")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        "rules.json": "old rules",
+        "rules.card.json": "old card",
+    }
+    card_path(out).unlink()
+    card_path(out).mkdir()
+    with pytest.raises(WorkError, match=r"rules\.card\.json is a folder"):
+        save_aggregation(finished, out, command="")
+    assert out.read_text() == "old rules"

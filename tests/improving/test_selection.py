@@ -1,0 +1,72 @@
+"""Successive halving: most episodes go to the good ones, and luck is shared."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sarl_core.improving.successive_halving import planned_episodes, successive_halving
+from sarl_core.progress import CancelledError
+
+
+def noisy(means, spread=1.0):
+    """Candidates whose episode of a seed is always the same."""
+
+    def score(candidate, first, count):
+        assert count > 0
+        draws = [
+            np.random.default_rng([candidate, seed]).normal()
+            for seed in range(first, first + count)
+        ]
+        return means[candidate] + spread * np.array(draws)
+
+    return score
+
+
+def test_the_best_of_many_is_found_although_single_episodes_deceive():
+    means = np.linspace(0.0, 2.0, 20)
+    found = successive_halving(20, noisy(means, 2.0), seed=0, first=16, most=512)
+    assert found.best in (18, 19)
+    assert found.episodes[found.best] == 512
+    assert found.episodes.min() == 16
+    assert found.means[found.best] == pytest.approx(means[found.best], abs=0.3)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(1, 30), st.integers(1, 20), st.integers(1, 90))
+def test_the_plan_is_what_is_run(candidates, first, most):
+    calls = []
+    found = successive_halving(
+        candidates,
+        lambda candidate, seed, count: np.full(count, float(candidate)),
+        seed=5,
+        first=first,
+        most=most,
+        finished=calls.append,
+    )
+    assert sum(calls) == planned_episodes(candidates, first, most)
+    assert found.best == candidates - 1
+    assert found.episodes[found.best] == most
+    assert int(found.episodes.sum()) == sum(calls)
+
+
+def test_all_are_given_the_same_seeds_and_none_twice():
+    seen: dict[int, list[int]] = {}
+
+    def score(candidate, first, count):
+        seen.setdefault(candidate, []).extend(range(first, first + count))
+        return np.zeros(count)
+
+    successive_halving(5, score, seed=100, first=4, most=32)
+    for seeds in seen.values():
+        assert seeds == list(range(100, 100 + len(seeds)))
+
+
+def test_it_can_be_stopped():
+    def finished(_):
+        raise CancelledError("stopped")
+
+    with pytest.raises(CancelledError):
+        successive_halving(3, noisy([0, 1, 2]), seed=0, finished=finished)

@@ -1,0 +1,68 @@
+"""The compact rules that are shipped: what their cards say, and what they reach."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import RuleSet
+from sarl_core.improving.aggregation_files import card_path
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.shielding.shield import Shield
+
+FOLDER = Path(__file__).resolve().parents[2] / "data" / "rules"
+SHIPPED = {
+    "cartpole_compact.json": ("CartPole-v1", 4, 500.0),
+    "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
+    "bipedal_walker_compact.json": ("BipedalWalker-v3", 128, 250.0),
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_card_is_that_of_the_file(name: str) -> None:
+    env_id, most, _ = SHIPPED[name]
+    rules = RuleSet.load(FOLDER / name)
+    card = json.loads(card_path(FOLDER / name).read_text())
+    counts = [len(rules.of_dimension(index)) for index in range(len(rules.actions))]
+    assert card["rules_per_dimension"] == counts
+    assert max(counts) <= card["budget"] == most
+    assert card["rules"] == len(rules)
+    assert card["env_id"] == rules.source.env_id == env_id
+    assert card["cut"] == rules.cut == "leaves"
+    assert card["mean_length"] == pytest.approx(np.mean([r.length for r in rules.rules]), abs=0.01)
+    chosen = card["rounds"][card["chosen_round"] - 1]
+    assert card["demonstrations"]["digest"] == rules.source.digest
+    assert card["demonstrations"]["steps"] == rules.source.steps == chosen["pairs"]
+    assert card["demonstrations"]["episodes"] == rules.source.episodes
+    assert f"--out data/rules/{name}" in card["command"]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_card_names_the_seeds_of_what_happened(name: str) -> None:
+    card = json.loads(card_path(FOLDER / name).read_text())
+    searched = card["generations"] > 0
+    assert card["seed"] == 0
+    assert card["seeds"] == {
+        "rounds": 20_000_000,
+        "validation": 30_000_000,
+        "refinement": 40_000_016 if searched else None,
+        "second_validation": 30_500_000 if searched else None,
+        "report": 50_000_000,
+    }
+    assert ("second validation" in card["chosen_by"]) == searched
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SHIPPED)
+def test_they_reach_what_was_promised(name: str) -> None:
+    """As `evaluate --agent novice --seed 100000 --episodes 100` plays them."""
+    env_id, most, promised = SHIPPED[name]
+    rules = RuleSet.load(FOLDER / name)
+    found = rollout(
+        env_id, "novice", shield=Shield(rules), episodes=100, seed=100_000, keep_steps=False
+    )
+    assert max(len(rules.of_dimension(index)) for index in range(len(rules.actions))) <= most
+    assert found.statistics.mean >= promised
