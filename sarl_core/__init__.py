@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from sarl_core.shielding.vec_env import ShieldedVecEnv
     from sarl_core.shielding.wrappers import ShieldedEnv
 
+__version__ = "0.2.0"
+
 _HOMES = {
     "Decision": "shielding.shield",
     "Demonstrations": "demonstrations.dataset",

@@ -1,4 +1,4 @@
-"""``python -m sarl_core``."""
+"""``python -m sarl_core``, and ``sarl`` once installed."""
 
 from __future__ import annotations
 
@@ -6,5 +6,11 @@ import sys
 
 from sarl_core.cli.app import main
 
-if __name__ == "__main__":
+
+def run() -> None:
+    """Run the command line that this process was started with."""
     sys.exit(main(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    run()

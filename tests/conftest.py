@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations
+from sarl_core import Demonstrations, PolicyTree, grow_policy_trees
 from tests.toys import TOYS
 
 
@@ -23,3 +23,8 @@ def lander_like() -> Demonstrations:
 @pytest.fixture(params=sorted(TOYS))
 def toy_id(request: pytest.FixtureRequest) -> str:
     return str(request.param)
+
+
+@pytest.fixture(scope="session")
+def lander_trees(lander_like: Demonstrations) -> tuple[PolicyTree, ...]:
+    return grow_policy_trees(lander_like)

@@ -16,7 +16,7 @@ PACKAGES = ("sarl_core", "sarl_dashboard")
 FOLDERS = (*PACKAGES, "pages", "tests", "benchmarks")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
-TOOLS = {"ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
+TOOLS = {"hatchling", "ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
 # The product imports it inside one function, and says what to do where it is missing.
 OPTIONAL = {"onnx"}
 

@@ -13,6 +13,7 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.ablate import ablate
 from sarl_core.cli.aggregate import aggregate
+from sarl_core.cli.dashboard import app as dashboard
 from sarl_core.cli.diff import diff
 from sarl_core.cli.evaluate_and_render import evaluate, render, train_expert
 from sarl_core.cli.export import export
@@ -48,6 +49,9 @@ for command in (
     reproduce,
 ):
     app.command(command.__name__.replace("_", "-"))(command)
+
+
+app.command("app")(dashboard)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -25,6 +25,15 @@ if TYPE_CHECKING:
 _WIDTH_IN_A_FILE = 160  # where no terminal says how wide it is, a table shall not be cut
 _INTERRUPTED = 130  # what a shell expects of a program that Ctrl-C ended
 
+_EXTRAS = {
+    "streamlit": "dashboard",
+    "stable_baselines3": "learning",
+    "torch": "learning",
+    "imageio": "video",
+    "imageio_ffmpeg": "video",
+}
+"""What a package that is not there belongs to."""
+
 Advance = Callable[[int, int], None]
 
 
@@ -105,6 +114,9 @@ def _told(error: BaseException) -> tuple[str, int]:
         return str(error), 2 if isinstance(error, InputError) else 1
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):
         return "stopped; nothing was written", _INTERRUPTED
+    if isinstance(error, ModuleNotFoundError) and error.name in _EXTRAS:
+        extra = f"sarl-explorer[{_EXTRAS[error.name]}]"
+        return f"this needs {error.name}, which is not installed; run pip install '{extra}'", 1
     return f"{type(error).__name__}: {error} (run it again with --debug to see where)", 1
 
 

@@ -37,6 +37,10 @@ def test_help_of_every_command_has_an_example_and_tells_its_options(command, run
     assert "--json" in text
 
 
+def test_the_dashboard_has_a_command(run):
+    assert "python -m sarl_core app" in run("app", "--help").split("Example:")[1]
+
+
 def test_without_a_command_the_commands_are_listed(run):
     text = run()
     assert all(command in text for command in COMMANDS)

@@ -3,12 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations, PolicyTree, grow_policy_trees
-
-
-@pytest.fixture(scope="session")
-def lander_trees(lander_like: Demonstrations) -> tuple[PolicyTree, ...]:
-    return grow_policy_trees(lander_like)
+from sarl_core import Demonstrations
 
 
 @pytest.fixture(scope="session")

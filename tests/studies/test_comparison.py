@@ -38,12 +38,12 @@ def comparison(rules: RuleSet) -> Comparison:
     return compare(CARTPOLE, arms, episodes=12, seed=5)
 
 
-def ended(terminated: list[bool], last_rewards: list[float]) -> Episodes:
+def ended(terminated: list[bool], last_rewards: list[float], env_id: str = CARTPOLE) -> Episodes:
     """Episodes of which only the end is known."""
     count = len(terminated)
     nothing = np.zeros(count, dtype=np.int64)
     return Episodes(
-        env_id="",
+        env_id=env_id,
         agent="",
         seeds=nothing.copy(),
         returns=np.zeros(count),
@@ -152,7 +152,7 @@ def test_where_failures_are_known_each_costs_one() -> None:
 )
 def test_a_landing_and_an_arrival_are_no_crash(env_id: str) -> None:
     #                 landed, crashed, out of time, out of time
-    episodes = ended([True, True, False, False], [100.0, -100.0, 0.3, -100.0])
+    episodes = ended([True, True, False, False], [100.0, -100.0, 0.3, -100.0], env_id)
     assert episodes.failed.tolist() == [False, True, False, False]
     assert crash_rate(episodes, env_id) == 0.25
 
