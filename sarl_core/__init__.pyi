@@ -1,0 +1,24 @@
+# The public names, each with its home: what is loaded when, and what type checkers see.
+from .demonstrations.dataset import Demonstrations as Demonstrations
+from .demonstrations.formats import load_demonstrations as load_demonstrations
+from .demonstrations.formats import save_demonstrations as save_demonstrations
+from .errors import InputError as InputError
+from .errors import SarlError as SarlError
+from .errors import WorkError as WorkError
+from .mining.algorithm_1 import mine_rules as mine_rules
+from .mining.classifier import RuleClassifier as RuleClassifier
+from .mining.landscape import Landscape as Landscape
+from .mining.landscape import threshold_landscape as threshold_landscape
+from .mining.rules import Rule as Rule
+from .mining.rules import RuleSet as RuleSet
+from .mining.tree import PolicyTree as PolicyTree
+from .mining.tree import grow_policy_trees as grow_policy_trees
+from .rollouts.episodes import Episodes as Episodes
+from .rollouts.episodes import rollout as rollout
+from .rollouts.recording import record as record
+from .shielding.shield import Decision as Decision
+from .shielding.shield import Shield as Shield
+from .shielding.vec_env import ShieldedVecEnv as ShieldedVecEnv
+from .shielding.wrappers import ShieldedEnv as ShieldedEnv
+
+__version__: str
