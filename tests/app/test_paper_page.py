@@ -17,7 +17,7 @@ from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import FULL, FULL_MINUTES, experts_in
 from sarl_core.paper.tables import write_table
 from sarl_core.paper.verdicts import enough
-from sarl_dashboard.views.paper import studies as paper
+from sarl_dashboard.views.paper import report_files as paper
 from tests.app.screens import errors, open_page, texts
 from tests.paper.frames import landscapes, learning
 from tests.paper.test_dividing import table

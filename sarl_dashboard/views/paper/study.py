@@ -1,0 +1,130 @@
+"""One figure of the paper, made again, beside what the paper says of it."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.errors import SarlError
+from sarl_core.paper.report import REPORT, Entry
+from sarl_core.paper.studies import STUDIES
+from sarl_core.paper.study import replication
+from sarl_dashboard.session import is_dark
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.paper import report_files
+from sarl_dashboard.views.paper.claims import show_claims
+
+PLAIN = {"displayModeBar": False}
+
+
+def show_study(name: str, entry: Entry | None) -> None:
+    """One figure, with what the paper says of it beside it.
+
+    Args:
+        name: Of the study.
+        entry: What the report says of it; None where it has not been made.
+    """
+    study = STUDIES[name]
+    st.subheader(f"{study.place}. {study.title}")
+    if entry is None:
+        st.info(
+            f"{study.place} has not been made yet. This command makes it:",
+            icon=":material/terminal:",
+        )
+        st.code(f"python -m sarl_core reproduce --figure {name} --out data/paper", language="sh")
+        return
+    st.caption(study.about)
+    if entry.quick:
+        st.warning(
+            "This comes from a quick run, which shows that everything works; its numbers mean "
+            "little.",
+            icon=":material/bolt:",
+        )
+    try:
+        frame = report_files.table(name, entry)
+        parts = study.parts(frame)
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+        return
+    st.caption(f"Made from {replication(frame)} for each environment.")
+    part = parts[0]
+    if len(parts) > 1:
+        part = (
+            st.segmented_control(
+                "Part",
+                parts,
+                default=parts[0],
+                key=f"part_{name}",
+                bind="query-params",
+                required=True,
+                label_visibility="collapsed",
+            )
+            or parts[0]
+        )
+    left, right = st.columns([3, 2], gap="large")
+    with left:
+        drawings = report_files.drawings(name, entry, part, dark=is_dark())
+        for number, drawing in enumerate(drawings):
+            st.markdown(f"**{drawing.title}**")
+            st.plotly_chart(
+                drawing.figure, key=f"drawing_{name}_{number}", config=PLAIN, alt=drawing.alt
+            )
+    with right:
+        show_claims(entry.claims, beside=True)
+    how_made(entry)
+    downloads(entry)
+
+
+def downloads(entry: Entry) -> None:
+    """The files of a study, and the report."""
+    files = entry.files
+    with st.container(horizontal=True):
+        if (report_files.FOLDER / files["page"]).is_file():
+            st.download_button(
+                "Page (HTML)",
+                lambda: report_files.whole_page(entry),
+                files["page"],
+                "text/html",
+                key="page_file",
+                on_click="ignore",
+                icon=":material/download:",
+            )
+        for label, kind, mime in (
+            ("Picture (PNG)", "picture", "image/png"),
+            ("Data (CSV)", "table", "text/csv"),
+        ):
+            path = report_files.FOLDER / files[kind]
+            if path.is_file():
+                st.download_button(
+                    label,
+                    path.read_bytes(),
+                    files[kind],
+                    mime,
+                    key=f"{kind}_file",
+                    on_click="ignore",
+                    icon=":material/download:",
+                )
+        report_download()
+
+
+def report_download() -> None:
+    """The report, every number in it."""
+    st.download_button(
+        "All numbers (JSON)",
+        (report_files.FOLDER / REPORT).read_bytes(),
+        REPORT,
+        "application/json",
+        key="report_file",
+        on_click="ignore",
+        icon=":material/download:",
+    )
+
+
+def how_made(entry: Entry) -> None:
+    """Command, seeds and versions."""
+    with st.expander("How this was made"):
+        versions = ", ".join(f"{name} {version}" for name, version in entry.versions.items())
+        st.markdown(
+            f"On {entry.made}, within {max(1, round(entry.seconds / 60))} min, with {versions}."
+        )
+        st.code(entry.command.replace("DIR", "data/paper"), language="sh")
+        st.json({"settings": entry.settings, "inputs": entry.inputs}, expanded=2)
