@@ -1,4 +1,4 @@
-"""Which episodes are held out: told, and chosen."""
+"""Which episodes are held out: parting_lines, and chosen."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sarl_dashboard.state.hold_out import chosen, leave_out, parted
 from sarl_dashboard.text import in_full
 
 
-def told(demonstrations: Demonstrations) -> list[str]:
+def parting_lines(demonstrations: Demonstrations) -> list[str]:
     """What is in force, for the sidebar.
 
     Args:

@@ -9,7 +9,7 @@ from streamlit.errors import StreamlitAPIException
 
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
-from sarl_dashboard.components.hold_out import told
+from sarl_dashboard.components.hold_out import parting_lines
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.data import (
     all_demonstrations,
@@ -78,7 +78,7 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
             f"{counted(demonstrations.n_episodes, 'episode')}"
         ]
         whole = all_demonstrations()
-        lines += told(whole) if whole is not None else []
+        lines += parting_lines(whole) if whole is not None else []
         if compact_set.in_force():
             lines.append("**Compact rules** in force")
             if thresholds_shown:

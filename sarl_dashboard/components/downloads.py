@@ -1,0 +1,72 @@
+"""Files to carry away, a button each."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats import save_demonstrations
+
+MIMES = {
+    ".c": "text/x-c",
+    ".csv": "text/csv",
+    ".gif": "image/gif",
+    ".html": "text/html",
+    ".json": "application/json",
+    ".md": "text/markdown",
+    ".mp4": "video/mp4",
+    ".npz": "application/octet-stream",
+    ".onnx": "application/octet-stream",
+    ".parquet": "application/vnd.apache.parquet",
+    ".png": "image/png",
+    ".py": "text/x-python",
+    ".txt": "text/plain",
+    ".zip": "application/zip",
+}
+
+
+def download(
+    label: str,
+    content: str | bytes | Callable[[], str | bytes],
+    file: str,
+    *,
+    key: str,
+    meaning: str | None = None,
+    icon: str = "download",
+    look: Literal["primary", "secondary"] = "secondary",
+) -> None:
+    """A button that gives a file, and runs nothing.
+
+    Args:
+        label: On the button.
+        content: Of the file, or what makes it when it is asked for.
+        file: Its name, with an ending of `MIMES`.
+        key: Of the button.
+        meaning: What is said beside it.
+        icon: Name of a Material symbol.
+        look: Primary for the one that the page is about.
+    """
+    st.download_button(
+        label,
+        content,
+        file,
+        MIMES[Path(file).suffix],
+        key=key,
+        help=meaning,
+        type=look,
+        icon=f":material/{icon}:",
+        on_click="ignore",
+    )
+
+
+def as_file(demonstrations: Demonstrations, extension: str = ".parquet") -> bytes:
+    """Demonstrations as a file's bytes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"demonstrations{extension}"
+        save_demonstrations(demonstrations, path)
+        return path.read_bytes()

@@ -1,0 +1,116 @@
+"""How every feature is distributed."""
+
+from __future__ import annotations
+
+import html
+
+import plotly.graph_objects as go
+import streamlit as st
+
+from sarl_core.decimals import decimal_on_scale
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.figures.demonstrations import feature_figure
+from sarl_core.explaining.figures.distributions import FeatureRow, histogram_by_label
+from sarl_core.mining.labels import LabelledDimension, label_dimensions
+from sarl_core.mining.language import label_text
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.text import escaped
+
+AT_FIRST, MOST = 12, 48  # figures
+
+
+@cached(show_spinner="Counting …")
+def feature_figures(
+    digest: str,
+    divider: int,
+    by: int,
+    features: tuple[int, ...],
+    _demonstrations: Demonstrations,
+) -> tuple[go.Figure, ...]:
+    """A figure for each of some features, coloured by the labels of one action dimension."""
+    dimension = label_dimensions(_demonstrations, divider)[by]
+    labels = dimension.labels_of(_demonstrations.action_columns[:, by])
+    return tuple(
+        feature_figure(
+            _demonstrations.features[index],
+            histogram_by_label(_demonstrations.observations[:, index], labels, dimension.n_labels),
+            dimension,
+        )
+        for index in features
+    )
+
+
+def legend(dimension: LabelledDimension) -> None:
+    """The colours of the labels."""
+    entries = "".join(
+        f'<span style="display:inline-block;margin-right:1.1em;white-space:nowrap">'
+        f'<span style="display:inline-block;width:.75em;height:.75em;border-radius:2px;'
+        f'background:{label_colour(label)};margin-right:.4em"></span>'
+        f"{html.escape(label_text(label, dimension))}</span>"
+        for label in range(min(dimension.n_labels, 24))
+    )
+    st.html(f'<div style="font-size:.9rem">{html.escape(dimension.name)}: {entries}</div>')
+
+
+def show_features(
+    demonstrations: Demonstrations, rows: tuple[FeatureRow, ...], divider: int
+) -> None:
+    """The distribution of features, coloured by the action, and a table of all.
+
+    Args:
+        demonstrations: N pairs with d features.
+        rows: Each of the d features in numbers.
+        divider: Number of intervals of continuous actions.
+    """
+    st.subheader("Features")
+    names = [row.name for row in rows]
+    dimensions = label_dimensions(demonstrations, divider)
+    by = 0
+    if len(dimensions) > 1:
+        by = st.selectbox(
+            "Colour by",
+            range(len(dimensions)),
+            key="colour",
+            format_func=lambda index: dimensions[index].name,
+            bind="query-params",
+        )
+    features = list(range(len(names)))
+    if len(names) > AT_FIRST:
+        features = st.multiselect(
+            "Features to show",
+            range(len(names)),
+            default=list(range(AT_FIRST)),
+            format_func=lambda index: names[index],
+            key="features",
+            bind="query-params",
+            max_selections=MOST,
+        )
+    legend(dimensions[by])
+    if not features:
+        st.caption("Choose a feature above to see how it is distributed.")
+    figures = feature_figures(demonstrations.digest, divider, by, tuple(features), demonstrations)
+    with st.grid(4, min_column_width=220, gap="small") as grid:
+        for index, figure in zip(features, figures, strict=True):
+            with grid.cell():
+                unit = rows[index].unit
+                st.markdown(
+                    f"**{escaped(names[index])}**" + (f" :gray[{escaped(unit)}]" if unit else "")
+                )
+                chart(figure, f"feature_{index}", f"Distribution of {names[index]}, by action")
+    st.dataframe(
+        {
+            "Feature": names,
+            "Unit": [row.unit or "–" for row in rows],
+            "Least": [decimal_on_scale(row.low, row.low, row.high) for row in rows],
+            "Median": [decimal_on_scale(row.median, row.low, row.high) for row in rows],
+            "Largest": [decimal_on_scale(row.high, row.low, row.high) for row in rows],
+        },
+        hide_index=True,
+        height="content" if len(names) <= 24 else 480,
+        column_config={
+            column: st.column_config.NumberColumn(format="%.12g")
+            for column in ("Least", "Median", "Largest")
+        },
+    )
