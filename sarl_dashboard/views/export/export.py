@@ -1,0 +1,51 @@
+"""The settings of an export and what comes of them."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
+from sarl_dashboard.state.data import all_demonstrations
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.export.files import prepared_for, show_file
+from sarl_dashboard.views.export.matrix import show_matrix
+from sarl_dashboard.views.export.rounding import show_rounding
+from sarl_dashboard.views.export.settings import settings
+
+FILE, MATRIX = "File", "Rules by features"
+
+
+@st.fragment
+def show_export(demonstrations: Demonstrations) -> None:
+    """Everything that answers to the settings.
+
+    Args:
+        demonstrations: The chosen ones.
+    """
+    chosen = settings()
+    everything = all_demonstrations()
+    assert everything is not None
+    key = repr((chosen.digest, everything.digest if chosen.rounded else "", chosen.merged))
+    try:
+        prepared = prepared_for(
+            key, chosen.rule_set, everything if chosen.rounded else None, merged=chosen.merged
+        )
+    except SarlError as error:
+        more = " Or switch rounding off." if chosen.rounded and chosen.rule_set.rules else ""
+        st.error(f"{in_full(str(error))}{more}", icon=":material/error:")
+        return
+    show_rounding(prepared, len(everything))
+    view = st.segmented_control(
+        "View",
+        [FILE, MATRIX],
+        default=FILE,
+        key="carry_view",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
+    )
+    if view == MATRIX:
+        show_matrix(prepared.rule_set, key, chosen.stem, demonstrations)
+    else:
+        show_file(prepared, key, chosen)

@@ -1,0 +1,135 @@
+"""Which rules are exported, as what, and how they are made ready."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import streamlit as st
+
+from sarl_core.errors import SarlError
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.projection import Projection
+from sarl_dashboard.components.settings import offered_rule_sets, projection_choice
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
+from sarl_dashboard.text import file_name, in_full
+
+
+class Format(NamedTuple):
+    """What a file may be: its ending, its language on screen, what is said of it."""
+
+    suffix: str
+    language: str | None
+    meaning: str
+    decides: bool = False  # it has an action for every state, and not the rules alone
+
+
+FORMATS = {
+    "JSON": Format(
+        ".json",
+        "json",
+        "The rule file: every number in full, as it stands; all of this project reads it.",
+    ),
+    "CSV": Format(".csv", None, "A line a rule, for a spreadsheet."),
+    "Markdown": Format(".md", "markdown", "A table for a wiki or a repository."),
+    "Python": Format(".py", "python", "One function that needs nothing but Python 3.", True),
+    "C": Format(".c", "c", "One function in C99 that needs nothing but the language.", True),
+    "ONNX": Format(
+        ".onnx", None, "A model for ONNX runtimes; writing it needs the package onnx.", True
+    ),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """What is exported, and how.
+
+    Attributes:
+        rule_set: As it was chosen.
+        digest: Tells it from others.
+        form: Of the file.
+        projection: What a continuous action becomes.
+        rounded: Whether thresholds are rounded.
+        merged: Whether conditions on one feature become one interval.
+    """
+
+    rule_set: RuleSet
+    digest: str
+    form: Format
+    projection: Projection
+    rounded: bool
+    merged: bool
+
+    @property
+    def stem(self) -> str:
+        """Name of the file, without its ending."""
+        return f"rules-{file_name(self.rule_set.source.env_id)}"
+
+
+def chosen_rules() -> tuple[RuleSet, str]:
+    """The rules to carry away; where there are none to be had, say why and stop."""
+    choices = offered_rule_sets([CHOSEN, COMPACT, EDITED, OWN_FILE])
+    default = COMPACT if compact_set.in_force() and COMPACT in choices else CHOSEN
+    choice = st.selectbox(
+        "Rules",
+        choices,
+        index=choices.index(default),
+        key="carry",
+        bind="query-params",
+        help="At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
+        "this environment. Edited: as they stand on the Edit page. Own file: rules you saved.",
+    )
+    uploaded = None
+    if choice == OWN_FILE:
+        uploaded = st.file_uploader("Rule file (.json)", key="carry_file")
+        if uploaded is None:
+            st.info("Upload a rule file to export its rules.", icon=":material/upload_file:")
+            st.stop()
+    try:
+        rule_set, digest = rules_for(choice, uploaded)
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+        st.stop()
+    assert rule_set is not None
+    return rule_set, digest
+
+
+def settings() -> Settings:
+    """The box of settings."""
+    with st.container(border=True):
+        left, middle, right = st.columns([4, 5, 3], gap="medium")
+        with left:
+            rule_set, digest = chosen_rules()
+        with middle:
+            name = st.pills(
+                "Format",
+                list(FORMATS),
+                default="JSON",
+                key="format",
+                bind="query-params",
+                required=True,
+                wrap=True,  # else the last ones are cut off on a telephone
+            )
+            form = FORMATS[name or "JSON"]  # a link may end in "format="
+            projection: Projection = PROJECTIONS[0]
+            if rule_set.actions[0].is_interval and form.decides:
+                projection = projection_choice()
+        with right:
+            rounded = st.toggle(
+                "Round thresholds",
+                value=True,
+                key="rounded",
+                bind="query-params",
+                help="To the fewest digits that change no decision on the demonstrations",
+            )
+            merged = st.toggle(
+                "Merge conditions",
+                key="merged",
+                bind="query-params",
+                help="Several conditions on one feature become one interval, and each rule stands "
+                "by itself: easier to read, slower to execute",
+            )
+    return Settings(rule_set, digest, form, projection, rounded, merged)
