@@ -7,7 +7,6 @@ and the next rule should be there at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import streamlit as st
 
@@ -20,53 +19,26 @@ from sarl_core.explaining.html.rule_examples import examples_html
 from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.rule_evidence import feature_evidence, path_steps
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds, node_of
+from sarl_core.mining.rules import Rule, RuleSet, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture
-from sarl_dashboard.state.compact_set import Compact
+from sarl_dashboard.views.rules.in_force import InForce
 
 
-@dataclass(frozen=True, eq=False)
-class Behind:
-    """What the rules come from.
-
-    Attributes:
-        demonstrations: The chosen ones.
-        trees: One an action dimension.
-        thresholds: At which they are cut.
-        compact: The compact set whose rules they are; None for mined ones.
-    """
-
-    demonstrations: Demonstrations
-    trees: tuple[PolicyTree, ...]
-    thresholds: Thresholds
-    compact: Compact | None
-
-    @property
-    def digest(self) -> str:
-        """What tells a compact set from others; "" for mined rules."""
-        return self.compact.digest if self.compact is not None else ""
-
-    def tree(self, rule: Rule) -> PolicyTree:
-        """The tree of a rule's action dimension."""
-        return self.trees[rule.dimension]
-
-
-def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[], None]) -> None:
+def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> None:
     """One rule and everything behind it.
 
     Args:
-        rule: One of the rule set.
-        rule_set: Knows the names.
-        behind: What it comes from.
+        rule: One of those in force.
+        in_force: All of them, and what they come from.
         buttons: Draws what leads to other rules.
     """
-    tree, compact = behind.tree(rule), behind.compact
+    tree, compact = in_force.tree(rule), in_force.compact
     with st.container(border=True, key="sentence"):
         buttons()
-        threshold = behind.thresholds.confidence if compact is None else None
-        st.html(rule_card(rule, rule_set, threshold=threshold))
+        threshold = in_force.thresholds.confidence if compact is None else None
+        st.html(rule_card(rule, in_force.rule_set, threshold=threshold))
         if compact is not None:
             show_origin(compact.as_shipped(rule), compact.shipped)
         if not rule.samples:
@@ -90,28 +62,28 @@ def show_rule(rule: Rule, rule_set: RuleSet, behind: Behind, buttons: Callable[[
             + path_table(steps, tree.dimension, leaf=compact is not None)
         )
     with right:
-        place(rule, behind)
-    st.html(features_of(key_of(rule, behind), tree, rule, behind.demonstrations))
+        place(rule, in_force)
+    st.html(features_of(key_of(rule, in_force), tree, rule, in_force.demonstrations))
 
 
-def make_ready(rule: Rule, behind: Behind) -> None:
+def make_ready(rule: Rule, in_force: InForce) -> None:
     """Make what takes longest to make of a rule that may be looked at next."""
-    tree = behind.tree(rule)
-    features_of(key_of(rule, behind), tree, rule, behind.demonstrations)
+    tree = in_force.tree(rule)
+    features_of(key_of(rule, in_force), tree, rule, in_force.demonstrations)
     tree_picture.make_ready(
-        behind.digest,
+        in_force.compact_digest,
         tree,
-        behind.thresholds,
+        in_force.thresholds,
         node_of(rule),
-        note=note_of(tree, behind),
-        leaves=behind.compact is not None,
+        note=note_of(tree, in_force),
+        leaves=in_force.compact is not None,
     )
 
 
-def key_of(rule: Rule, behind: Behind) -> tuple[object, ...]:
+def key_of(rule: Rule, in_force: InForce) -> tuple[object, ...]:
     """What tells a rule from all others, those of other data included."""
-    tree = behind.tree(rule)
-    return tree.source.digest, tree.divider, behind.digest, rule.id
+    tree = in_force.tree(rule)
+    return tree.source.digest, tree.divider, in_force.compact_digest, rule.id
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
@@ -126,27 +98,27 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
     )
 
 
-def place(rule: Rule, behind: Behind) -> None:
+def place(rule: Rule, in_force: InForce) -> None:
     """The path lit in the tree."""
-    tree = behind.tree(rule)
+    tree = in_force.tree(rule)
     st.html(heading("Its place in the tree"))
     tree_picture.show_tree(
-        behind.digest,
+        in_force.compact_digest,
         tree,
-        behind.thresholds,
+        in_force.thresholds,
         node_of(rule),
         around="Around this rule",
         widget="tree",
-        note=note_of(tree, behind),
-        leaves=behind.compact is not None,
+        note=note_of(tree, in_force),
+        leaves=in_force.compact is not None,
     )
 
 
-def note_of(tree: PolicyTree, behind: Behind) -> str:
+def note_of(tree: PolicyTree, in_force: InForce) -> str:
     """What the boxes of a tree are."""
     return f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
         "Rules are full in colour, what is cut off below them is grey."
-        if behind.compact is None
+        if in_force.compact is None
         else "Every leaf is a rule, full in colour."
     )
 
@@ -158,8 +130,8 @@ def features_of(
     """The interval on each feature against its distribution, and some states of the rule."""
     parts = []
     if _rule.conditions:
-        found = feature_evidence(_demonstrations, _tree, _rule)
-        figures = features_html(found, _tree.source.features, label_colour(_rule.action))
+        evidence = feature_evidence(_demonstrations, _tree, _rule)
+        figures = features_html(evidence, _tree.source.features, label_colour(_rule.action))
         parts.append(heading("What it asks, feature by feature") + figures)
     if _rule.samples:
         title = "Example states" if _rule.samples > 1 else "The one state it applies to"
