@@ -16,7 +16,19 @@ PACKAGES = ("sarl_core", "sarl_dashboard")
 FOLDERS = (*PACKAGES, "pages", "tests", "benchmarks")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
-TOOLS = {"hatchling", "ruff", "mypy", "import-linter", "pandas-stubs", "pytest-xdist"}
+TOOLS = {
+    "hatchling",
+    "import-linter",
+    "mkdocs",
+    "mkdocs-material",
+    "mkdocstrings",
+    "mkdocstrings-python",
+    "mypy",
+    "pandas-stubs",
+    "pre-commit",
+    "pytest-xdist",
+    "ruff",
+}
 # The product imports it inside one function, and says what to do where it is missing.
 OPTIONAL = {"onnx"}
 

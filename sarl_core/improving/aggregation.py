@@ -8,6 +8,7 @@ successive halving, and reported on episodes that nothing was chosen by.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,6 +125,7 @@ def aggregate(
     agent: str | Agent = "novice",
     expert: str | Agent = "expert",
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     watch: Callable[[Round], None] | None = None,
 ) -> Aggregation:
@@ -136,6 +138,7 @@ def aggregate(
         agent: Who is shielded, as in `make_agent`.
         expert: Who is asked: a trained policy.
         jobs: Processes; changes the speed, never the result.
+        executor: Whose processes they are; this machine's where not given.
         progress: Called with (units done, in all); returning False stops.
         watch: Called after every round.
 
@@ -150,7 +153,8 @@ def aggregate(
     env_id = env_id or start.env_id
     if not env_id:
         raise InputError("the demonstrations name no environment; say which with --env")
-    run = _Run(start, plan, env_id, make_agent(agent, env_id), make_agent(expert, env_id), jobs)
+    agents = make_agent(agent, env_id), make_agent(expert, env_id)
+    run = _Run(start, plan, env_id, *agents, jobs, executor)
     clock = _Clock(run.planned_units(), progress)
     try:
         for number in range(1, plan.rounds + 1):
@@ -207,9 +211,16 @@ class _Run:
     """The rounds so far, and what was made of them: whoever stops it loses nothing finished."""
 
     def __init__(
-        self, start: Demonstrations, plan: Plan, env_id: str, agent: Agent, expert: Agent, jobs: int
+        self,
+        start: Demonstrations,
+        plan: Plan,
+        env_id: str,
+        agent: Agent,
+        expert: Agent,
+        jobs: int,
+        executor: Executor | None = None,
     ) -> None:
-        self.plan, self.env_id, self.jobs = plan, env_id, jobs
+        self.plan, self.env_id, self.jobs, self.executor = plan, env_id, jobs, executor
         self.agent, self.expert = agent, expert
         self.answers = Answers(env_id, expert, start)
         self.rounds: list[Round] = []
@@ -270,6 +281,7 @@ class _Run:
             episodes=episodes,
             seed=seed,
             jobs=self.jobs,
+            executor=self.executor,
             keep_steps=keep_steps,
             max_steps=self.plan.max_steps,
             progress=clock.of(),
@@ -360,6 +372,7 @@ class _Run:
             max_steps=self.plan.max_steps,
             seed=self.plan.seed,
             jobs=self.jobs,
+            executor=self.executor,
             progress=clock.of(),
             better=better,
         )

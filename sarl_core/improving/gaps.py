@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -78,6 +79,7 @@ def find_gaps(
     seed: int = 0,
     projection: Projection = "centre",
     jobs: int = 1,
+    executor: Executor | None = None,
     max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Gaps:
@@ -91,6 +93,7 @@ def find_gaps(
         seed: Of the first.
         projection: How the shield replaces a continuous action.
         jobs: Processes.
+        executor: Whose processes they are; this machine's where not given.
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         progress: Called with (episodes done, in all); returning False stops.
 
@@ -110,6 +113,7 @@ def find_gaps(
         episodes=episodes,
         seed=seed,
         jobs=jobs,
+        executor=executor,
         max_steps=max_steps,
         progress=progress,
     )
@@ -139,6 +143,7 @@ def gaps_so_far(
     seed: int = 0,
     projection: Projection = "centre",
     jobs: int = 1,
+    executor: Executor | None = None,
     max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Gaps]:
@@ -152,6 +157,7 @@ def gaps_so_far(
         seed: Of the first.
         projection: How the shield replaces a continuous action.
         jobs: Processes.
+        executor: Whose processes they are; this machine's where not given.
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         progress: Called with (episodes done, in all); returning False stops.
 
@@ -179,7 +185,8 @@ def gaps_so_far(
                 episodes=count,
                 seed=seed + start,
                 projection=projection,
-                jobs=min(jobs, count),
+                jobs=jobs,
+                executor=executor,
                 max_steps=max_steps,
                 progress=told,
             )

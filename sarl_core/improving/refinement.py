@@ -9,6 +9,7 @@ their order stay.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +19,10 @@ from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.processes import executor_of, run_each
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.episodes import LOST, rollout
 from sarl_core.rollouts.seeds import REFINEMENT, of_run
-from sarl_core.rollouts.workers import parallel
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
@@ -90,6 +91,7 @@ def refine(
     max_steps: int | None = None,
     seed: int = 0,
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: Progress | None = None,
     better: Callable[[tuple[PolicyTree, ...]], None] | None = None,
 ) -> list[tuple[PolicyTree, ...]]:
@@ -106,6 +108,7 @@ def refine(
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
         seed: Another one gives another way.
         jobs: Processes; changes the speed, never the result.
+        executor: Whose processes they are; this machine's where not given.
         progress: Called with (episodes done, in all); returning False stops.
         better: Called with the trees of a point on the way whenever the episodes around it
             brought more than those around any point before, the start included; so that
@@ -116,10 +119,9 @@ def refine(
         choose by episodes.
 
     Raises:
+        WorkError: If a process ended in the middle of its work.
         CancelledError: If `progress` returned False.
     """
-    from joblib import delayed
-
     parameters = _Parameters(tuple(trees), tuple(_spread(tree, pairs) for tree in trees))
     few = pairs_of(pairs, _FEW)
     generator = np.random.default_rng(seed)
@@ -136,35 +138,38 @@ def refine(
             for index, structure in enumerate(parameters.structures(point))
         )
 
-    with parallel(jobs) as work:
-        for number in range(1, generations + 1):
-            directions = generator.normal(size=(PAIRS, len(here)))
-            first = generation_seed(seed, number)
-            shaken = [
-                parameters.structures(here + side * _SHAKE * direction)
-                for direction in directions
-                for side in (1, -1)
-            ]
-            means = work(
-                delayed(_mean_return)(
-                    env_id, structures, few, trees[0].divider, agent, projection, first, max_steps
-                )
+    workers = executor_of(jobs, executor)
+    for number in range(1, generations + 1):
+        directions = generator.normal(size=(PAIRS, len(here)))
+        first = generation_seed(seed, number)
+        shaken = [
+            parameters.structures(here + side * _SHAKE * direction)
+            for direction in directions
+            for side in (1, -1)
+        ]
+        means = run_each(
+            _mean_return,
+            [
+                (env_id, structures, few, trees[0].divider, agent, projection, first, max_steps)
                 for structures in shaken
-            )
-            if float(np.mean(means)) > most:
-                most = float(np.mean(means))
-                if better is not None and number > 1:
-                    better(trees_at(here))
-            ranks = _ranks(np.array(means))
-            slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
-            momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
-            size = _MEMORY[1] * size + (1 - _MEMORY[1]) * slope**2
-            steady = momentum / (1 - _MEMORY[0] ** number)
-            scale = np.sqrt(size / (1 - _MEMORY[1] ** number)) + 1e-12
-            here = here + _STEP * _SHAKE * steady / scale
-            report(progress, number * generation_cost(), total)
-            if number in stops:
-                found.append(trees_at(here))
+            ],
+            lost=LOST,
+            executor=workers,
+        )
+        if float(np.mean(means)) > most:
+            most = float(np.mean(means))
+            if better is not None and number > 1:
+                better(trees_at(here))
+        ranks = _ranks(np.array(means))
+        slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
+        momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
+        size = _MEMORY[1] * size + (1 - _MEMORY[1]) * slope**2
+        steady = momentum / (1 - _MEMORY[0] ** number)
+        scale = np.sqrt(size / (1 - _MEMORY[1] ** number)) + 1e-12
+        here = here + _STEP * _SHAKE * steady / scale
+        report(progress, number * generation_cost(), total)
+        if number in stops:
+            found.append(trees_at(here))
     return found
 
 

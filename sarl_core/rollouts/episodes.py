@@ -6,9 +6,12 @@ does not depend on what runs beside it, nor on the number of processes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +20,12 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.failures import failed, failure_known
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, SarlError
+from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.player import Outcome, play
+from sarl_core.rollouts.player import play
 from sarl_core.rollouts.statistics import Interval, Rate, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
-from sarl_core.rollouts.workers import parallel
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +33,11 @@ if TYPE_CHECKING:
     from sarl_core.shielding.shield import Shield
 
 MAX_STEPS = 100_000  # where an environment sets itself no limit; an episode has to end
+
+LOST = (
+    "a process that ran episodes ended unexpectedly, as when memory runs out; "
+    "run again, with fewer episodes at a time"
+)
 
 _BATCH = 32  # more brings nothing: the policy's share of a step is small by then
 _ROUNDS = 4  # of pieces for all processes; progress is told after each
@@ -354,6 +362,7 @@ def rollout(
     stochastic: bool = False,
     batch: int = _BATCH,
     jobs: int = 1,
+    executor: Executor | None = None,
     keep_steps: bool = True,
     max_steps: int | None = None,
     progress: Progress | None = None,
@@ -370,6 +379,7 @@ def rollout(
         stochastic: Whether a trained policy is sampled.
         batch: Environments side by side; changes the speed, never the result.
         jobs: Processes; likewise. Starting one takes about a second.
+        executor: Whose processes they are, as a Dask client's; this machine's where not given.
         keep_steps: Whether to keep the record of every step (about 60 bytes and 4 d a step).
         max_steps: An episode that has not ended by then is cut off, and `Episodes.cut` says so;
             `MAX_STEPS` where not given.
@@ -381,6 +391,7 @@ def rollout(
 
     Raises:
         InputError: If a number is out of range, or agent, shield and environment do not fit.
+        WorkError: If a process ended in the middle of its work.
         CancelledError: If `progress` returned False.
     """
     most = MAX_STEPS if max_steps is None else max_steps
@@ -395,8 +406,6 @@ def rollout(
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     seeds = np.arange(seed, seed + episodes, dtype=np.int64)
-    # None larger than what runs side by side: who stops a long run need not wait for a part of it.
-    pieces = np.array_split(seeds, min(episodes, max(jobs * _ROUNDS, -(-episodes // batch))))
     done = 0
 
     def finished(count: int) -> None:
@@ -404,23 +413,21 @@ def rollout(
         done += count
         report(progress, done, episodes)
 
-    if jobs == 1:
-        return run_seeds(
-            env_id,
-            actor,
-            shield,
-            seeds,
-            batch=batch,
-            keep_steps=keep_steps,
-            max_steps=most,
-            finished=lambda: finished(1),
-        )
-    found = []
-    outcomes = _in_processes(env_id, actor, shield, pieces, batch, jobs, keep_steps, most)
-    for piece, outcome in zip(pieces, outcomes, strict=True):
-        found.append(_episodes(env_id, actor.name, piece, outcome))
-        finished(len(piece))
-    return join(found)
+    work = partial(run_seeds, batch=batch, keep_steps=keep_steps, max_steps=most)
+    workers = executor_of(jobs, executor)
+    if workers is None:
+        return work(env_id, actor, shield, seeds, finished=lambda: finished(1))
+    # None larger than what runs side by side: who stops a long run need not wait for a part of it.
+    pieces = np.array_split(seeds, min(episodes, max(jobs * _ROUNDS, -(-episodes // batch))))
+    calls = ((place, work, (env_id, actor, shield, piece)) for place, piece in enumerate(pieces))
+    parts: dict[int, Episodes] = {}
+    with closing(completed(workers, calls, lost=LOST)) as batches:
+        for place, part in itertools.chain.from_iterable(batches):
+            if isinstance(part, SarlError):
+                raise part
+            parts[place] = part
+            finished(len(part))
+    return join([parts[place] for place in range(len(pieces))])
 
 
 def run_seeds(
@@ -462,37 +469,4 @@ def run_seeds(
         keep_steps=keep_steps,
         finished=finished,
     )
-    return _episodes(env_id, agent.name, seeds, outcome)
-
-
-def _in_processes(
-    env_id: str,
-    agent: Agent,
-    shield: Shield | None,
-    pieces: Sequence[NDArray[np.int64]],
-    batch: int,
-    jobs: int,
-    keep_steps: bool,
-    max_steps: int,
-) -> Iterator[Outcome]:
-    from joblib import delayed
-
-    # In rounds, so that a caller who stops between two leaves no unfinished work behind.
-    with parallel(jobs) as work:
-        for start in range(0, len(pieces), jobs):
-            yield from work(
-                delayed(play)(
-                    env_id,
-                    agent,
-                    shield,
-                    piece,
-                    batch=batch,
-                    max_steps=max_steps,
-                    keep_steps=keep_steps,
-                )
-                for piece in pieces[start : start + jobs]
-            )
-
-
-def _episodes(env_id: str, agent: str, seeds: NDArray[np.int64], outcome: Outcome) -> Episodes:
-    return Episodes(env_id=env_id, agent=agent, seeds=seeds, **outcome._asdict())
+    return Episodes(env_id=env_id, agent=agent.name, seeds=seeds, **outcome._asdict())

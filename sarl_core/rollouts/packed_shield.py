@@ -39,7 +39,7 @@ def pack(shield: Shield) -> bytes:
         What `PackedShield` takes as content.
     """
     # As everything else is packed that goes to the processes, whatever script made it.
-    from joblib.externals.loky.backend.reduction import dumps
+    from loky.backend.reduction import dumps
 
     return bytes(dumps(shield))
 
@@ -60,7 +60,7 @@ def unpack(packed: PackedShield) -> Shield:
 
 @lru_cache(_MOST_KEPT)
 def _whole(content: bytes) -> Shield:
-    from joblib.externals.loky.backend.reduction import loads
+    from loky.backend.reduction import loads
 
     shield: Shield = loads(content)
     return shield

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
@@ -12,11 +14,12 @@ import numpy as np
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.errors import InputError, SarlError
+from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join, run_seeds
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
 from sarl_core.rollouts.player import check_environment
-from sarl_core.rollouts.pool import LARGEST_PIECE, Found, Task, WorkerPool
-from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use, without_rule
+from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use
+from sarl_core.rollouts.tasks import Task, TaskPiece, run_tasks
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import MOST_RULES, Ablation, rules_to_take_out
 
@@ -24,8 +27,8 @@ LEAST_EPISODES = 2  # a difference that was seen once says nothing about the nex
 
 _TOGETHER = 32  # rules whose episodes are handed over at once: the processes wait between
 
-Runner = Callable[[Sequence[Task]], Iterator[Found]]
-"""Runs tasks, as `WorkerPool.run` does."""
+Runner = Callable[[Sequence[Task]], Iterator[TaskPiece]]
+"""Runs tasks, as `run_tasks` does."""
 
 
 class _Outcome(NamedTuple):
@@ -270,6 +273,7 @@ def ablate(
     most: int = MOST_RULES,
     stochastic: bool = False,
     jobs: int = 1,
+    executor: Executor | None = None,
     max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Ablation:
@@ -285,6 +289,7 @@ def ablate(
         most: Rules to take out at most: those that change the most actions.
         stochastic: Whether a trained policy is sampled.
         jobs: Processes; changes the speed, never the result.
+        executor: Whose processes they are; this machine's where not given.
         max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where not
             given.
         progress: Called with (episodes done, in all, as far as can be told); returning False
@@ -308,48 +313,16 @@ def ablate(
             raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     record = AblationRecord(env_id, actor, shield, seed, max_steps)
-    pool = WorkerPool(jobs, gives_way=False) if jobs > 1 else None
-    try:
-        for done, total, _ in record.run(episodes, most, run_here if pool is None else pool.run):
-            report(progress, done, total)
-    finally:
-        if pool is not None:
-            pool.close()
+    runner = partial(run_tasks, executor=executor_of(jobs, executor))
+    for done, total, _ in record.run(episodes, most, runner):
+        report(progress, done, total)
     found = record.result(episodes, most)
     assert found is not None
     return found
 
 
-def run_here(tasks: Sequence[Task]) -> Iterator[Found]:
-    """Run tasks one after the other, in this process.
-
-    Args:
-        tasks: What to run.
-
-    Yields:
-        Pieces as they are finished, in the order of tasks and seeds.
-    """
-    for index, task in enumerate(tasks):
-        shield = task.shield
-        if shield is not None and task.without is not None:
-            shield = without_rule(shield, task.without)
-        for start in range(0, len(task.seeds), LARGEST_PIECE):
-            seeds = task.seeds[start : start + LARGEST_PIECE]
-            yield Found(
-                index,
-                run_seeds(
-                    task.env_id,
-                    task.agent,
-                    shield,
-                    seeds,
-                    keep_steps=task.keep_steps,
-                    max_steps=task.max_steps,
-                ),
-            )
-
-
-def _pieces(found: Iterator[Found]) -> Iterator[Found]:
-    for piece in found:
+def _pieces(pieces: Iterator[TaskPiece]) -> Iterator[TaskPiece]:
+    for piece in pieces:
         if isinstance(piece.result, SarlError):
             raise piece.result
         yield piece

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,6 +106,7 @@ def compare(
     episodes: int = 100,
     seed: int = 0,
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
     """Run the same episodes with every arm.
@@ -115,6 +117,7 @@ def compare(
         episodes: How many each, E.
         seed: Episode i of every arm starts from seed + i and draws the same random numbers.
         jobs: Processes; changes the speed, never the result.
+        executor: Whose processes they are; this machine's where not given.
         progress: Called with (episodes done, in all, over all arms); returning False stops.
 
     Returns:
@@ -140,7 +143,15 @@ def compare(
             report(progress, before + done, total)
 
         found.append(
-            compare_arm(env_id, arm, episodes=episodes, seed=seed, jobs=jobs, progress=told)
+            compare_arm(
+                env_id,
+                arm,
+                episodes=episodes,
+                seed=seed,
+                jobs=jobs,
+                executor=executor,
+                progress=told,
+            )
         )
     return Comparison(env_id, seed, tuple(arms), tuple(found))
 
@@ -152,6 +163,7 @@ def compare_arm(
     episodes: int = 100,
     seed: int = 0,
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Episodes:
     """Run the episodes of one arm.
@@ -162,6 +174,7 @@ def compare_arm(
         episodes: How many, E.
         seed: Of the first.
         jobs: Processes.
+        executor: Whose processes they are; this machine's where not given.
         progress: Called with (episodes done, E); returning False stops.
 
     Returns:
@@ -184,6 +197,7 @@ def compare_arm(
         seed=seed,
         stochastic=arm.stochastic,
         jobs=jobs,
+        executor=executor,
         keep_steps=False,
         progress=progress,
     )

@@ -8,6 +8,7 @@ each time. What is lost then is lost to the intervals, and not to the rules.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -135,6 +136,7 @@ def study_divider(
     episodes: int = 100,
     seed: int = 0,
     jobs: int = 1,
+    executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> DividerStudy:
     """Snap an expert's actions and see what it still achieves.
@@ -149,6 +151,7 @@ def study_divider(
         episodes: How many for each combination, E; all on the same seeds.
         seed: Of the first.
         jobs: Processes.
+        executor: Whose processes they are; this machine's where not given.
         progress: Called with (episodes done, in all); returning False stops.
 
     Returns:
@@ -172,6 +175,7 @@ def study_divider(
             episodes=episodes,
             seed=seed,
             jobs=jobs,
+            executor=executor,
             keep_steps=False,
             progress=lambda now, _: report(progress, done + now, total),
         )

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
+from sarl_core.rollouts.tasks import run_tasks
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import Ablation
 from sarl_core.studies.ablation_run import AblationRecord
 from sarl_dashboard.byte_cache import Kept
-from sarl_dashboard.jobs.episodes import pool
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.processes import processes
 
 MOST_RECORDS = 24
 
@@ -59,7 +61,7 @@ class Ablating(Job):
     def __init__(self, wanted: Wanted) -> None:
         self.key, self._wanted = wanted.key, wanted
         # Streamlit's caches are asked here: the work's own thread has no session.
-        self._records, self._pool = records(), pool()
+        self._records, self._processes = records(), processes()
         super().__init__(self._ablate, wanted.episodes)
 
     def _ablate(self, _: Job) -> None:
@@ -69,7 +71,8 @@ class Ablating(Job):
             self.text = "Making the agent …"
             record = AblationRecord(wanted.env_id, wanted.agent(), wanted.shield(), wanted.seed)
             self._records.put(wanted.key, record)
-        work = record.run(wanted.episodes, wanted.most, self._pool.run)
+        runner = partial(run_tasks, executor=self._processes)
+        work = record.run(wanted.episodes, wanted.most, runner)
         for self.done, self.total, self.text in work:
             if not self.wanted():
                 work.close()

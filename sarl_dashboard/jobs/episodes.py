@@ -19,9 +19,10 @@ from sarl_core.agents.agent import Agent
 from sarl_core.errors import SarlError
 from sarl_core.rollouts.episodes import Episodes, join
 from sarl_core.rollouts.player import check_environment
-from sarl_core.rollouts.pool import Task, WorkerPool
+from sarl_core.rollouts.tasks import Task, run_tasks
 from sarl_core.shielding.shield import Shield
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.text import digest_of
 
 MOST_RESULTS = 1_000  # a hundred episodes take about 10 kB
@@ -122,12 +123,6 @@ def results() -> Results:
     return Results()
 
 
-@st.cache_resource
-def pool() -> WorkerPool:
-    """The processes; all visitors take turns on them."""
-    return WorkerPool()
-
-
 class Comparing(Job):
     """Episodes of several rows, run one row after the other.
 
@@ -141,7 +136,7 @@ class Comparing(Job):
         self._rows = tuple({row.key: row for row in reversed(rows)}.values())[::-1]
         self._episodes = episodes
         # Streamlit's caches are asked here: the work's own thread has no session.
-        self._results, self._pool = results(), pool()
+        self._results, self._processes = results(), processes()
         super().__init__(self._compare, len(self._rows) * episodes)
 
     @property
@@ -171,7 +166,7 @@ class Comparing(Job):
             if not self.wanted():
                 return
         self.text = "Starting …"
-        work = self._pool.run(tasks)
+        work = run_tasks(tasks, self._processes)
         for index, found in work:
             row = todo[index]
             if isinstance(found, SarlError):

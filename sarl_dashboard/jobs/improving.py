@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,9 +18,9 @@ from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
 from sarl_core.mining.rules import RuleSet
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.workers import giving_way
 from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.processes import processes
 
 KEPT = 6  # a finished run holds up to some ten megabytes of demonstrations
 _SOON = 0.03  # share of the work from which on the rest can be guessed
@@ -80,7 +79,7 @@ def kept_outcomes() -> Kept[Outcome]:
 
 @st.cache_resource
 def _one_at_a_time() -> Lock:
-    """Runs share one set of processes, which serves one of them at a time."""
+    """Runs take minutes of all processors: one is finished sooner than two side by side."""
     return Lock()
 
 
@@ -97,6 +96,7 @@ class Working(Job):
         self.outcome = Outcome(order)
         # Streamlit's caches are asked here: the work's own thread has no session.
         self._kept, self._lock = kept_outcomes(), _one_at_a_time()
+        self._processes = processes()
         self._began = time.monotonic()
         super().__init__(self._in_turn, order.plan.rounds * order.plan.episodes)
 
@@ -111,8 +111,7 @@ class Working(Job):
                 return
             self._began = time.monotonic()
             try:
-                with giving_way():
-                    finished = self._find_gaps() if self.order.expert is None else self._improve()
+                finished = self._find_gaps() if self.order.expert is None else self._improve()
             except CancelledError:
                 return
         if finished:
@@ -150,7 +149,8 @@ class Working(Job):
             order.plan,
             env_id=order.env_id,
             expert=order.expert(),
-            jobs=jobs(),
+            jobs=self._processes.workers,
+            executor=self._processes,
             progress=progress,
             watch=watch,
         )
@@ -190,13 +190,9 @@ class Working(Job):
             order.rules,
             episodes=order.plan.episodes,
             seed=order.plan.seed,
-            jobs=jobs(),
+            jobs=self._processes.workers,
+            executor=self._processes,
             progress=progress,
         ):
             self.outcome = Outcome(order, gaps=found)
         return True
-
-
-def jobs() -> int:
-    """Processes for a run: at least two, so that the server itself plays no episode."""
-    return min(max(os.cpu_count() or 1, 2), 8)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,12 @@ from scipy.stats import ttest_1samp
 from sarl_core import InputError, RuleSet, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.errors import WorkError
+from sarl_core.processes import Processes
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.pool import Found, Task, WorkerPool
 from sarl_core.rollouts.rule_use import RuleUse, rule_use
+from sarl_core.rollouts.tasks import Task, TaskPiece, run_tasks
 from sarl_core.studies.ablation import Ablation, rules_to_take_out
-from sarl_core.studies.ablation_run import AblationRecord, ablate, run_here
+from sarl_core.studies.ablation_run import AblationRecord, ablate
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 CART = load_demonstrations(DATA / "cartpole.parquet")
@@ -90,9 +92,9 @@ def test_every_rule_is_what_running_without_it_gives(env_id: str, rules: object)
 def test_of_the_episodes_only_those_are_run_that_can_differ() -> None:
     tasks: list[Task] = []
 
-    def runner(given: Sequence[Task]) -> Iterator[Found]:
+    def runner(given: Sequence[Task]) -> Iterator[TaskPiece]:
         tasks.extend(given)
-        return run_here(given)
+        return run_tasks(given)
 
     shield = Shield(mined())
     record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 40)
@@ -161,9 +163,9 @@ def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(tmp_pat
     file = tmp_path / "deadly"
     agent = DeadlyOnce(novice, file, n_uniforms=novice.n_uniforms)
     record = AblationRecord("CartPole-v1", agent, shield, 9)
-    pool = WorkerPool(2)
-    try:
-        steps = record.run(5, 200, pool.run)
+    with Processes(2) as processes:
+        runner = partial(run_tasks, executor=processes)
+        steps = record.run(5, 200, runner)
         for step in steps:
             if step.text.startswith("Taking rules out"):
                 file.touch()
@@ -172,9 +174,7 @@ def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(tmp_pat
             list(steps)
         assert not file.exists()
         # The new processes were given nothing before, and need nothing of what the others knew.
-        list(record.run(5, 200, pool.run))
-    finally:
-        pool.close()
+        list(record.run(5, 200, runner))
     found = record.result(5, 200)
     assert found is not None
     assert found.to_frame().equals(
@@ -186,7 +186,7 @@ def test_called_off_what_is_finished_stays() -> None:
     shield = Shield(mined())
     record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 9)
     assert record.result(5, 200) is None
-    steps = record.run(5, 200, run_here)
+    steps = record.run(5, 200, run_tasks)
     for step in steps:
         if step.text.startswith("Without rule 2"):
             break
@@ -194,7 +194,7 @@ def test_called_off_what_is_finished_stays() -> None:
     some = record.result(5, 200)
     assert some is not None
     assert 1 <= len(some.rules) < len(some.rules) + len(some.left_out)
-    list(record.run(5, 200, run_here))
+    list(record.run(5, 200, run_tasks))
     whole = record.result(5, 200)
     assert whole is not None
     assert whole.to_frame().equals(
@@ -205,7 +205,7 @@ def test_called_off_what_is_finished_stays() -> None:
 def test_two_callers_at_the_same_ablation_get_what_one_would() -> None:
     shield = Shield(mined())
     record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 9)
-    for both in zip_longest(record.run(5, 200, run_here), record.run(5, 200, run_here)):
+    for both in zip_longest(record.run(5, 200, run_tasks), record.run(5, 200, run_tasks)):
         assert all(step is None or step.done <= step.total for step in both)
     found = record.result(5, 200)
     assert found is not None

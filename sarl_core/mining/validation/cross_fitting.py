@@ -21,7 +21,6 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.rules import RuleSet, Thresholds
-from sarl_core.mining.tasks import run_each
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.mining.validation.episode_counts import (
     EpisodeCounts,
@@ -30,6 +29,7 @@ from sarl_core.mining.validation.episode_counts import (
     most_influential,
 )
 from sarl_core.mining.validation.evidence import HeldOut, held_out_of
+from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 
 FOLDS = 10

@@ -19,8 +19,8 @@ from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.applying import Applications, applications
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rules import Operator, Rule, RuleSet
-from sarl_core.mining.tasks import run_each
 from sarl_core.mining.tree import grow_policy_trees
+from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 
 SAME_RULE = 0.5

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.processes import Processes
 from sarl_core.rollouts.episodes import Episodes, join, rollout
-from sarl_core.rollouts.pool import Task, WorkerPool
 from sarl_core.rollouts.recording import record
+from sarl_core.rollouts.tasks import Task, run_tasks
 from sarl_core.shielding.shield import Shield
 
 COLUMNS = ("seeds", "returns", "lengths", "interventions", "covered", "terminated", "last_rewards")
@@ -36,15 +38,14 @@ class Misbehaving:
 
 
 @pytest.fixture(scope="module")
-def pool() -> Iterator[WorkerPool]:
-    pool = WorkerPool(2)
-    yield pool
-    pool.close()
+def pool() -> Iterator[Processes]:
+    with Processes(2) as processes:
+        yield processes
 
 
-def gathered(pool: WorkerPool, tasks: list[Task]) -> dict[int, list[Episodes | SarlError]]:
+def gathered(pool: Executor, tasks: list[Task]) -> dict[int, list[Episodes | SarlError]]:
     found: dict[int, list[Episodes | SarlError]] = {}
-    for task, result in pool.run(tasks):
+    for task, result in run_tasks(tasks, pool):
         found.setdefault(task, []).append(result)
     return found
 
@@ -53,7 +54,7 @@ def task(agent: str = "novice", episodes: int = 40, seed: int = 3) -> Task:
     return Task("CartPole-v1", make_agent(agent, "CartPole-v1"), None, seed, episodes)
 
 
-def test_pieces_together_are_what_one_rollout_gives(pool: WorkerPool) -> None:
+def test_pieces_together_are_what_one_rollout_gives(pool: Processes) -> None:
     rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
     novice = make_agent("novice", "CartPole-v1")
     tasks = [task(), Task("CartPole-v1", novice, Shield(rules), 7, 45), task("expert", 1)]
@@ -76,7 +77,7 @@ def test_pieces_together_are_what_one_rollout_gives(pool: WorkerPool) -> None:
 
 
 def test_chosen_episodes_without_a_rule_are_what_a_rollout_without_it_gives(
-    pool: WorkerPool,
+    pool: Processes,
 ) -> None:
     rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
     novice, shield = make_agent("novice", "CartPole-v1"), Shield(rules)
@@ -102,10 +103,10 @@ def test_chosen_episodes_without_a_rule_are_what_a_rollout_without_it_gives(
             assert (getattr(pieces, name) == getattr(wholes[index], name)[places]).all()
 
 
-def test_what_is_done_stays_when_the_rest_is_called_off(pool: WorkerPool) -> None:
-    work = pool.run([task(episodes=1_000)])
+def test_what_is_done_stays_when_the_rest_is_called_off(pool: Processes) -> None:
+    work = run_tasks([task(episodes=1_000)], pool)
     index, first = next(work)
-    work.close()  # type: ignore[attr-defined]  # a generator
+    work.close()
     assert index == 0
     assert isinstance(first, Episodes)
     assert first.seeds.tolist() == list(range(3, 3 + len(first)))
@@ -113,7 +114,7 @@ def test_what_is_done_stays_when_the_rest_is_called_off(pool: WorkerPool) -> Non
     assert sum(len(piece) for piece in gathered(pool, [task(episodes=5)])[0]) == 5  # type: ignore[arg-type]
 
 
-def test_a_task_that_fails_leaves_the_others_alone(pool: WorkerPool) -> None:
+def test_a_task_that_fails_leaves_the_others_alone(pool: Processes) -> None:
     bad = Task("CartPole-v1", Misbehaving(deadly=False), None, 0, 50)
     found = gathered(pool, [task(episodes=9), bad, task(episodes=9)])
     (error,) = found[1]
@@ -126,7 +127,7 @@ def test_a_task_that_fails_leaves_the_others_alone(pool: WorkerPool) -> None:
         assert sum(len(piece) for piece in found[index] if isinstance(piece, Episodes)) == 9
 
 
-def test_rules_of_another_environment_are_one_sentence(pool: WorkerPool) -> None:
+def test_rules_of_another_environment_are_one_sentence(pool: Processes) -> None:
     rules = mine_rules(record("Pendulum-v1", "expert", steps=400), supp_min=0.0, conf_min=1.0)
     bad = Task("CartPole-v1", make_agent("novice", "CartPole-v1"), Shield(rules), 0, 10)
     (error,) = gathered(pool, [bad])[0]
@@ -135,12 +136,40 @@ def test_rules_of_another_environment_are_one_sentence(pool: WorkerPool) -> None
 
 
 def test_after_a_process_has_died_there_are_new_ones() -> None:
-    pool = WorkerPool(1)
     deadly = Task("CartPole-v1", Misbehaving(deadly=True), None, 0, 2)
-    with pytest.raises(WorkError, match="ended unexpectedly"):
-        gathered(pool, [deadly])
-    assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3  # type: ignore[arg-type]
-    pool.close()
+    with Processes(1) as pool:
+        with pytest.raises(WorkError, match="ended unexpectedly"):
+            gathered(pool, [deadly])
+        assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3  # type: ignore[arg-type]
+
+
+def test_where_a_process_dies_a_rollout_says_so_and_the_next_one_runs() -> None:
+    with pytest.raises(WorkError, match="a process that ran episodes ended unexpectedly"):
+        rollout("CartPole-v1", Misbehaving(deadly=True), episodes=4, jobs=2)
+    again = rollout("CartPole-v1", "novice", episodes=4, jobs=2)
+    assert again.returns.tolist() == rollout("CartPole-v1", "novice", episodes=4).returns.tolist()
+
+
+def test_any_executor_fits_in() -> None:
+    """As a Dask client's: one that is no process of ours, and says nothing of its size."""
+    rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
+    asked = Task("CartPole-v1", make_agent("novice", "CartPole-v1"), Shield(rules), 7, 45)
+    whole = rollout(asked.env_id, asked.agent, shield=asked.shield, episodes=45, seed=7)
+    with ThreadPoolExecutor(2) as executor:
+        pieces = gathered(executor, [asked])[0]
+        ours = rollout(
+            asked.env_id,
+            asked.agent,
+            shield=asked.shield,
+            episodes=45,
+            seed=7,
+            jobs=2,
+            executor=executor,
+        )
+    assert len(pieces) > 1
+    for one in (ours, join([piece for piece in pieces if isinstance(piece, Episodes)])):
+        for name in COLUMNS:
+            assert (getattr(one, name) == getattr(whole, name)).all()
 
 
 @dataclass(frozen=True)
@@ -164,9 +193,8 @@ def test_processes_give_way_to_those_who_serve_pages_and_not_where_a_caller_wait
     agent = Telling(novice, tmp_path / "nice", novice.n_uniforms)
     told = []
     for gives_way in (True, False):
-        pool = WorkerPool(1, gives_way=gives_way)
-        gathered(pool, [Task("CartPole-v1", agent, None, 0, 1)])
-        pool.close()
+        with Processes(1, gives_way=gives_way) as pool:
+            gathered(pool, [Task("CartPole-v1", agent, None, 0, 1)])
         told.append(int(agent.file.read_text()))
     assert told[0] > told[1] == os.nice(0)
 
