@@ -1,0 +1,233 @@
+"""What differs between two rule sets: rules, and decisions in the same states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import streamlit as st
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
+from sarl_core.explaining.html.confusion import confusion_html
+from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
+from sarl_core.explaining.words.difference import decided_text, rows_text
+from sarl_core.mining.editing.difference import comparable
+from sarl_core.mining.language import counted
+from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rules import RuleSet
+from sarl_core.shielding.deciding import ground_of
+from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.state.data import chosen_demonstrations, digest_or_empty
+from sarl_dashboard.text import escaped, in_full, together
+from sarl_dashboard.views.difference.sides import Side, chosen_sides
+
+EVERY = "all"
+Digests = tuple[str, str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two rule sets, held against each other.
+
+    Attributes:
+        digests: Of the first, of the second, and of the demonstrations.
+        names: Of both.
+        disagreement: What differs.
+        states: On which they were compared, shape (n, d).
+        demonstrations: Whose states these are; None where they are random.
+    """
+
+    digests: Digests
+    names: tuple[str, str]
+    disagreement: Disagreement
+    states: NDArray[np.float32]
+    demonstrations: Demonstrations | None
+
+    @property
+    def noun(self) -> str:
+        """What one of the states is called."""
+        return "random state" if self.demonstrations is None else "demonstrated state"
+
+
+@st.fragment
+def comparison() -> None:
+    """Both choices and what differs; nothing else on the page does."""
+    sides = chosen_sides()
+    if len(sides) < 2:
+        return
+    try:
+        compared = _compare(*sides)
+    except SarlError as error:
+        st.error(in_full(str(error)), icon=":material/error:")
+        return
+    _show_states(compared)
+    _show_rules(compared)
+
+
+def _compare(first: Side, second: Side) -> Comparison:
+    names = (first.name, second.name)
+    if first.name == second.name:
+        names = (f"{first.name} (first)", f"{second.name} (second)")
+    demonstrations = chosen_demonstrations()
+    if demonstrations is not None and not (
+        fits(first.rule_set, demonstrations) and fits(second.rule_set, demonstrations)
+    ):
+        demonstrations = None
+    digests = (first.digest, second.digest, digest_or_empty(demonstrations))
+    found, states = _disagreement(digests, first.rule_set, second.rule_set, demonstrations)
+    return Comparison(digests, names, found, states, demonstrations)
+
+
+@cached(show_spinner="Comparing …")
+def _disagreement(
+    digests: Digests, _first: RuleSet, _second: RuleSet, _demonstrations: Demonstrations | None
+) -> tuple[Disagreement, NDArray[np.float32]]:
+    """The comparison, and the states."""
+    _second = comparable(_first, _second).rule_set
+    states = (
+        sampled_states([_first, _second])
+        if _demonstrations is None
+        else _demonstrations.observations
+    )
+    return disagreement(ground_of(_first, states), ground_of(_second, states)), states
+
+
+@cached(show_spinner="Writing the rules in plain language …")
+def _rules_frame(digests: Digests, kinds: tuple[str, ...], _found: Disagreement) -> Any:
+    """The rules that differ, as a data frame."""
+    import pandas as pd
+
+    rows = rule_rows(_found, kinds)
+    rows["Action"] = [[action] for action in rows["Action"]]
+    if "changed" not in rows["What"]:
+        del rows["Change"]
+    return pd.DataFrame(rows)
+
+
+@cached()
+def _decisions(
+    digests: Digests, names: tuple[str, str], dimension: int, _compared: Comparison
+) -> tuple[str, Any]:
+    """What the two say of the states, as a table in HTML, and some states as a data frame."""
+    import pandas as pd
+
+    table = confusion_html(_compared.disagreement, dimension, names=names, noun=_compared.noun)
+    rows = example_rows(
+        _compared.disagreement,
+        dimension,
+        _compared.states,
+        names=names,
+        demonstrations=_compared.demonstrations,
+    )
+    return table, pd.DataFrame(rows)
+
+
+def _small(text: str) -> str:
+    """Markdown as a caption has it."""
+    return f":small[:gray[{text}]]"
+
+
+def _headed(title: str, *paragraphs: str) -> str:
+    """A heading and what stands below it, in one piece of Markdown."""
+    return "\n\n".join([f"### {title}", *filter(None, paragraphs)])
+
+
+def _show_rules(compared: Comparison) -> None:
+    """Rules added, removed, changed."""
+    found = compared.disagreement
+    st.markdown(
+        _headed("Rules", _small(rows_text(found))),
+        help="Rules are the same rule where they ask the same, or where they share more than "
+        "half of the states that either of them applies to. A changed one has other conditions, "
+        "says something else, was switched on or off, or has another place.",
+    )
+    counts = (
+        len(found.difference.added),
+        len(found.difference.removed),
+        len(found.difference.changed),
+    )
+    if not any(counts):
+        return
+    view = st.segmented_control(
+        "Show",
+        [EVERY, *(kind for kind, count in zip(KINDS, counts, strict=True) if count)],
+        default=EVERY,
+        key="kind",
+        bind="query-params",
+        required=True,
+        label_visibility="collapsed",
+    )
+    kinds = KINDS if view in (None, EVERY) else (str(view),)
+    frame = _rules_frame(compared.digests, kinds, found)
+    column = st.column_config
+    action, action_width = action_column(found.first.actions, "What the rule says")
+    st.dataframe(
+        frame,
+        hide_index=True,
+        height=table_height(len(frame), 9),
+        key="rule_changes",
+        alt="Rules that differ",
+        column_config={
+            "What": column.TextColumn(width=75),
+            "Rule": column.TextColumn(width=80),
+            "Action": action,
+            "When": column.TextColumn(width=(470 if "Change" in frame else 650) - action_width),
+            "Change": column.TextColumn(width=240),
+            "States": column.NumberColumn(
+                format="localized",
+                width=75,
+                help="Demonstrated states to which the rule applies, of those it was mined from",
+            ),
+        },
+    )
+
+
+def _show_states(compared: Comparison) -> None:
+    """The states that are decided differently."""
+    found = compared.disagreement
+    random = (
+        f"The states are {counted(found.states, 'random one')} over the range of the rules' "
+        "thresholds, because the chosen demonstrations are of something else. They say where "
+        "the two differ, not how often an agent comes there."
+    )
+    st.markdown(
+        _headed(
+            "Decisions",
+            f"**{escaped(together(decided_text(found, states=compared.noun)))}**",
+            _small(random) if compared.demonstrations is None else "",
+        )
+    )
+    actions = found.first.actions
+    dimension = 0
+    if len(actions) > 1:
+        labels = [action.name for action in actions]
+        most = labels[int(found.differs.sum(axis=0).argmax())]
+        name = st.segmented_control(
+            "Action", labels, default=most, key="decided", bind="query-params", required=True
+        )
+        dimension = labels.index(name) if name in labels else 0
+    table, examples = _decisions(compared.digests, compared.names, dimension, compared)
+    with st.container(key="confusion"):
+        st.html(table)
+    count = len(examples)
+    if not count:
+        return
+    several = int(found.differs[:, dimension].sum())
+    st.markdown(
+        _headed(
+            "Example states",
+            _small(f"{count} of {several:,}, evenly spread.") if several > count else "",
+        )
+    )
+    st.dataframe(
+        examples,
+        hide_index=True,
+        height=table_height(count, 9),
+        key="examples",
+        alt="States that the two decide differently",
+    )
