@@ -18,11 +18,13 @@ from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.rules import Condition, Rule, RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.rule_files import COMPACT, compact_file, compact_rules
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, compact_file, compact_rules
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import in_full
 
 THRESHOLDS = "thresholds"
+# Which set the Rules page has to show, to show a rule of a set that was chosen elsewhere.
+SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
 
 
 @dataclass(frozen=True, eq=False)

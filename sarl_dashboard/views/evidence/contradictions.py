@@ -74,24 +74,24 @@ def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
     _show(remaining, rule_set, _contradictions(remaining.digest, divider, reach, remaining))
 
 
-def _show(remaining: Demonstrations, rule_set: RuleSet, found: Contradictions) -> None:
+def _show(remaining: Demonstrations, rule_set: RuleSet, contradictions: Contradictions) -> None:
     dimension = None
     actions = rule_set.actions
     if len(actions) > 1:
         names = ["any action", *(action.name for action in actions)]
         name = st.selectbox("Action", names, key="contradiction", bind="query-params", width=260)
         dimension = names.index(name) - 1 if name in names[1:] else None
-    flags = found.found(dimension)
+    flags = contradictions.found(dimension)
     which = slice(None) if dimension is None else [dimension]
-    identical = int(found.identical[:, which].any(axis=1).sum())
-    near = int(found.near[:, which].any(axis=1).sum())
-    compared = int((found.neighbour >= 0).sum())
+    identical = int(contradictions.identical[:, which].any(axis=1).sum())
+    near = int(contradictions.near[:, which].any(axis=1).sum())
+    compared = int((contradictions.neighbour >= 0).sum())
     st.markdown(
         f"**{int(flags.sum()):,} of {counted(len(remaining), 'state')}** contradict another: "
         f"{identical:,} are identical to one with another action, {near:,} of {compared:,} that "
         "have a near one in another episode differ from it."
     )
-    episodes = by_episode(remaining, found, dimension)
+    episodes = by_episode(remaining, contradictions, dimension)
     if not flags.any():
         st.info(
             "No demonstrations disagree at this distance. Widen it to look further.",
@@ -144,12 +144,12 @@ def _show(remaining: Demonstrations, rule_set: RuleSet, found: Contradictions) -
             help="Tick episodes in the table. Every page follows, and nothing is deleted.",
         )
     for place, action in enumerate(actions):
-        if dimension in (None, place) and found.near[:, place].any():
+        if dimension in (None, place) and contradictions.near[:, place].any():
             st.markdown(f"**The nearest pairs: {escaped(action.name)}**")
             st.dataframe(
-                pair_columns(remaining, found, divider=rule_set.divider, dimension=place),
+                pair_columns(remaining, contradictions, divider=rule_set.divider, dimension=place),
                 hide_index=True,
-                height=table_height(int(found.near[:, place].sum()), 6),
+                height=table_height(int(contradictions.near[:, place].sum()), 6),
                 key=f"pairs_{place}",
                 column_config={"Distance": st.column_config.NumberColumn(format="%.3g")},
                 alt="States and their nearest ones with another action",

@@ -1,0 +1,138 @@
+"""The settings of the page Ablation, and the ablation that they ask for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import InputError
+from sarl_core.rollouts.player import check_environment
+from sarl_core.shielding.shield import Shield
+from sarl_core.studies.ablation import MOST_RULES
+from sarl_core.studies.ablation_run import LEAST_EPISODES
+from sarl_dashboard.components.settings import (
+    environment_choice,
+    no_boxes_notice,
+    notes_notice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
+from sarl_dashboard.jobs.ablation import Wanted
+from sarl_dashboard.jobs.episodes import row_key
+from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
+from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+
+MOST_EPISODES = 500
+RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """What was chosen.
+
+    Attributes:
+        wanted: The ablation.
+        rules: What its rules are called on screen.
+    """
+
+    wanted: Wanted
+    rules: str
+
+    @property
+    def on_demonstrated_seeds(self) -> bool:
+        """Whether some of its episodes are among the demonstrated ones."""
+        wanted = self.wanted
+        return self.rules != OWN_FILE and demonstrated(wanted.env_id, wanted.seed, wanted.episodes)
+
+
+def settings() -> Choice:
+    """The widgets, and what they ask for.
+
+    Raises:
+        SarlError: If it cannot be had.
+    """
+    with st.container(border=True):
+        with st.grid(4, min_column_width=150, gap="small"):
+            env = environment_choice()
+            agent = st.selectbox(
+                "Agent",
+                AGENTS,
+                key="agent",
+                bind="query-params",
+                help="Whom the rules hold. With the novice, which acts at random, they have the "
+                "most to do.",
+            )
+            rules = st.selectbox(
+                "Rules",
+                offered_rule_sets(RULE_SETS),
+                key="rules",
+                bind="query-params",
+                help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
+                "is shipped for this environment. Own file: rules you saved.",
+            )
+            most = st.number_input(
+                "Rules to take out",
+                1,
+                MOST_RULES,
+                25,
+                key="most_rules",
+                bind="query-params",
+                help="At most so many: those that change the most actions.",
+            )
+            episodes = st.number_input(
+                "Episodes",
+                LEAST_EPISODES,
+                MOST_EPISODES,
+                50,
+                key="ablation_episodes",
+                bind="query-params",
+                help="With every rule taken out, and with none. More of them show smaller "
+                "differences.",
+            )
+            seed = st.number_input(
+                "First seed",
+                0,
+                2**31 - 1 - 1_000,
+                FRESH_SEED,
+                key="first_seed",
+                bind="query-params",
+                help="The episodes start from this seed, the next one, and so on, the same with "
+                "every rule taken out. The same seeds give the same result.",
+            )
+            projection = PROJECTIONS[0]
+            if continuous(env):
+                projection = projection_choice()
+            outside = outside_choice()
+        policy_file = rule_file = None
+        if agent == OWN_FILE:
+            policy_file = policy_upload("Policy", "policy_file", env)
+        if rules == OWN_FILE:
+            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+
+    env_id, first = environment_of(env), int(seed or 0)
+    describe_environment(env_id)
+    rule_set, rules_digest = rules_for(rules, rule_file)
+    make, agent_digest = agent_for(agent, policy_file, env_id, first)
+    if rule_set is None or not any(rule.enabled for rule in rule_set.rules):
+        raise InputError(
+            "there is no rule that could be taken out; lower the thresholds in the sidebar, or "
+            "choose other rules"
+        )
+    no_boxes_notice([rule_set], outside)
+    notes_notice(check_environment(env_id, Shield(rule_set)).notes)
+    wanted = Wanted(
+        row_key(env_id, agent_digest, f"{rules_digest} {outside}", projection, first),
+        env_id,
+        first,
+        int(episodes or LEAST_EPISODES),
+        int(most or 1),
+        make,
+        lambda: Shield(rule_set, projection=projection, outside=outside),
+    )
+    return Choice(wanted, rules)

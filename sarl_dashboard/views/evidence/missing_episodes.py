@@ -1,0 +1,85 @@
+"""How many more episodes each rule would take, on the page Evidence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.explaining.html.evidence import enough_plot
+from sarl_core.explaining.html.headings import note
+from sarl_core.explaining.tables.evidence import enough_columns
+from sarl_core.explaining.words.evidence import never_text
+from sarl_core.mining.rules import RuleSet
+from sarl_dashboard.cache import cached
+from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.views.evidence.evidence import Evidence, Findings
+
+
+@cached()
+def _enough(key: tuple[object, ...], _findings: Findings, _rule_set: RuleSet) -> Any:
+    import pandas as pd
+
+    columns = enough_columns(
+        _findings.rules, _rule_set, _findings.missing, _findings.threshold, _findings.influences
+    )
+    # A list of one, which the table shows in the action's colour.
+    columns["Action"] = [[action] for action in columns["Action"]]
+    return pd.DataFrame(columns)
+
+
+def show_enough(evidence: Evidence) -> None:
+    """How many more episodes each rule would take."""
+    findings = evidence.findings
+    if findings.judged is None:
+        st.info(
+            "Whether the demonstrations are enough, only episodes can say that the rules were not "
+            "mined from. Hold some out above.",
+            icon=":material/info:",
+        )
+        return
+    st.html(
+        note(
+            "How many more episodes until the lower end of a rule's interval would reach the "
+            "minimum confidence, if the same share of them was held out, and the rule applied as "
+            "often and was right as often, and as unevenly, as so far. Where the confidence itself "
+            "does not lie above the minimum, no number is enough."
+        )
+    )
+    none = never_text(findings.missing)
+    if none:
+        st.html(note(none))
+        table = st.container()
+    else:
+        left, table = st.columns([1, 2], gap="medium")
+        with left, st.container(key="enough"):
+            st.html(enough_plot(findings.missing))
+    with table:
+        column = st.column_config
+        st.dataframe(
+            _enough(evidence.key, findings, evidence.rule_set),
+            hide_index=True,
+            height=table_height(len(findings.rules), 6),
+            key="enough_table",
+            column_config={
+                "Rule": column.TextColumn(width=60),
+                "Action": action_column(evidence.rule_set.actions, "What the rule says")[0],
+                "Still missing": column.TextColumn(width=155),
+                "Held out": column.TextColumn(
+                    width=170,
+                    help="How often it was right in an episode held out, on average over those",
+                ),
+                "Interval": column.TextColumn(
+                    width=130, help="What so few or so many episodes can tell (95 %)"
+                ),
+                "Verdict": None,
+                "Mined from": column.TextColumn(
+                    width=160, help="How often it was right in the states it was mined from"
+                ),
+                "Moved most by": column.TextColumn(
+                    width=195, help="The one episode without which the share would differ most"
+                ),
+                "When": column.TextColumn(width=420),
+            },
+            alt="What each rule still misses",
+        )

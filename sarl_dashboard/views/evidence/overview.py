@@ -1,0 +1,85 @@
+"""All rules on the page Evidence, and how many of them reach the minimum confidence."""
+
+from __future__ import annotations
+
+import math
+
+import streamlit as st
+
+from sarl_core.explaining.html.evidence import overview_plot
+from sarl_core.explaining.html.headings import note
+from sarl_core.explaining.html.number_cards import Number, number_cards
+from sarl_core.explaining.words.cross_fit import influence_sentences, judged_sentence
+from sarl_core.explaining.words.evidence import (
+    VERDICT_COLOURS,
+    VERDICTS,
+    remedy_text,
+    verdict_counts,
+)
+from sarl_core.mining.language import share_text
+from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.validation.evidence import FEWEST_EPISODES
+from sarl_core.mining.validation.holding_out import Verdict, shortfall
+from sarl_dashboard.cache import cached
+from sarl_dashboard.views.evidence.evidence import Evidence, Findings
+
+MOST_DRAWN = 600
+MEANINGS: tuple[tuple[Verdict, str], ...] = (
+    ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
+    ("open", "The minimum confidence lies within the interval: not enough is known"),
+    ("below", "The whole interval lies below the minimum confidence"),
+    ("unknown", f"The rule applied in fewer than {FEWEST_EPISODES} of the held-out episodes"),
+)
+
+
+@cached()
+def _overview(key: tuple[object, ...], _findings: Findings, _rule_set: RuleSet) -> str:
+    return overview_plot(_findings.rules[:MOST_DRAWN], _rule_set, _findings.threshold)
+
+
+def show_overview(evidence: Evidence) -> None:
+    """All rules with what is known of them, and how many reach the minimum confidence."""
+    findings, judged = evidence.findings, evidence.findings.judged
+    numbers = [Number("Rules", f"{len(findings.rules):,}")]
+    sentences = []
+    if judged is not None:
+        counts = verdict_counts(findings.rules, findings.threshold)
+        share = judged.fidelity.share
+        numbers.append(
+            Number(
+                "Held-out fidelity",
+                share_text(math.nan if share is None else share, decimals=1),
+                "Share of the states with a rule in which the expert did what it says, on average "
+                "over the held-out episodes",
+            )
+        )
+        numbers += [
+            Number(VERDICTS[name].capitalize(), f"{counts[name]:,}", meaning)
+            for name, meaning in MEANINGS
+        ]
+        sentences = [judged_sentence(judged), *influence_sentences(judged)]
+        held_out = evidence.parts.held_out
+        short = shortfall(
+            findings.rules, findings.threshold, 0 if held_out is None else held_out.n_episodes
+        )
+        remedy = remedy_text(short, evidence.parts.remaining.n_episodes)
+        if remedy:
+            sentences.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
+    ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
+    words = f"dotted: minimum confidence {share_text(findings.threshold)}"
+    if judged is not None:
+        words = (
+            f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
+            "a dot alone: too few episodes &ensp; grey: on what it was mined from &ensp; " + words
+        )
+    if len(findings.rules) > MOST_DRAWN:
+        sentences.append(
+            f"Drawn: the {MOST_DRAWN} rules with the most support, of {len(findings.rules):,}."
+        )
+    with st.container(key="overview"):  # one piece: each element of its own takes its time
+        st.html(
+            f"{number_cards(numbers)}<div style='height:1.2rem'></div>"
+            + _overview(evidence.key, findings, evidence.rule_set)
+            + f"<div style='font-size:0.85rem;opacity:0.9;margin:0.6rem 0 0.9rem'>{words}</div>"
+            + "".join(map(note, sentences))
+        )
