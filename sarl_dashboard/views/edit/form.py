@@ -21,8 +21,7 @@ from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.state.url import set_url_choice
-from sarl_dashboard.text import escaped
-from sarl_dashboard.views.edit.table import refuse
+from sarl_dashboard.text import escaped, in_full
 
 ABOVE, AT_MOST = "above", "at most"
 SIGNS: dict[str, Operator] = {ABOVE: ">", AT_MOST: "<="}
@@ -93,15 +92,50 @@ def _fewer(draft: Draft, row: int) -> None:
     draft.rows.remove(row)
 
 
-def form(of: Base, now: Verdicts) -> None:
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """A draft, and the rules that it is for.
+
+    Attributes:
+        base: The rules without edits.
+        now: What they say with the edits so far.
+        draft: What is filled in.
+    """
+
+    base: Base
+    now: Verdicts
+    draft: Draft
+
+    def edit(self, rule: Rule) -> Add | Change:
+        """The edit that puts a rule in force."""
+        return Change(rule) if self.draft.changing else Add(rule)
+
+
+@dataclass(frozen=True)
+class Filled:
+    """What the widgets say.
+
+    Attributes:
+        asks: The conditions.
+        dimension: Action dimension.
+        action: What the rule says there; None while that was not chosen.
+    """
+
+    asks: list[Ask]
+    dimension: int
+    action: int | None
+
+
+def form(base: Base, now: Verdicts) -> None:
     """The form and the preview."""
-    draft, rule_set = draft_of(of), now.rule_set
-    editing = draft.changing and any(rule.id == draft.changing for rule in rule_set.rules)
-    if draft.changing and not editing:
+    draft = draft_of(base)
+    filling = Filling(base, now, draft)
+    if not any(rule.id == draft.changing for rule in now.rule_set.rules):
         draft.changing = ""  # it was removed meanwhile: what was filled in makes a new one
-    st.subheader(f"Change {escaped(draft.changing)}" if editing else "Add a rule by hand")
+    changing = draft.changing
+    st.subheader(f"Change {escaped(changing)}" if changing else "Add a rule by hand")
     with st.container(border=True, key="manual"):
-        asks = [_condition(of, draft, row) for row in list(draft.rows)]
+        asks = [_condition(base, draft, row) for row in list(draft.rows)]
         st.button(
             "Another condition" if draft.rows else "Add a condition",
             on_click=_more,
@@ -110,16 +144,15 @@ def form(of: Base, now: Verdicts) -> None:
             key=draft.key("more"),
             type="tertiary",
         )
-        dimension, action = _says(draft, rule_set)
-        rule = _rule(of, now, draft, asks, dimension, action)
-        if rule is not None:
-            preview(of, now, rule, changing=bool(editing))
+        rule = _rule(filling, Filled(asks, *_says(draft, now.rule_set)))
+        edit = None if rule is None else filling.edit(rule)
+        if edit is not None:
+            preview(filling, edit)
         with st.container(horizontal=True, gap="small"):
-            edit = None if rule is None else Change(rule) if editing else Add(rule)
             st.button(
-                "Save the change" if editing else "Add the rule",
+                "Save the change" if changing else "Add the rule",
                 on_click=_save,
-                args=(of, edit),
+                args=(base, edit),
                 type="primary",
                 disabled=edit is None,
                 icon=":material/check:",
@@ -128,7 +161,7 @@ def form(of: Base, now: Verdicts) -> None:
             st.button(
                 "Clear",
                 on_click=_clear,
-                args=(of,),
+                args=(base,),
                 icon=":material/clear:",
                 key=draft.key("clear"),
             )
@@ -138,12 +171,11 @@ def _save(of: Base, edit: Add | Change) -> None:
     edits.do(of, edit)
     if not st.session_state.get("_edit_error"):
         begin(of)
-
         set_url_choice("rule", edit.rule_id)
 
 
-def _condition(of: Base, draft: Draft, row: int) -> Ask:
-    features = of.rule_set.source.features
+def _condition(base: Base, draft: Draft, row: int) -> Ask:
+    features = base.rule_set.source.features
 
     def named(at: int) -> str:
         name, unit = features[at].name, features[at].unit
@@ -167,7 +199,7 @@ def _condition(of: Base, draft: Draft, row: int) -> Ask:
             label_visibility="collapsed",
             width=110,
         )
-        values = of.basis.ground.states[:, feature]
+        values = base.basis.ground.states[:, feature]
         least, most = float(values.min()), float(values.max())
         low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
         threshold = st.number_input(
@@ -218,33 +250,31 @@ def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:
     return dimension, action
 
 
-def _rule(
-    of: Base, now: Verdicts, draft: Draft, asks: list[Ask], dimension: int, action: int | None
-) -> Rule | None:
+def _rule(filling: Filling, filled: Filled) -> Rule | None:
     """The rule as it is filled in; None, with a sentence, while it is none."""
-    blank = action is None and all(ask.threshold is None for ask in asks)
-    if blank and asks:
+    asks, rule_set = filled.asks, filling.now.rule_set
+    if asks and filled.action is None and all(ask.threshold is None for ask in asks):
         st.caption("Fill in a condition and an action to see here what the rule would change.")
         return None
     try:
         return manual_rule(
-            now.rule_set,
+            rule_set,
             asks,
-            rule_id=draft.changing or next_manual_id(now.rule_set, edits.history(of)),
-            action=action,
-            dimension=dimension,
-            demonstrations=edits.demonstrations_for(of.rule_set),
+            rule_id=filling.draft.changing or next_manual_id(rule_set, edits.history(filling.base)),
+            action=filled.action,
+            dimension=filled.dimension,
+            demonstrations=edits.demonstrations_for(filling.base.rule_set),
         )
     except SarlError as error:
-        refuse(error)
+        st.warning(in_full(str(error)), icon=":material/error:")
         return None
 
 
-def preview(of: Base, now: Verdicts, rule: Rule, *, changing: bool) -> None:
+def preview(filling: Filling, edit: Add | Change) -> None:
     """What the rule would change, before it is there."""
-    edit = Change(rule) if changing else Add(rule)
-    then = edits.verdicts_of(of, (*edits.history(of).edits, edit))
-    noun = of.basis.noun
+    base, now, rule = filling.base, filling.now, edit.rule
+    then = edits.verdicts_of(base, (*edits.history(base).edits, edit))
+    noun = base.basis.noun
     st.markdown(f"**{escaped(sentence(rule, then.rule_set, evidence=False))}**")
     if not rule.conditions:
         st.warning(
@@ -254,14 +284,14 @@ def preview(of: Base, now: Verdicts, rule: Rule, *, changing: bool) -> None:
         )
     index = next(at for at, one in enumerate(then.rule_set.rules) if one.id == rule.id)
     decides = int(then.decided[index])
-    told = [f"It would decide {decides:,} of {len(then.labels):,} {noun}s."]
+    sentences = [f"It would decide {decides:,} of {len(then.labels):,} {noun}s."]
     if then.right is not None and decides:
-        told.append(f"The expert did as it says in {int(then.right[index]):,} of them.")
-    told.append(
+        sentences.append(f"The expert did as it says in {int(then.right[index]):,} of them.")
+    sentences.append(
         "Against the set as it is now: "
         + _lower(change_text(change(now, then), now, then, states=noun))
     )
-    st.markdown(escaped(" ".join(told)))
+    st.markdown(escaped(" ".join(sentences)))
     own = [one for one in then.conflicts if one.rule == index]
     if own:
         states = sum(one.states for one in own)

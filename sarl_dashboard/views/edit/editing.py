@@ -1,0 +1,42 @@
+"""The edits of some rules and all that follows from them, on the page Edit."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.errors import SarlError
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.edits import Base
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.edit import form
+from sarl_dashboard.views.edit.conflicts import conflicts
+from sarl_dashboard.views.edit.rule import chosen_rule
+from sarl_dashboard.views.edit.table import table
+from sarl_dashboard.views.edit.totals import bar, numbers
+
+
+@st.fragment
+def editing(of: Base) -> None:
+    """The edits and all that follows from them; nothing else on the page does."""
+    try:
+        before = edits.verdicts_of(of, ())
+        after = edits.verdicts_of(of, edits.history(of).edits)
+    except SarlError as problem:
+        st.error(in_full(str(problem)), icon=":material/error:")
+        return
+    bar(of)
+    numbers(of, before, after)
+    if after.rule_set.rules:
+        rule = table(of, after)
+        if rule is not None:
+            wish = chosen_rule(of, rule, after)
+            if wish:
+                form.begin(of, rule, changing=wish == "change")
+    else:
+        st.info(
+            "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "
+            "add a rule by hand.",
+            icon=":material/filter_alt_off:",
+        )
+    form.form(of, after)
+    conflicts(of, after)

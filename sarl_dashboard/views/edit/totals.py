@@ -1,0 +1,102 @@
+"""What the edits come to: undo, redo, the file, and what they change, on the page Edit."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.explaining.html.headings import note
+from sarl_core.explaining.html.number_cards import Number, number_cards
+from sarl_core.explaining.words.edits import change_text, edit_text
+from sarl_core.mining.language import share_text
+from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.shielding.effects import Verdicts, change
+from sarl_dashboard.state import edits
+from sarl_dashboard.state.edits import Base
+from sarl_dashboard.text import escaped, in_full
+
+
+def bar(of: Base) -> None:
+    """Undo, redo, and the file."""
+    history = edits.history(of)
+    rule_set = edits.edited(of)
+    error = st.session_state.pop("_edit_error", None)
+    if error:
+        st.error(in_full(error), icon=":material/error:")
+    with st.container(horizontal=True, gap="small", vertical_alignment="center"):
+        for name, icon, step, waiting in (
+            ("Undo", "undo", edits.undo, history.edits[-1:]),
+            ("Redo", "redo", edits.redo, history.undone[-1:]),
+        ):
+            told = edit_text(waiting[0], rule_set) if waiting else ""
+            st.button(
+                f"{name}: {escaped(_short(told))}" if told else name,
+                on_click=step,
+                args=(of,),
+                disabled=not waiting,
+                icon=f":material/{icon}:",
+                key=name.lower(),
+                help=escaped(told) if told else f"Nothing to {name.lower()}",
+            )
+        source = rule_set.source.env_id.rsplit("/", 1)[-1] or "unnamed"
+        st.download_button(
+            "Rule file",
+            lambda: rules_to_json(rule_set),
+            f"rules-{source}-edited.json",
+            "application/json",
+            on_click="ignore",
+            icon=":material/download:",
+            key="edited_file",
+            help="The set with all edits: what is off, what is pinned, what was added by hand.",
+        )
+        if history.edits:
+            st.page_link(
+                "difference.py",
+                label="Compare with the unedited set",
+                icon=":material/difference:",
+                query_params={"first": "before the edits", "second": "edited"},
+            )
+
+
+def _short(text: str, most: int = 44) -> str:
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
+
+
+def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
+    """What the edits change at once, against the unedited set."""
+    found, noun = change(before, after), of.basis.noun
+    in_force = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
+    shown = (
+        ("Rules in force", f"{in_force[1]:,}", f"{in_force[0]:,}"),
+        ("Coverage", *(share_text(one.coverage, decimals=1) for one in (after, before))),
+        ("Fidelity", *(share_text(one.fidelity, decimals=1) for one in (after, before))),
+        ("Decided differently", f"{found.different:,}", ""),
+        ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
+    )
+    meanings = (
+        "Rules that are switched on",
+        "Share of the states in which some rule applies",
+        "Share of the covered states in which the expert did as the rule in force says",
+        "States of which the edited set says something else than the unedited one",
+        "States in which a placed rule overrules another that says something else",
+    )
+    told = change_text(found, before, after, states=noun)
+    cards = [
+        Number(label, value, meaning, was if was != value else "")
+        for (label, value, was), meaning in zip(shown, meanings, strict=True)
+    ]
+    with st.container(key="numbers"):
+        st.html(
+            number_cards(cards, framed=True)
+            + '<div style="height:0.8rem"></div>'
+            + note(f"Against the unedited set: {told[:1].lower() + told[1:]}{where(of)}")
+        )
+
+
+def where(of: Base) -> str:
+    """Which states these are, where they are not the demonstrated ones."""
+    if of.basis.expert is not None:
+        return ""
+    return (
+        " The chosen demonstrations are of something else, so this is counted on random states "
+        "over the range of the rules' thresholds."
+    )
