@@ -17,6 +17,7 @@ from sarl_core.mining.quantisation import (
 )
 from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.run_bar import run_bar
 from sarl_dashboard.jobs.episodes import Row, known, row_key, working
 from sarl_dashboard.session import is_dark
@@ -26,7 +27,6 @@ from sarl_dashboard.text import escaped, in_full
 
 PLACE = "divider"
 MOST_EPISODES = 200
-PLAIN = {"displayModeBar": False}
 
 Divided = tuple[tuple[Quantisation, ...], ...]
 Combination = tuple[int, Snapping]
@@ -55,11 +55,10 @@ def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
     left, right = st.columns(2, gap="medium")
     with left:
         st.markdown("**How far an action moves, as a share of its range**")
-        st.plotly_chart(
+        chart(
             error_figure(some, dark=dark),
-            config=PLAIN,
-            key="divider_errors",
-            alt="Root mean square of what snapping changes, for every action and divider",
+            "divider_errors",
+            "Root mean square of what snapping changes, for every action and divider",
         )
     with right:
         st.markdown("**What the expert still achieves**")
@@ -67,11 +66,10 @@ def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
     st.markdown("**Where the demonstrated actions lie**")
     with st.grid(min(len(some), 2), min_column_width=320):
         for index, each in enumerate(some):
-            st.plotly_chart(
+            chart(
                 occupancy_figure(each, dark=dark),
-                config=PLAIN,
-                key=f"occupancy_{index}",
-                alt=f"Share of the steps in every interval of {each[0].dimension.name}",
+                f"occupancy_{index}",
+                f"Share of the steps in every interval of {each[0].dimension.name}",
             )
     unseen = [
         f"{escaped(part.dimension.name)}: {len(part.never_seen)} of {part.divider}"
@@ -120,21 +118,20 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
         if at_work != working(PLACE):
             st.rerun()  # as a whole: from now on every second, or no longer
         run_bar(PLACE, list(rows.values()), episodes)
-        found = dict(zip(rows, known(list(rows.values()), episodes), strict=True))
+        ready = dict(zip(rows, known(list(rows.values()), episodes), strict=True))
         cells = {
-            (divider, snapping): episodes
+            (divider, snapping): run
             for divider in STUDIED_DIVIDERS
             for snapping in SNAPPINGS
-            for episodes in [found[unchanged_as(divider, snapping)]]
-            if episodes is not None
+            for run in [ready[unchanged_as(divider, snapping)]]
+            if run is not None
         }
         if not cells:
             return
-        st.plotly_chart(
+        chart(
             snapped_figure(STUDIED_DIVIDERS, cells, dark=is_dark()),
-            config=PLAIN,
-            key="snapped_returns",
-            alt="Typical return of the expert with snapped actions, for every divider",
+            "snapped_returns",
+            "Typical return of the expert with snapped actions, for every divider",
         )
         st.caption(
             "The typical return, and its 95 % interval. Clip replaces an action by the nearest "
@@ -168,9 +165,9 @@ def snapped_rows(
                 own = [(each[column],) for each in divided]
                 return snapped_agents(env_id, make(), own, (snapping,))[0]
 
-            told = f"{expert}, {demonstrations.digest}, {divider} intervals, {snapping}"
+            agent = f"{expert}, {demonstrations.digest}, {divider} intervals, {snapping}"
             rows[divider, snapping] = Row(
-                row_key(env_id, told, "", "centre", FRESH_SEED),
+                row_key(env_id, agent, "", "centre", FRESH_SEED),
                 f"{divider} intervals, {snapping}",
                 env_id,
                 FRESH_SEED,

@@ -1,0 +1,163 @@
+"""The sliders of the thresholds, and everything that follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import streamlit as st
+from streamlit.delta_generator import DeltaGenerator
+
+from sarl_core.explaining.figures.thresholds import mark_place
+from sarl_core.mining.landscape import Landscape
+from sarl_core.mining.language import threshold_text
+from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+from sarl_core.mining.threshold_steps import (
+    CONFIDENCE_STEPS,
+    SUPPORT_STEPS,
+    neat_jumps,
+    with_step,
+)
+from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
+from sarl_dashboard.views.thresholds.display import Display
+from sarl_dashboard.views.thresholds.largest_rules import show_largest
+from sarl_dashboard.views.thresholds.moves import (
+    follow,
+    jump,
+    leave_compact,
+    take_over,
+    use,
+    use_compact,
+)
+from sarl_dashboard.views.thresholds.numbers import show_numbers
+
+# Where the sliders share a narrow row, the words between two buttons stand above them.
+NARROW_JUMPS = (
+    "<style>@media (min-width: 641px) and (max-width: 1200px) {"
+    " [class*='st-key-jumps_'] > :nth-child(2) { order: -1; flex-basis: 100%; } }</style>"
+)
+
+
+@st.fragment(key="controls")
+def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator | None) -> None:
+    """Sliders, named settings and jumps; the numbers of the rule set; the mark; the table.
+
+    Args:
+        display: What is looked at.
+        landscape: That of the maps.
+        table: Where the table of rules goes; None where it is not looked at.
+    """
+    take_over()
+    thresholds = chosen_thresholds()
+    # A callback that asks for more than this fragment costs a run; most moves need none.
+    alone = table is not None and not display.surfaces
+    moved: Callable[[], None] | Literal["rerun"] = (
+        leave_compact if display.compact is not None else "rerun" if alone else follow
+    )
+    jumps = neat_jumps(display.trees, thresholds)
+    left, middle, right = st.columns([4, 4, 3])
+    with left:
+        st.select_slider(
+            "Minimum support",
+            with_step(SUPPORT_STEPS, thresholds.support),
+            key="support",
+            value=FILTERED.support,
+            format_func=threshold_text,
+            bind="query-params",
+            on_change=moved,
+            help="Share of all demonstrated states to which a rule must apply.",
+        )
+        jump_buttons("support", jumps.support_below, jumps.support_above)
+    with middle:
+        st.select_slider(
+            "Minimum confidence",
+            with_step(CONFIDENCE_STEPS, thresholds.confidence),
+            key="confidence",
+            value=FILTERED.confidence,
+            format_func=threshold_text,
+            bind="query-params",
+            on_change=moved,
+            help="Share of those states in which the expert did what the rule says.",
+        )
+        jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
+    with right:
+        if display.is_divided:
+            st.slider(
+                "Divider",
+                MIN_DIVIDER,
+                MAX_DIVIDER,
+                key="divider",
+                value=MIN_DIVIDER,
+                bind="query-params",
+                on_change=leave_compact,
+                help="Number of equal intervals each continuous action is divided into.",
+            )
+        named_settings(thresholds, compact=display.compact is not None)
+    point = display.point(thresholds)
+    everything = display.dimension is None
+    show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
+    if everything:
+        cross_fitting.told(thresholds, float(point.fidelity[0, 0]))
+    across, down = mark_place(landscape, thresholds.support, thresholds.confidence)
+    st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
+    if display.compact is not None:
+        st.html("<style>.st-key-maps [class*='st-key-box_']::after { display: none; }</style>")
+    if table is not None:
+        with table.container():
+            show_largest(display, thresholds, int(point.rule_count[0, 0]))
+
+
+def jump_buttons(name: str, below: float | None, above: float | None) -> None:
+    """Two buttons that go to the next value at which the rule set changes."""
+    with st.container(
+        horizontal=True,
+        horizontal_alignment="distribute",
+        vertical_alignment="center",
+        gap="small",
+        key=f"jumps_{name}",
+    ):
+        for side, value in (("below", below), ("above", above)):
+            if side == "above":
+                st.caption("next change", width="content")
+            st.button(
+                "none" if value is None else threshold_text(value),
+                key=f"{name}_{side}",
+                on_click=jump,
+                args=(name, value),
+                type="tertiary",
+                icon=f":material/{'arrow_back' if side == 'below' else 'arrow_forward'}:",
+                icon_position="left" if side == "below" else "right",
+                disabled=value is None,
+                help=f"Next value {side} at which the rules change",
+            )
+
+
+def named_settings(thresholds: Thresholds, *, compact: bool) -> None:
+    """The paper's two settings and, where there are some, the compact rules; a click each.
+
+    Args:
+        thresholds: Those in force, or set aside.
+        compact: Whether the compact rules are in force.
+    """
+    with st.container(horizontal=True, gap="small", horizontal_alignment="right"):
+        for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
+            st.button(
+                name,
+                key=name.lower(),
+                on_click=use,
+                args=(setting,),
+                type="primary" if thresholds == setting and not compact else "secondary",
+                help=f"The paper's setting: support {setting.support:g}, "
+                f"confidence {setting.confidence:g}",
+            )
+        if compact_set.offered():
+            st.button(
+                "Compact",
+                key="compact",
+                on_click=use_compact,
+                type="primary" if compact else "secondary",
+                help="A small set that comes with these data: it has a rule for every state, and "
+                "was chosen by what a novice achieves with it",
+            )

@@ -1,0 +1,172 @@
+"""What the page shows of the thresholds, and how: the choices above the figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import streamlit as st
+
+from sarl_core.explaining.figures.thresholds import Layer
+from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
+from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.mining.threshold_steps import FINE_CONFIDENCES, FINE_SUPPORTS
+from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.compact_set import Compact
+from sarl_dashboard.state.data import held_out_demonstrations
+from sarl_dashboard.state.mined import mined_landscape
+from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT, chosen_thresholds
+
+MAPS, SURFACES = "Maps", "3-D"
+FINE, PAPER = "Fine grid", "Paper's grid"
+LARGEST, TRADE_OFFS, DIVIDER = "Largest rules", "Best trade-offs", "Divider"
+WHOLE = "All actions"
+SIZE, QUALITY, HELD_OUT = "Rules and length", "Coverage and fidelity", "Held out"
+LAYERS: dict[str, tuple[Layer, Layer]] = {
+    SIZE: ("rule_count", "mean_length"),
+    QUALITY: ("coverage", "fidelity"),
+    HELD_OUT: ("fidelity", "held_out_fidelity"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Display:
+    """What is looked at, and how.
+
+    Attributes:
+        trees: One an action dimension.
+        compact: The compact rules where they are in force; None for thresholds.
+        dimension: Which action dimension is looked at; None for all.
+        layers: What the two figures show.
+        surfaces: Whether as the paper's surfaces, and not as maps.
+        paper_grid: Whether on the paper's grid.
+    """
+
+    trees: tuple[PolicyTree, ...]
+    compact: Compact | None
+    dimension: int | None
+    layers: tuple[Layer, Layer]
+    surfaces: bool
+    paper_grid: bool
+
+    @property
+    def is_divided(self) -> bool:
+        """Whether the actions are continuous, and the divider says what labels there are."""
+        return self.trees[0].dimension.is_interval
+
+    def landscape(self) -> Landscape:
+        """The landscape over the grid, at the lift and depth in force."""
+        supports, confidences = FINE_SUPPORTS, FINE_CONFIDENCES
+        if self.paper_grid:
+            supports, confidences = tuple(PAPER_SUPPORTS), tuple(PAPER_CONFIDENCES)
+        return self._part(supports, confidences, chosen_thresholds())
+
+    def point(self, thresholds: Thresholds) -> Landscape:
+        """The numbers in force, in the shape of a landscape of one point.
+
+        Args:
+            thresholds: Those in force; set aside where the compact rules are.
+        """
+        if self.compact is not None:
+            return _compact_point(self.compact.counted, self.dimension)
+        return self._part((thresholds.support,), (thresholds.confidence,), thresholds)
+
+    def _part(
+        self, supports: tuple[float, ...], confidences: tuple[float, ...], limits: Thresholds
+    ) -> Landscape:
+        whole = mined_landscape(
+            self.trees, supports, confidences, lift=limits.lift, depth=limits.max_depth
+        )
+        return whole if self.dimension is None else whole.dimensions[self.dimension]
+
+
+def _compact_point(rules: RuleSet, dimension: int | None) -> Landscape:
+    if dimension is not None:
+        own = rules.of_dimension(dimension)
+        rules = replace(rules, rules=own, actions=(rules.actions[dimension],))
+    nowhere = np.zeros(1)
+    return Landscape(
+        nowhere,
+        nowhere,
+        np.array([[len(rules)]]),
+        np.array([[rules.mean_length]]),
+        np.array([[rules.coverage]]),
+        np.array([[rules.fidelity]]),
+    )
+
+
+def chosen_display(trees: tuple[PolicyTree, ...], compact: Compact | None) -> Display:
+    """The choices above the figures.
+
+    Args:
+        trees: One an action dimension.
+        compact: The compact rules where they are in force.
+    """
+    with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
+        pairs = [SIZE, QUALITY] if held_out_demonstrations() is None else list(LAYERS)
+        pair = switch("Show", "layer", pairs, "What the two figures show")
+        view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
+        grid = switch(
+            "Grid",
+            "grid",
+            [FINE, PAPER],
+            "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.",
+        )
+        more()
+        dimension = chosen_dimension([tree.dimension.name for tree in trees])
+    return Display(trees, compact, dimension, LAYERS[pair], view == SURFACES, grid == PAPER)
+
+
+def switch(label: str, key: str, options: list[str], hint: str | None = None) -> str:
+    """A choice between a few ways to look."""
+    return (
+        st.segmented_control(
+            label,
+            options,
+            default=options[0],
+            key=key,
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+            help=hint,
+        )
+        or options[0]
+    )
+
+
+def more() -> None:
+    """What changes the whole plane, and is rarely needed."""
+    with st.popover("More", icon=":material/tune:"):
+        st.slider(
+            "Minimum lift",
+            0.0,
+            MAX_LIFT,
+            value=0.0,
+            step=0.1,
+            key="lift",
+            bind="query-params",
+            on_change=compact_set.choose,
+            args=(False,),
+            help="How many times more often than over all states the expert must have done what "
+            "the rule says. 0: no limit.",
+        )
+        st.slider(
+            "Maximum depth",
+            0,
+            MAX_DEPTH,
+            value=0,
+            key="depth",
+            bind="query-params",
+            on_change=compact_set.choose,
+            args=(False,),
+            help="Most conditions of a rule. 0: no limit.",
+        )
+
+
+def chosen_dimension(names: list[str]) -> int | None:
+    """Which of the action dimensions is looked at; None for all together."""
+    if len(names) == 1:
+        return None
+    name = switch("Action", "dimension", [WHOLE, *names])
+    return names.index(name) if name in names else None

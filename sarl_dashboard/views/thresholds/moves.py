@@ -1,0 +1,82 @@
+"""What puts thresholds in force: the callbacks of the page Thresholds."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.threshold_steps import neat_point
+from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits
+from sarl_dashboard.views.thresholds.display import SURFACES, TRADE_OFFS
+
+
+def follow() -> None:
+    """Show what the thresholds of the moment give; for callbacks, and the last thing they do."""
+    if st.session_state.get("view") == SURFACES:
+        st.rerun()  # the chosen point is part of the surface
+    st.rerun(
+        ["controls", "front"] if st.session_state.get("details") == TRADE_OFFS else ["controls"]
+    )
+
+
+def move(**thresholds: float) -> None:
+    """Put thresholds in force, by their names in the URL.
+
+    `take_over` writes them where the sliders find them: what a callback in a fragment writes to a
+    slider does not reach the browser when it asks for another run.
+    """
+    st.session_state["_moved"] = thresholds
+    if compact_set.in_force():
+        leave_compact()
+    follow()
+
+
+def take_over() -> None:
+    """Hand moved thresholds to the sliders, before these are drawn."""
+    for name, value in st.session_state.pop("_moved", {}).items():
+        st.session_state[name] = value
+
+
+def jump(name: str, value: float) -> None:
+    """Move one threshold."""
+    move(**{name: value})
+
+
+def use(setting: Thresholds) -> None:
+    """Put a named setting in force."""
+    choose_thresholds(setting)
+    compact_set.choose(False)
+    st.rerun()  # lift and depth, which it resets, are part of the maps
+
+
+def use_compact() -> None:
+    """Put the compact rules in force."""
+    compact_set.choose(True)
+    st.rerun()  # the maps lose their ring
+
+
+def leave_compact() -> None:
+    """Go back to the thresholds; for callbacks, and the last thing they do."""
+    compact_set.choose(False)
+    st.rerun()  # the ring comes back to the maps, and the sidebar says what is in force
+
+
+def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
+    """Set both thresholds to those of the clicked cell or point.
+
+    A second click on one cell takes its selection back, and means the cell all the same.
+    """
+    points = st.session_state[key].selection.points
+    if points and "customdata" in points[0]:
+        data = points[0]["customdata"]
+        # Which of the two arrives depends on how the numbers were packed for the browser.
+        values = list(data.values()) if isinstance(data, dict) else list(data)
+        clicked = Thresholds(float(values[0]), float(values[1]), *chosen_limits())
+        if key == "pareto":
+            clicked = neat_point(trees, clicked)
+        st.session_state["_clicked"] = (clicked.support, clicked.confidence)
+    support, confidence = st.session_state.get("_clicked", (None, None))
+    if support is not None:
+        move(support=support, confidence=confidence)

@@ -1,0 +1,62 @@
+"""The numbers of the rule set in force."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.explaining.words.cross_fit import elsewhere_text
+from sarl_core.mining.landscape import Landscape
+from sarl_core.mining.language import share_text
+from sarl_core.mining.validation.cross_fitting import Judged
+from sarl_core.mining.validation.evidence import HeldOut
+
+
+def show_numbers(point: Landscape, judged: Judged | None) -> None:
+    """The four numbers of the rule set in force, and what two of them are in other episodes.
+
+    Args:
+        point: A landscape of one point.
+        judged: The same rules in episodes that they were not mined from; None where not known.
+    """
+    rules = int(point.rule_count[0, 0])
+    with st.container(horizontal=True, key="metrics"):
+        st.metric("Rules", f"{rules:,}")
+        st.metric(
+            "Mean length",
+            f"{point.mean_length[0, 0]:.1f}" if rules else "–",
+            help="Conditions a rule, on average",
+        )
+        st.metric(
+            "Coverage",
+            share_text(float(point.coverage[0, 0]), decimals=1),
+            help="Share of the demonstrated states in which some rule applies; elsewhere: of the "
+            "states of an episode that the rules were not mined from, on average",
+            **elsewhere(None if judged is None else judged.coverage),
+        )
+        st.metric(
+            "Fidelity",
+            share_text(float(point.fidelity[0, 0]), decimals=1),
+            help="Share of those in which the expert did what the rule says; elsewhere: in an "
+            "episode that the rules were not mined from, on average",
+            **elsewhere(None if judged is None else judged.fidelity),
+        )
+        if point.held_out_fidelity is not None:
+            st.metric(
+                "Held-out fidelity",
+                share_text(float(point.held_out_fidelity[0, 0]), decimals=1),
+                help="The same on the episodes held out, which no rule was mined from; on average, "
+                "so that each episode counts once",
+            )
+
+
+def elsewhere(share: HeldOut | None) -> dict[str, Any]:
+    """A number in episodes that the rules were not mined from, to stand under the other."""
+    if share is None:
+        return {}
+    return {
+        "delta": f"elsewhere {elsewhere_text(share)}",
+        "delta_color": "off",
+        "delta_arrow": "off",
+    }

@@ -1,0 +1,57 @@
+"""The rule sets that no other one beats."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.explaining.figures.pareto_front import front_figure, thin_front
+from sarl_dashboard.session import is_dark
+from sarl_dashboard.state.mined import mined_front
+from sarl_dashboard.state.thresholds import chosen_thresholds
+from sarl_dashboard.views.thresholds.display import Display
+from sarl_dashboard.views.thresholds.maps import BARE
+from sarl_dashboard.views.thresholds.moves import take_click
+
+
+@st.fragment(key="front")
+def show_trade_offs(display: Display) -> None:
+    """The rule sets that no other one beats, and where the one in force is among them.
+
+    Args:
+        display: What is looked at.
+    """
+    thresholds, dimension = chosen_thresholds(), display.dimension
+    point = display.point(thresholds)
+    trees = display.trees if dimension is None else (display.trees[dimension],)
+    with st.spinner("Looking for the best trade-offs …"):
+        front = mined_front(trees, lift=thresholds.lift, depth=thresholds.max_depth)
+    if not front:
+        st.info(
+            "There is no rule at any thresholds; lower the minimum lift under More.",
+            icon=":material/filter_alt_off:",
+        )
+        return
+    st.caption(
+        "No other thresholds give fewer rules, more coverage and more fidelity than these. "
+        "Click a point to use its thresholds."
+    )
+    points = thin_front(front)
+    figure = front_figure(
+        points,
+        dark=is_dark(),
+        chosen=(
+            int(point.rule_count[0, 0]),
+            float(point.coverage[0, 0]),
+            float(point.fidelity[0, 0]),
+        ),
+    )
+    st.plotly_chart(
+        figure,
+        key="pareto",
+        config=BARE,
+        selection_mode="points",
+        on_select=lambda: take_click("pareto", display.trees),
+        alt="Number of rules against coverage, coloured by fidelity",
+    )
+    if len(points) < len(front):
+        st.caption(f"{len(points):,} of {len(front):,} such rule sets are drawn.")
