@@ -16,11 +16,10 @@ import streamlit as st
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.learning.arms import ARMS
-from sarl_core.learning.run import rules_digest
 from sarl_core.learning.study import LearningPlan
 from sarl_core.learning.study_files import LearningStudy, load_study, policy_path
 from sarl_core.mining.language import counted, threshold_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs import learning
 from sarl_dashboard.state.agents import PROJECTIONS

@@ -10,7 +10,8 @@ import streamlit as st
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.replay import named_description
-from sarl_core.mining.rules import UNFILTERED, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import UNFILTERED
 from sarl_core.rollouts.player import shield_for
 from sarl_core.shielding.shield import Shield
 from sarl_dashboard.components.settings import (

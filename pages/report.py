@@ -18,7 +18,7 @@ from sarl_core.explaining.report.report import Report, Wishes
 from sarl_core.explaining.report.tally import report_rules
 from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.jobs.report import (
     Order,
     Reporting,

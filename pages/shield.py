@@ -16,7 +16,7 @@ from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.comparison import arm_style
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.shield import Outside, Projection, Shield
 from sarl_core.studies.comparison import Arm
 from sarl_dashboard.components.run_bar import run_bar

@@ -14,7 +14,7 @@ from sarl_core.explaining.html.lit_path import PathFinder
 from sarl_core.explaining.words.what_if import by_use
 from sarl_core.mining.language import label_text
 from sarl_core.mining.rule_order import fits, rules_for
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans, random_state, within
 from sarl_core.shielding.shield import Outside, Projection, Shield

@@ -9,8 +9,8 @@ from .mining.algorithm_1 import mine_rules as mine_rules
 from .mining.classifier import RuleClassifier as RuleClassifier
 from .mining.landscape import Landscape as Landscape
 from .mining.landscape import threshold_landscape as threshold_landscape
+from .mining.rule_set import RuleSet as RuleSet
 from .mining.rules import Rule as Rule
-from .mining.rules import RuleSet as RuleSet
 from .mining.tree import PolicyTree as PolicyTree
 from .mining.tree import grow_policy_trees as grow_policy_trees
 from .rollouts.episodes import Episodes as Episodes

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from sarl_core.cli.evidence_answers import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
     from sarl_core.mining.validation.cross_fitting import Judged
     from sarl_core.rendering.replay import Replay
     from sarl_core.shielding.shield import Shield

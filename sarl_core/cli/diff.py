@@ -37,7 +37,7 @@ def diff(
     with terminal.working("Comparing"):
         from sarl_core.mining.editing.difference import comparable
         from sarl_core.mining.rule_order import rules_for
-        from sarl_core.mining.rules import RuleSet
+        from sarl_core.mining.rule_set import RuleSet
         from sarl_core.shielding.disagreement import SAMPLED_STATES, disagreement, sampled_states
 
         one, other = RuleSet.load(first), RuleSet.load(second)

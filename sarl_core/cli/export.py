@@ -14,7 +14,7 @@ from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.explaining.exports.export import Prepared
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
 
 _ENDINGS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
 _SHOWN = 5
@@ -74,7 +74,7 @@ def export(
         )
     with terminal.working("Exporting"):
         from sarl_core.explaining.exports.export import prepare, save_export
-        from sarl_core.mining.rules import RuleSet
+        from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
         given = None if demonstrations is None else read_demonstrations(demonstrations, env)

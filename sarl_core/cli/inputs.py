@@ -86,7 +86,7 @@ def read_shield(
     """
     if rules is None:
         return None
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
     from sarl_core.shielding.shield import Shield
 
     shield = Shield(

@@ -81,7 +81,7 @@ def learn(
         from sarl_core.learning.arms import arms_named
         from sarl_core.learning.study import LearningPlan, run_study
         from sarl_core.learning.summary import summarise_study
-        from sarl_core.mining.rules import RuleSet
+        from sarl_core.mining.rule_set import RuleSet
         from sarl_core.progress import CancelledError
 
         plan = LearningPlan(

@@ -97,7 +97,7 @@ def report(
         from sarl_core.explaining.report.report import Wishes, make_report
         from sarl_core.explaining.report.thresholds import read_card
         from sarl_core.files import whole_file
-        from sarl_core.mining.rules import RuleSet
+        from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
         given = read_demonstrations(demonstrations, env)

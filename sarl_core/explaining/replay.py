@@ -18,7 +18,7 @@ from sarl_core.explaining.figures.markup import plain
 from sarl_core.explaining.figures.replay import Track
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, number_text, sentence
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.written import value_text
 from sarl_core.rollouts.steps import StepTable
 

@@ -25,7 +25,7 @@ from sarl_core.improving.successive_halving import planned_episodes, successive_
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.player import check_environment

@@ -15,7 +15,7 @@ from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
 
 SEEDS_APART = 100_000  # between learners, so that no two share an episode
 LAST_SEED = 89  # of a learner: the next one would see the episodes that all are tried on

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from stable_baselines3 import PPO
 
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
 
 PAPER_LEARNING = 500  # steps between two tests
 PAPER_TEST = 20_000  # steps of a test

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,14 +18,12 @@ from sarl_core.learning.checkpoints import Rest, load_checkpoint, save_checkpoin
 from sarl_core.learning.curves import NO_EPISODES, LearningCurve, Trial
 from sarl_core.learning.experts import export_policy
 from sarl_core.learning.recipes import make_learner
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.progress import CancelledError, Progress
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
-
-if TYPE_CHECKING:
-    from sarl_core.mining.rules import RuleSet
 
 TRIAL_EPISODES = 50
 
@@ -120,7 +118,7 @@ def learn(
         "arm": arm.name,
         "steps": steps,
         "seed": seed,
-        "rules": rules_digest(rules) if arm.shielded else "",
+        "rules": rules_digest(rules) if arm.shielded and rules is not None else "",
         "projection": projection if arm.shielded else "",
     }
     learner, env = make_learner(
@@ -162,22 +160,6 @@ def learn(
     return LearningResult(
         env_id, arm, steps, seed, curve, policy, alone, shielded, end.seconds, end.sittings
     )
-
-
-def rules_digest(rules: RuleSet | None) -> str:
-    """Fingerprint of rules.
-
-    Args:
-        rules: A rule set or None.
-
-    Returns:
-        As text; "" for None.
-    """
-    if rules is None:
-        return ""
-    from sarl_core.mining.rule_files import rules_digest as digest_of
-
-    return digest_of(rules)
 
 
 def _learn(

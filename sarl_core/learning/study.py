@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
 from sarl_core.learning.curves import NO_EPISODES, LearningCurve
-from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn, rules_digest
+from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn
 from sarl_core.learning.study_files import (
     FORMAT,
     PLAN,
@@ -31,11 +31,9 @@ from sarl_core.learning.study_files import (
     write_json,
 )
 from sarl_core.learning.summary import summarise_study
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.progress import CancelledError, Progress
 from sarl_core.shielding.projection import Projection
-
-if TYPE_CHECKING:
-    from sarl_core.mining.rules import RuleSet
 
 MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
 _WRITTEN_EVERY = 1.0  # seconds, for who looks on

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, Numbered, RuleNode, tree_of
-from sarl_core.mining.rules import RuleSet
 from sarl_core.mining.tree import walk
 
 

@@ -16,7 +16,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
-from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import (
     LEAF,
     PolicyTree,

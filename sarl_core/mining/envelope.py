@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applying import Applications, applications
 from sarl_core.mining.rule_order import rules_for
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import splits_of
 from sarl_core.mining.validation.evidence import DataBox
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,11 @@ from numpy.typing import NDArray
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Bounds, Condition, Rule, RuleSet
+from sarl_core.mining.rules import Bounds, Condition, Rule
 from sarl_core.mining.written import amount_text, limit_texts
+
+if TYPE_CHECKING:
+    from sarl_core.mining.rule_set import RuleSet
 
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
@@ -320,3 +324,28 @@ def sentence(
         return f"{text}."
     states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
+
+
+def limits_text(rule_set: RuleSet) -> str:
+    """The thresholds that a rule set was mined at.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "support at least 0.005, confidence at least 0.95".
+    """
+    thresholds = rule_set.thresholds
+    limits = [
+        f"support at least {threshold_text(thresholds.support)}",
+        f"confidence at least {threshold_text(thresholds.confidence)}",
+    ]
+    if rule_set.cut == "leaves":
+        limits = ["every leaf of the tree"]
+    if thresholds.lift:
+        limits.append(f"lift at least {threshold_text(thresholds.lift)}")
+    if thresholds.max_depth is not None:
+        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
+    if any(dimension.is_interval for dimension in rule_set.actions):
+        limits.append(f"divider {rule_set.divider}")
+    return ", ".join(limits)

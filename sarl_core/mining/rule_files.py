@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,12 +16,13 @@ from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.documents import LARGEST_WHOLE, DocumentReader, is_number, parse_json
 from sarl_core.errors import InputError, quoted
-from sarl_core.files import whole_file
-from sarl_core.limits import limited_bytes
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
-from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox, HeldOut
+
+if TYPE_CHECKING:
+    from sarl_core.mining.rule_set import RuleSet
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
@@ -32,47 +31,29 @@ version 1, which is what it was before there was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
-def rules_to_json(rule_set: RuleSet) -> str:
-    """A rule set as the text of a rule file.
+class RuleFile(NamedTuple):
+    """What a rule file says, as `RuleSet` has it."""
 
-    Args:
-        rule_set: To write.
-
-    Returns:
-        JSON; numbers read back as the same floats.
-    """
-    return "".join(_parts(rule_set))
+    rules: tuple[Rule, ...]
+    actions: tuple[LabelledDimension, ...]
+    source: Source
+    thresholds: Thresholds
+    divider: int
+    cut: Literal["thresholds", "leaves"]
 
 
 def write_rules(rule_set: RuleSet, path: Path) -> None:
-    """Write a rule file as `rules_to_json` gives it, without ever having it whole.
+    """Write a rule file without ever having it whole.
 
     Args:
         rule_set: To write.
         path: The file.
     """
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(_parts(rule_set))
+        file.writelines(file_parts(rule_set))
 
 
-def rules_digest(rule_set: RuleSet) -> str:
-    """Fingerprint of rules, whatever file they came in.
-
-    Args:
-        rule_set: The rules.
-
-    Returns:
-        32 hex digits (blake2b) of the file this version would write, without what is known of the
-        data around thresholds: that is no part of the rules.
-    """
-    bare = rule_set.source.with_splits([None] * len(rule_set.source.features))
-    digest = hashlib.blake2b(digest_size=16)
-    for part in _parts(replace(rule_set, source=bare)):
-        digest.update(part.encode())
-    return digest.hexdigest()
-
-
-def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSet:
+def read_rules(text: str | bytes, name: str) -> RuleFile:
     """Read the text of a rule file.
 
     Args:
@@ -80,7 +61,7 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
         name: Of the file, for errors.
 
     Returns:
-        The rule set.
+        What is in it.
 
     Raises:
         InputError: If it is no rule file, or holds anything this version does not know.
@@ -103,47 +84,18 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
             f"{name} has version {quoted(version)} of the rule format, and this program reads "
             f"versions {VERSIONS[0]} to {VERSIONS[-1]}; use a program of its version"
         )
-    return _rule_set(DocumentReader(document, name, ""))
+    return _rule_file(DocumentReader(document, name, ""))
 
 
-def save_rules(rule_set: RuleSet, path: Path) -> None:
-    """Write a rule file; it appears whole or not at all.
+def file_parts(rule_set: RuleSet) -> Iterator[str]:
+    """The text of a rule file, so that nobody need have it whole.
 
     Args:
         rule_set: To write.
-        path: A `.json` file.
 
-    Raises:
-        InputError: If the folder does not exist.
-        WorkError: If it cannot be written to.
+    Yields:
+        Parts of JSON of which each has one rule at most.
     """
-    with whole_file(path) as unfinished:
-        write_rules(rule_set, unfinished)
-
-
-def load_rules(path: Path) -> RuleSet:
-    """Read a rule file.
-
-    Args:
-        path: A `.json` file.
-
-    Returns:
-        The rule set.
-
-    Raises:
-        InputError: If it cannot be read or is no rule file.
-    """
-    try:
-        text = limited_bytes(path)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); give a rule file") from error
-    return rules_from_json(text, name=str(path))
-
-
-def _parts(rule_set: RuleSet) -> Iterator[str]:
-    """The text of a rule file, in parts of which each has one rule at most."""
     indented = sum(len(rule.conditions) for rule in rule_set.rules) <= _MOST_CONDITIONS
     opening = "{"
     for key, value in _document(rule_set).items():
@@ -181,9 +133,9 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
         "features": map(_feature, source.features, asked),
         "actions": map(_action, rule_set.actions),
         "thresholds": {
-            "support": thresholds.support,
-            "confidence": thresholds.confidence,
-            "lift": thresholds.lift,
+            "support": _number(thresholds.support),
+            "confidence": _number(thresholds.confidence),
+            "lift": _number(thresholds.lift),
             "max_depth": thresholds.max_depth,
         },
         "divider": rule_set.divider,
@@ -196,6 +148,11 @@ def _document(rule_set: RuleSet) -> dict[str, Any]:
         },
         "rules": map(_rule, rule_set.rules),
     }
+
+
+def _number(value: float) -> float:
+    """Equal numbers are written alike, as 1 and 1.0, or zero with a sign and without."""
+    return float(value) + 0.0
 
 
 def _feature(feature: Feature, asked: set[float]) -> dict[str, Any]:
@@ -232,18 +189,21 @@ def _rule(rule: Rule) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "id": rule.id,
         "dimension": rule.dimension,
-        "conditions": [condition._asdict() for condition in rule.conditions],
+        "conditions": [
+            {"feature": feature, "op": op, "threshold": _number(threshold)}
+            for feature, op, threshold in rule.conditions
+        ],
         "action": rule.action,
-        "support": rule.support,
-        "confidence": rule.confidence,
-        "lift": rule.lift,
+        "support": _number(rule.support),
+        "confidence": _number(rule.confidence),
+        "lift": _number(rule.lift),
         "samples": rule.samples,
         "length": rule.length,
         "enabled": rule.enabled,
         "origin": rule.origin,
     }
     if rule.demonstrated_value is not None:
-        entry["demonstrated_value"] = rule.demonstrated_value
+        entry["demonstrated_value"] = _number(rule.demonstrated_value)
     if rule.pinned:
         entry["pinned"] = True
     if rule.box is not None:
@@ -253,7 +213,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
     return entry
 
 
-def _rule_set(document: DocumentReader) -> RuleSet:
+def _rule_file(document: DocumentReader) -> RuleFile:
     document.take("format", str)
     version: int = document.take("version", int)
     features = tuple(_read_feature(part) for part in document.parts("features"))
@@ -263,7 +223,7 @@ def _rule_set(document: DocumentReader) -> RuleSet:
     thresholds = document.part("thresholds")
     demonstrations = document.part("demonstrations")
     steps = demonstrations.count("steps", low=1)
-    rule_set = RuleSet(
+    found = RuleFile(
         rules=tuple(
             _read_rule(part, len(features), actions, steps, version)
             for part in document.parts("rules")
@@ -287,11 +247,11 @@ def _rule_set(document: DocumentReader) -> RuleSet:
     )
     for part in (thresholds, demonstrations, document):
         part.finish()
-    ids = [rule.id for rule in rule_set.rules]
+    ids = [rule.id for rule in found.rules]
     if len(set(ids)) < len(ids):
         doubled = next(one for one, count in Counter(ids).items() if count > 1)
         raise document.fail(f"the rule id {quoted(doubled)} stands twice")
-    return rule_set
+    return found
 
 
 def _read_cut(document: DocumentReader) -> Literal["thresholds", "leaves"]:

@@ -1,19 +1,15 @@
-"""What a rule is, and a rule set with the thresholds it was mined at."""
+"""What a rule is, and the thresholds that rules are mined at."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
-from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
@@ -200,114 +196,3 @@ FILTERED = Thresholds(support=0.005, confidence=0.95)
 """The paper's Table 1, "filtered"."""
 NAMED_SETTINGS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 """The paper's Table 1, by the words that everything in this project uses for them."""
-
-
-@dataclass(frozen=True)
-class RuleSet:
-    """Rules, with what they were mined from and how.
-
-    Attributes:
-        rules: Rules of one action dimension never overlap unless a person added some.
-        actions: Action dimensions and their labels.
-        source: Environment, features and fingerprint of the demonstrations.
-        thresholds: In force when it was mined.
-        divider: Number of intervals of continuous dimensions.
-        cut: Where the paths were cut: at the first node that reaches the thresholds
-            (Algorithm 1), or nowhere, so that every leaf is a rule and every state is covered.
-    """
-
-    rules: tuple[Rule, ...]
-    actions: tuple[LabelledDimension, ...]
-    source: Source
-    thresholds: Thresholds
-    divider: int = 2
-    cut: Literal["thresholds", "leaves"] = "thresholds"
-
-    def __len__(self) -> int:
-        """Number of rules."""
-        return len(self.rules)
-
-    def __repr__(self) -> str:
-        """Its size, as `RuleSet('CartPole-v1', rules=12, support>=0.005, confidence>=0.95)`."""
-        if self.cut == "leaves":
-            return f"RuleSet({self.source.env_id!r}, rules={len(self)}, every leaf)"
-        return (
-            f"RuleSet({self.source.env_id!r}, rules={len(self)}, "
-            f"support>={self.thresholds.support:g}, confidence>={self.thresholds.confidence:g})"
-        )
-
-    @property
-    def rule_count(self) -> int:
-        """Number of rules."""
-        return len(self.rules)
-
-    @property
-    def mean_length(self) -> float:
-        """Mean number of queries a rule, 0 without rules."""
-        return sum(rule.length for rule in self.rules) / max(len(self), 1)
-
-    @property
-    def coverage(self) -> float:
-        """Share of pairs to which a rule applies, averaged over action dimensions."""
-        pairs = self.source.steps * len(self.actions)
-        return sum(rule.samples for rule in self.rules) / pairs
-
-    @property
-    def fidelity(self) -> float:
-        """Share of the covered pairs whose label the rule gives; NaN where none is covered."""
-        covered = sum(rule.samples for rule in self.rules)
-        return sum(rule.correct for rule in self.rules) / covered if covered else float("nan")
-
-    @cached_property
-    def names(self) -> Mapping[str, str]:
-        """What people call the rules, by id: R1 to Rn, by their place in the set."""
-        return {rule.id: name_at(place) for place, rule in enumerate(self.rules)}
-
-    def name_of(self, rule: Rule) -> str:
-        """What people call a rule; its id is for files and links.
-
-        Args:
-            rule: One of the set.
-
-        Returns:
-            As "R12".
-        """
-        return self.names[rule.id]
-
-    def of_dimension(self, dimension: int) -> tuple[Rule, ...]:
-        """The rules of one action dimension.
-
-        Args:
-            dimension: Its index.
-
-        Returns:
-            In their order.
-        """
-        return tuple(rule for rule in self.rules if rule.dimension == dimension)
-
-    def save(self, path: str | Path) -> None:
-        """Write the rule file; it appears whole or not at all.
-
-        Args:
-            path: A `.json` file.
-        """
-        from sarl_core.mining.rule_files import save_rules
-
-        save_rules(self, Path(path))
-
-    @classmethod
-    def load(cls, path: str | Path) -> RuleSet:
-        """Read a rule file.
-
-        Args:
-            path: A `.json` file.
-
-        Returns:
-            The rule set.
-
-        Raises:
-            InputError: If the file is no rule file, or holds anything this version does not know.
-        """
-        from sarl_core.mining.rule_files import load_rules
-
-        return load_rules(Path(path))

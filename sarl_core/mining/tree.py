@@ -7,8 +7,9 @@ a node a slice.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -140,6 +141,21 @@ class PolicyTree:
     def n_nodes(self) -> int:
         """Number of nodes."""
         return len(self.feature)
+
+    @cached_property
+    def digest(self) -> str:
+        """Fingerprint (blake2b, 32 hex digits) of the tree, and of what is known of its data."""
+        digest = hashlib.blake2b(digest_size=16)
+        splits = [feature.splits for feature in self.source.features]
+        for place, thing in enumerate([self, *splits]):
+            for column in fields(thing) if thing is not None else ():
+                value = getattr(thing, column.name)
+                if isinstance(value, np.ndarray):
+                    digest.update(f"{place} {column.name} {value.dtype}{value.shape}".encode())
+                    digest.update(np.ascontiguousarray(value).data)
+                else:
+                    digest.update(f"{place} {column.name} {value!r}".encode())
+        return digest.hexdigest()
 
     @cached_property
     def samples(self) -> NDArray[np.int64]:

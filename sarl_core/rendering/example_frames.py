@@ -19,7 +19,7 @@ from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.agents.spaces import SpaceAdapter, adapt
 from sarl_core.environments.description import make_environment
 from sarl_core.errors import InputError, SarlError
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rendering.film import Palette
 from sarl_core.rendering.filming import _no_display as no_display

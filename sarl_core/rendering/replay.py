@@ -26,7 +26,7 @@ from sarl_core.rendering.overlay import Panel, side_by_side_picture
 from sarl_core.rollouts.episodes import Episodes
 
 if TYPE_CHECKING:
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
     from sarl_core.shielding.shield import Shield
 
 __all__ = ["Replay", "encode_gif", "encode_mp4", "render_episode", "side_by_side"]

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, tree_of
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.matching import Matcher
 
 

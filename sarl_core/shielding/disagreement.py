@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.deciding import Ground, deciding, ground_of, labels_at, regions
 
 SAMPLED_STATES = 10_000

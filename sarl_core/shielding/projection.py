@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 
 Projection = Literal["centre", "clip", "expert"]
 

@@ -19,7 +19,7 @@ from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.mining.labels import LabelledDimension
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
 
 Faults = dict[int, str]
 """Why a row of a batch cannot be read, for those rows only."""

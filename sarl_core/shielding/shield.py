@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
-from sarl_core.mining.rules import RuleSet
 from sarl_core.shielding.boxes import Boxes, leaves_out
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements

@@ -22,7 +22,7 @@ from sarl_core.studies.shield_effect import shield_effect
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sarl_core.mining.rules import RuleSet
+    from sarl_core.mining.rule_set import RuleSet
 
 
 @dataclass(frozen=True)

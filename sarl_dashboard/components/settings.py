@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import streamlit as st
 
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
 from sarl_dashboard.state.agents import PROJECTIONS

@@ -16,7 +16,7 @@ from sarl_core.improving.aggregation import Aggregation, Round, aggregate
 from sarl_core.improving.gaps import Gaps, gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError
 from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job

@@ -32,7 +32,7 @@ from sarl_core.learning.study_files import (
     make_folder,
     policy_path,
 )
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.shield import Projection
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs.job import Job

@@ -24,7 +24,7 @@ from sarl_core.explaining.html.lit_path import PathFinder
 from sarl_core.explaining.replay import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rendering.forking import Fork, Rest, fork
 from sarl_core.rendering.replay import Replay as Film
 from sarl_core.rendering.replay import render_episode, side_by_side

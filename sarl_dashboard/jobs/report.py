@@ -11,7 +11,7 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.report.comparison import Result, results_of
 from sarl_core.explaining.report.report import Report, Wishes, make_report
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
 from sarl_dashboard.byte_cache import Kept

@@ -14,8 +14,9 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.mining.budgeted_trees import leaf_rules
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import recount
-from sarl_core.mining.rules import Condition, Rule, RuleSet
+from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, compact_file, compact_rules

@@ -18,9 +18,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.applying import labels_of
 from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
-from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rule_order import fits
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_from_json
 from sarl_core.mining.validation.holding_out import with_untried_held_out
 from sarl_core.shielding.deciding import Ground, ground_of
 from sarl_core.shielding.disagreement import sampled_states

@@ -5,8 +5,7 @@ from __future__ import annotations
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.errors import InputError
-from sarl_core.mining.rule_files import rules_from_json
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_from_json
 from sarl_dashboard.state.edits import edited_rules
 from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (

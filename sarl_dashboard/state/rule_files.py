@@ -7,10 +7,10 @@ from pathlib import Path
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
-from sarl_core.mining.rule_files import rules_from_json
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rule_order import rules_for as rules_of
-from sarl_core.mining.rules import FILTERED, UNFILTERED, RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_from_json
+from sarl_core.mining.rules import FILTERED, UNFILTERED
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state import given_names

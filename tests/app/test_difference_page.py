@@ -6,7 +6,7 @@ import re
 from itertools import product
 
 from sarl_core import Shield, load_demonstrations, mine_rules
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, errors, html, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"

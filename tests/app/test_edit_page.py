@@ -11,8 +11,7 @@ from sarl_core import Shield, load_demonstrations, mine_rules
 from sarl_core.mining.editing.edits import Add, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_from_json, rules_to_json
 from sarl_core.mining.validation.holding_out import hold_out
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 

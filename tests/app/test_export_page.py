@@ -7,7 +7,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.exports.code_c import rules_to_c
 from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"

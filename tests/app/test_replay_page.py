@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules, save_demonstrations
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import errors, html, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"

@@ -8,7 +8,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.cli.app import main
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import errors, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"

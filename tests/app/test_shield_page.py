@@ -15,7 +15,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.agents.mlp_policy import MlpPolicy
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.studies.comparison import Arm, compare
 from tests.app.screens import errors, open_page, texts
 

@@ -13,7 +13,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules
 from sarl_core.mining.language import sentence
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, html, open_page, texts
 
 DATA = ROUTER.parents[1] / "data"

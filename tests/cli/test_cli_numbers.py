@@ -10,7 +10,7 @@ import pytest
 
 from sarl_core import Demonstrations, load_demonstrations, mine_rules
 from sarl_core.cli.app import main
-from sarl_core.explaining.exports.export import limits_text
+from sarl_core.mining.language import limits_text
 
 
 def _lines(capsys: pytest.CaptureFixture[str], *arguments: str) -> list[str]:

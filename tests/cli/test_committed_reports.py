@@ -11,7 +11,7 @@ import pytest
 
 from sarl_core import RuleSet
 from sarl_core.cli.app import main
-from sarl_core.explaining.report.provenance import digest_of
+from sarl_core.mining.rule_set import rules_digest
 
 ROOT = Path(__file__).resolve().parents[2]
 REPORTS = sorted((ROOT / "docs").glob("report_*.html"))
@@ -35,4 +35,4 @@ def test_the_fingerprint_is_that_of_the_rules(report: Path, tmp_path: Path) -> N
         rules = tmp_path / "rules.json"
         assert main([verb, str(ROOT / demonstrations), *options, str(rules)]) == 0
     (fingerprint,) = re.findall(r'<th scope="row">Rules</th><td>([0-9a-f]{32}) ', text)
-    assert digest_of(RuleSet.load(rules)) == fingerprint
+    assert rules_digest(RuleSet.load(rules)) == fingerprint

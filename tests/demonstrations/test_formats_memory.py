@@ -32,7 +32,7 @@ from pathlib import Path
 import pyarrow.compute, pyarrow.csv, pyarrow.parquet
 from sarl_core.demonstrations.formats import load_demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.rule_files import load_rules
+from sarl_core.mining.rule_set import load_rules
 from sarl_core.agents.mlp_policy import MlpPolicy
 read = {"json": load_rules, "policy": MlpPolicy.load}.get(sys.argv[2], load_demonstrations)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -12,7 +12,7 @@ from sarl_core.explaining.figures.comparison import (
     typical_figure,
 )
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.statistics import summarise

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from sarl_core import PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.exports.export import rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.exports.rule_matrix_png import matrix_png
 from sarl_core.explaining.html.rule_matrix import matrix_document, matrix_html, rule_matrix
@@ -36,7 +36,7 @@ def edited(mined: RuleSet) -> RuleSet:
 
 
 def test_counts_that_overlap_are_no_share_of_the_states(mined: RuleSet, edited: RuleSet) -> None:
-    for write in (rules_to_markdown, rules_to_text):
+    for write in (rules_to_markdown, RuleSet.to_text):
         assert "of the states and are right in" in write(mined)
         told = write(edited)
         assert "of the states and are right in" not in told
@@ -45,7 +45,7 @@ def test_counts_that_overlap_are_no_share_of_the_states(mined: RuleSet, edited: 
 
 
 def test_text_keeps_the_order_of_placed_rules_and_marks_those_off(edited: RuleSet) -> None:
-    lines = re.findall(r"^ +R\d+\. .*", rules_to_text(edited), flags=re.M)
+    lines = re.findall(r"^ +R\d+\. .*", edited.to_text(), flags=re.M)
     assert lines[0].endswith("(pinned)")
     assert "Always" in lines[1]
     assert lines[1].endswith("(by hand)")

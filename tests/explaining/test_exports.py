@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.exports.export import CSV_COLUMNS, rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.export import CSV_COLUMNS, rules_to_csv
 from sarl_core.mining.rules import Condition
 
 
@@ -60,7 +60,7 @@ def test_no_cell_is_a_formula(unfiltered: RuleSet) -> None:
 
 
 def test_text_numbers_every_rule_and_promises_nothing(unfiltered: RuleSet) -> None:
-    text = rules_to_text(unfiltered)
+    text = unfiltered.to_text()
     assert f"{unfiltered.rule_count:,} rules" in text
     names = re.findall(r"^ +(R\d+)\. If ", text, flags=re.M)
     assert set(names) == {f"R{place}" for place in range(1, unfiltered.rule_count + 1)}
@@ -73,14 +73,14 @@ def test_an_empty_rule_set_is_a_header_and_a_sentence(
 ) -> None:
     empty = mine_rules(lander_trees, supp_min=1.0, conf_min=1.0)
     assert rules_to_csv(empty) == ",".join(CSV_COLUMNS) + "\n"
-    assert "0 rules" in rules_to_text(empty)
+    assert "0 rules" in empty.to_text()
 
 
 def test_text_says_divider_lift_and_depth(two_torques: Demonstrations) -> None:
     rules = mine_rules(
         two_torques, supp_min=0.01, conf_min=0.7, lift_min=1.1, max_depth=4, divider=3
     )
-    text = rules_to_text(rules)
+    text = rules.to_text()
     assert "lift at least 1.1, at most 4 conditions, divider 3" in text
     assert "\nhip: " in text
     assert "\nknee: " in text

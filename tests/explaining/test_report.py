@@ -11,13 +11,14 @@ import pytest
 
 from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.report.comparison import Result
-from sarl_core.explaining.report.provenance import digest_of, mining_command
+from sarl_core.explaining.report.provenance import mining_command
 from sarl_core.explaining.report.report import Wishes, make_report
 from sarl_core.explaining.report.tally import Share, tally
 from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
 from sarl_core.mining.language import share_text
+from sarl_core.mining.rule_set import rules_digest
 from sarl_core.mining.rules import UNFILTERED
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
@@ -287,7 +288,7 @@ def test_of_one_environment_the_report_speaks_as_the_demonstrations_do(
     assert "the tilt is" in text
     assert "right!" in text
     assert "pole angle" not in text
-    assert digest_of(rules) in text  # of the rules as they came
+    assert rules_digest(rules) in text  # of the rules as they came
 
 
 def test_only_a_command_that_makes_these_rules_is_printed(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Rule, RuleSet, grow_policy_trees, mine_rules
 from sarl_core.decimals import digits_across, digits_telling
-from sarl_core.explaining.exports.export import rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.figures.tree import path_queries
 from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table
@@ -26,7 +26,7 @@ from sarl_core.explaining.words.what_if import condition_views
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import conditions_text, number_text, sentence
-from sarl_core.mining.rule_files import rules_digest, rules_from_json, rules_to_json
+from sarl_core.mining.rule_set import rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import node_of
 from sarl_core.rendering.replay import plain_descriptions
 
@@ -219,7 +219,7 @@ def test_an_offset_takes_more_digits_and_no_noise() -> None:
     texts = [
         *(sentence(rule, rule_set) for rule in rule_set.rules),
         rules_to_markdown(rule_set),
-        rules_to_text(rule_set),
+        rule_set.to_text(),
         *(row["rule"] for row in csv.DictReader(io.StringIO(rules_to_csv(rule_set)))),
     ]
     numbers = [one for text in texts for one in re.findall(r"293\.\d+", text)]

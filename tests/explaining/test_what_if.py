@@ -23,7 +23,8 @@ from sarl_core.explaining.words.what_if import (
     outside_texts,
 )
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox
 from sarl_core.shielding.near import Change, Neighbourhood

@@ -11,7 +11,8 @@ import pytest
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.html.what_if import changes_html, decision_html, misses_html, way_html
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox
 from sarl_core.shielding.near import Neighbourhood, decision_changes

@@ -23,7 +23,7 @@ from sarl_core.demonstrations.formats import read_demonstrations, save_demonstra
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.language import sentence
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.shielding.shield import Shield
 from tests.bad_inputs import BAD_INPUTS, ROWS, csv_bytes, good_arrays, npz_bytes, parquet_bytes
 from tests.fuzz.mutations import Bytes, of_archive, of_json, of_parquet, of_table

@@ -16,7 +16,8 @@ from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
 from sarl_core.improving.refinement import _ranks, refine
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
-from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import REPORT, ROUNDS
 from sarl_core.shielding.shield import Shield

@@ -8,7 +8,7 @@ import pytest
 
 from sarl_core import InputError, load_demonstrations, mine_rules
 from sarl_core.learning.relevance import Relevance, relevance_from_frame, study_relevance
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.seeds import MOST_LEARNERS

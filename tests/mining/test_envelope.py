@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules
 from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition
 from tests.mining.strategies import labelled_states
 

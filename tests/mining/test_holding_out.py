@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules, threshold_landscape
-from sarl_core.mining.rule_files import rules_from_json, rules_to_json
+from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.validation.episode_counts import count_rules
 from sarl_core.mining.validation.evidence import HeldOut, held_out_of

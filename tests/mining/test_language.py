@@ -19,7 +19,8 @@ from sarl_core.mining.language import (
     short_condition,
     threshold_text,
 )
-from sarl_core.mining.rules import FILTERED, Bounds, Condition, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import FILTERED, Bounds, Condition, Rule
 from sarl_core.mining.tree import Source
 
 INF = math.inf

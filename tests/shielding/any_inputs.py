@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import Condition, Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox
 

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, Shield, mine_rules
-from sarl_core.mining.rules import Condition, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Condition, Rule
 from tests.mining.strategies import labelled_states
 
 

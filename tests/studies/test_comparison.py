@@ -10,7 +10,7 @@ from sarl_core.environments.failures import failure_known
 from sarl_core.errors import InputError
 from sarl_core.explaining.words.comparison import verdict
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.recording import record

@@ -14,8 +14,9 @@ from sarl_core.explaining.exports.program import (
     program_of,
 )
 from sarl_core.mining.language import action_text, conditions_text, counted
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid
 

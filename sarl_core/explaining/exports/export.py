@@ -16,7 +16,6 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
-from sarl_core.explaining.words.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.files import whole_file
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.language import (
@@ -24,11 +23,9 @@ from sarl_core.mining.language import (
     exact_condition,
     label_text,
     sentence,
-    share_text,
-    threshold_text,
 )
 from sarl_core.mining.rule_order import rules_for
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid, Shield
@@ -224,7 +221,7 @@ def save_export(
 
 def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: OnInvalid) -> str:
     if suffix == ".json":
-        from sarl_core.mining.rule_files import rules_to_json
+        from sarl_core.mining.rule_set import rules_to_json
 
         return rules_to_json(rule_set)
     if suffix == ".csv":
@@ -283,72 +280,3 @@ def rules_to_csv(rule_set: RuleSet) -> str:
             )
         )
     return text.getvalue()
-
-
-def rules_to_text(rule_set: RuleSet) -> str:
-    """A rule set for reading.
-
-    Args:
-        rule_set: Any number of rules.
-
-    Returns:
-        What it was mined from and how, then every rule as a sentence, by action
-        dimension: those that a person placed in their order, then the most general first.
-    """
-    source = rule_set.source
-    summary = (
-        f"they cover {share_text(rule_set.coverage)} of the states and are right in "
-        f"{share_text(rule_set.fidelity)} of those."
-        if is_plain(rule_set)
-        else f"{edits_counted(rule_set)}."
-    )
-    lines = [
-        f"Rules for {source.env_id or 'an unnamed environment'}",
-        f"Mined from {counted(source.steps, 'step')} in "
-        f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}.",
-        f"{counted(rule_set.rule_count, 'rule')}, {rule_set.mean_length:.2f} conditions on "
-        f"average; {summary}",
-        "They were learned from examples and guarantee nothing.",
-    ]
-    for index, dimension in enumerate(rule_set.actions):
-        rules = reading_order(rule_set.of_dimension(index))
-        lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
-        lines += [
-            f"{rule_set.name_of(rule):>5}. {sentence(rule, rule_set)}{_mark(rule)}"
-            for rule in rules
-        ]
-    if any(rule.placed for rule in rule_set.rules):
-        lines += ["", "Rules written by hand or pinned come before the others, in their order."]
-    return "\n".join(lines) + "\n"
-
-
-def _mark(rule: Rule) -> str:
-    """What a person made of a rule, as " (pinned, off)"."""
-    marks = ["by hand"] if rule.origin == "manual" else ["pinned"] if rule.pinned else []
-    marks += [] if rule.enabled else ["off"]
-    return f" ({', '.join(marks)})" if marks else ""
-
-
-def limits_text(rule_set: RuleSet) -> str:
-    """The thresholds that a rule set was mined at.
-
-    Args:
-        rule_set: Any.
-
-    Returns:
-        As "support at least 0.005, confidence at least 0.95".
-    """
-    thresholds = rule_set.thresholds
-    limits = [
-        f"support at least {threshold_text(thresholds.support)}",
-        f"confidence at least {threshold_text(thresholds.confidence)}",
-    ]
-    if rule_set.cut == "leaves":
-        limits = ["every leaf of the tree"]
-    if thresholds.lift:
-        limits.append(f"lift at least {threshold_text(thresholds.lift)}")
-    if thresholds.max_depth is not None:
-        limits.append(f"at most {counted(thresholds.max_depth, 'condition')}")
-    if any(dimension.is_interval for dimension in rule_set.actions):
-        limits.append(f"divider {rule_set.divider}")
-    return ", ".join(limits)

@@ -8,10 +8,11 @@ from html import escape
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.exports.program import one_line
-from sarl_core.explaining.words.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.explaining.words.evidence import held_out_text, interval_text
+from sarl_core.mining.editing.edited_sets import edits_counted, is_plain, reading_order
 from sarl_core.mining.language import action_text, counted, share_text
-from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Bounds, Rule
 from sarl_core.mining.written import limit_texts
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
@@ -28,7 +29,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         What it was mined from and how, then a table for each action dimension: rules that a
         person placed in their order, then those that apply most often. Every name is escaped.
     """
-    from sarl_core.explaining.exports.export import limits_text
+    from sarl_core.mining.language import limits_text
 
     source = rule_set.source
     # Rules that overlap or are off have counts that do not add up to a share of the states.

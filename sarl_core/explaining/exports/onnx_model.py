@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import WorkError
 from sarl_core.explaining.exports.program import Order, Program, largest_float32, program_of
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid

@@ -14,8 +14,9 @@ import numpy as np
 
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection, replacements
 from sarl_core.shielding.shield import OnInvalid

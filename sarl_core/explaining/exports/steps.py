@@ -14,7 +14,7 @@ from sarl_core.demonstrations.formats.metadata import KEY
 from sarl_core.errors import InputError
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.files import whole_file
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.steps import StepTable
 
 if TYPE_CHECKING:

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.exports.program import Order, largest_float32, program_of
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import RuleNode
-from sarl_core.mining.rules import Condition, RuleSet
+from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid, Shield

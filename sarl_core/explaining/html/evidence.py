@@ -24,7 +24,8 @@ from sarl_core.explaining.words.evidence import (
     verdict_counts,
 )
 from sarl_core.mining.language import action_text, counted, share_text
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.evidence import Interval
 from sarl_core.mining.validation.holding_out import verdict
 

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.figures.colours import MARKER_COLOUR, label_colour
 from sarl_core.mining.language import action_text, bounds_of, number_text, query_text
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, RuleNode, tree_of
-from sarl_core.mining.rules import Condition, RuleSet
+from sarl_core.mining.rules import Condition
 from sarl_core.mining.written import value_text
 
 

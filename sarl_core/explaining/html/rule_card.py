@@ -12,7 +12,8 @@ from sarl_core.explaining.words.evidence import (
     told_by_episodes,
 )
 from sarl_core.mining.language import counted, sentence, share_text
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import verdict
 
 _STYLE = """<style>

@@ -24,7 +24,8 @@ from sarl_core.mining.language import (
     share_text,
     short_condition,
 )
-from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Bounds, Rule
 
 PAGE_ROWS = 50
 LEGEND = (

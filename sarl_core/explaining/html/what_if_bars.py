@@ -14,7 +14,7 @@ from sarl_core.explaining.html.path import label_key
 from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.near import Line
 
 _PALE = 0.32

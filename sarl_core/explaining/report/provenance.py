@@ -12,24 +12,12 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.language import counted, threshold_text
-from sarl_core.mining.rule_files import rules_digest
-from sarl_core.mining.rules import NAMED_SETTINGS, RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_core.mining.rules import NAMED_SETTINGS
 from sarl_core.mining.tree import PolicyTree
 
 _PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")
 _PROGRAM = "python -m sarl_core"
-
-
-def digest_of(rule_set: RuleSet) -> str:
-    """Fingerprint of rules (blake2b, 32 hex digits), whatever file they came in.
-
-    Args:
-        rule_set: The rules.
-
-    Returns:
-        As `rules_digest`.
-    """
-    return rules_digest(rule_set)
 
 
 def facts(
@@ -59,7 +47,7 @@ def facts(
     source = rule_set.source
     found = [
         ("Demonstrations", _named(demonstrations.digest, demonstrations_name)),
-        ("Rules", _named(digest_of(rule_set), rules_name)),
+        ("Rules", _named(rules_digest(rule_set), rules_name)),
     ]
     if not tally.same:
         size = f"{source.steps:,} steps in {counted(source.episodes, 'episode')}"

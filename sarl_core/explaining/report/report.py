@@ -28,7 +28,7 @@ from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import counted, share_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.progress import Progress

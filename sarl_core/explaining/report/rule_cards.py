@@ -25,7 +25,8 @@ from sarl_core.mining.language import (
     share_text,
     short_condition,
 )
-from sarl_core.mining.rules import Bounds, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Bounds, Rule
 from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.mining.written import value_text
 from sarl_core.rendering.example_frames import ExampleFrame, Examples

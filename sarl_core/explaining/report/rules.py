@@ -11,7 +11,8 @@ from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.language import action_text, conditions_text, counted, share_text
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.rendering.example_frames import Examples
 
 MOST_IN_TABLE = 5_000

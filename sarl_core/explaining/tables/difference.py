@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.difference import said_text, what_text
 from sarl_core.mining.language import action_text, conditions_text, label_text
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.disagreement import Disagreement
 
 KINDS = ("added", "removed", "changed")

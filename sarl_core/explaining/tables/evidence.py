@@ -18,7 +18,8 @@ from sarl_core.explaining.words.evidence import (
 )
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.language import action_text, conditions_text, label_text
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.contradictions import Contradictions, EpisodeContradictions
 from sarl_core.mining.validation.episode_counts import Influence
 from sarl_core.mining.validation.holding_out import verdict

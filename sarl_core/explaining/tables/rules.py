@@ -10,7 +10,8 @@ import numpy as np
 
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
 from sarl_core.mining.language import action_text, conditions_text
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds, name_at
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, Thresholds, name_at
 from sarl_core.mining.tree import PolicyTree, source_of
 
 

@@ -15,7 +15,8 @@ from sarl_core.mining.language import (
     sentence,
     share_text,
 )
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.disagreement import Disagreement
 
 NO_RULE_TEXT = "no rule"

@@ -11,7 +11,8 @@ from sarl_core.mining.language import (
     sentence,
     share_text,
 )
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Change, Conflict, Verdicts
 
 

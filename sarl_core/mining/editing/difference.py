@@ -20,7 +20,8 @@ from sarl_core.environments.feature_order import Named, only_counts
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
 from sarl_core.mining.rule_order import Fitted, fitted_rules
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 
 What = Literal["conditions", "action", "switched", "place", "origin"]
 Regions = tuple[NDArray[np.int64], NDArray[np.int64]]

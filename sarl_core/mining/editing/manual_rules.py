@@ -13,7 +13,8 @@ from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.envelope import box_of
-from sarl_core.mining.rules import Bounds, Condition, Operator, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Bounds, Condition, Operator, Rule
 
 _MOST_NAMES = 8  # as many features as a sentence can name
 

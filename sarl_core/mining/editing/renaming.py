@@ -7,7 +7,7 @@ from dataclasses import replace
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names
 from sarl_core.mining.labels import label_dimensions
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree, Source
 
 

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from sarl_core.decimals import short_decimal
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rule_order import rules_for
-from sarl_core.mining.rules import Condition, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Condition, Rule
 
 ONE_SIDED = "no demonstrated state tells its two sides apart"
 SHORTEST = "no shorter number decides every state as it does"

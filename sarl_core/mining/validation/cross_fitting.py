@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import cut_nodes
-from sarl_core.mining.rules import RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.mining.validation.episode_counts import (
     EpisodeCounts,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applying import applications, labels_of
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.evidence import EpisodeSums, HeldOut, held_outs
 

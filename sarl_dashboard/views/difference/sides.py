@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.components.settings import offered_rule_sets
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.rule_choice import EDITED, rules_for

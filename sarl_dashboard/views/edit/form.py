@@ -16,7 +16,8 @@ from sarl_core.explaining.words.edits import change_text, conflict_text
 from sarl_core.mining.editing.edits import Add, Change, next_manual_id
 from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
 from sarl_core.mining.language import action_text, number_text, sentence
-from sarl_core.mining.rules import Operator, Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Operator, Rule
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base

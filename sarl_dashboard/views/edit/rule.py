@@ -10,7 +10,8 @@ import streamlit as st
 from sarl_core.explaining.words.edits import state_text
 from sarl_core.mining.editing.edits import Edit, Move, Pin, Remove, Switch, Unpin, peers_of
 from sarl_core.mining.language import counted, sentence
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base

@@ -9,7 +9,8 @@ import streamlit as st
 
 from sarl_core.explaining.words.edits import state_text
 from sarl_core.mining.language import action_text, conditions_text, counted
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height

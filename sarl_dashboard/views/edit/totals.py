@@ -8,7 +8,7 @@ from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.html.number_cards import Number, number_cards
 from sarl_core.explaining.words.edits import change_text, edit_text
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base

@@ -10,7 +10,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.evidence import EPISODES_DRAWN, contradictions_figure
 from sarl_core.explaining.tables.evidence import episode_columns, pair_columns
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.contradictions import (
     NEAR,
     Contradictions,

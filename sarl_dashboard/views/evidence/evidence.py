@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged, judge
 from sarl_core.mining.validation.episode_counts import Influence, count_rules, most_influential
 from sarl_core.mining.validation.holding_out import more_episodes

@@ -10,7 +10,7 @@ from sarl_core.explaining.html.evidence import enough_plot
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.tables.evidence import enough_columns
 from sarl_core.explaining.words.evidence import never_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.views.evidence.evidence import Evidence, Findings

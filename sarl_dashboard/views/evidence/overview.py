@@ -17,7 +17,7 @@ from sarl_core.explaining.words.evidence import (
     verdict_counts,
 )
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.evidence import FEWEST_EPISODES
 from sarl_core.mining.validation.holding_out import Verdict, shortfall
 from sarl_dashboard.cache import cached

@@ -10,7 +10,7 @@ import streamlit as st
 
 from sarl_core.explaining.tables.evidence import stability_columns
 from sarl_core.mining.language import counted, share_text
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.stability import SAME_RULE, Stability, rule_stability
 from sarl_core.progress import Progress
 from sarl_dashboard.components.tables import table_height

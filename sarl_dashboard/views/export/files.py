@@ -15,7 +15,7 @@ from sarl_core.explaining.exports.export import (
     prepare,
     vectors_name,
 )
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download

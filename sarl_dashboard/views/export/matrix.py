@@ -15,7 +15,7 @@ from sarl_core.explaining.html.rule_matrix import (
     matrix_html,
     rule_matrix,
 )
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
 

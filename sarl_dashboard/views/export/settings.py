@@ -8,7 +8,7 @@ from typing import NamedTuple
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.components.settings import offered_rule_sets, projection_choice
 from sarl_dashboard.state import compact_set

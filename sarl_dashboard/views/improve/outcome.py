@@ -27,7 +27,7 @@ from sarl_core.improving.aggregation import Aggregation
 from sarl_core.improving.aggregation_files import aggregation_card, card_path
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import at_least_text, counted, share_text
-from sarl_core.mining.rule_files import rules_to_json
+from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome

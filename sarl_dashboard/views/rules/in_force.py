@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact

@@ -9,11 +9,11 @@ from typing import Any
 
 import streamlit as st
 
-from sarl_core.explaining.exports.export import rules_to_csv, rules_to_text
+from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
 from sarl_core.mining.language import action_text, conditions_text
-from sarl_core.mining.rule_files import rules_to_json
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_to_json
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
@@ -115,7 +115,7 @@ def downloads(stem: str, count: int, make_set: Callable[[], RuleSet]) -> None:
     for kind, ending, write in (
         ("JSON", "json", rules_to_json),
         ("CSV", "csv", rules_to_csv),
-        ("Text", "txt", rules_to_text),
+        ("Text", "txt", RuleSet.to_text),
     ):
         download(
             kind,

@@ -19,7 +19,8 @@ from sarl_core.explaining.html.rule_examples import examples_html
 from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.rule_evidence import feature_evidence, path_steps
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import Rule, RuleSet, node_of
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture

@@ -21,7 +21,8 @@ from sarl_core.explaining.html.what_if import (
 )
 from sarl_core.explaining.html.what_if_bars import lines_html
 from sarl_core.explaining.words.what_if import node_of_way
-from sarl_core.mining.rules import Rule, RuleSet
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.near import DecisionChange, Line, Neighbourhood, decision_changes
 from sarl_core.shielding.sampling import Span

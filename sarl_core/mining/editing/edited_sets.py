@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from sarl_core.mining.rules import Rule, RuleSet
+from typing import TYPE_CHECKING
+
+from sarl_core.mining.rules import Rule
+
+if TYPE_CHECKING:
+    from sarl_core.mining.rule_set import RuleSet
 
 
 def is_plain(rule_set: RuleSet) -> bool:

@@ -1,0 +1,339 @@
+"""A rule set: rules, what they were mined from and how; a sequence, a frame, text, a file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, overload
+
+import numpy as np
+
+from sarl_core.errors import InputError
+from sarl_core.files import whole_file
+from sarl_core.limits import limited_bytes
+from sarl_core.mining.editing.edited_sets import edits_counted, is_plain, reading_order
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import (
+    action_text,
+    conditions_text,
+    counted,
+    exact_condition,
+    label_text,
+    limits_text,
+    sentence,
+    share_text,
+)
+from sarl_core.mining.rule_files import file_parts, read_rules, write_rules
+from sarl_core.mining.rules import Rule, Thresholds, name_at
+from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.notebooks import MOST_ROWS, table_html
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_NUMBERS = {
+    "support": np.float64,
+    "confidence": np.float64,
+    "lift": np.float64,
+    "joint_support": np.float64,
+    "samples": np.int64,
+    "length": np.int64,
+    "merged_length": np.int64,
+    "enabled": np.bool_,
+    "pinned": np.bool_,
+}
+"""What a frame has of each rule as a number or a flag."""
+
+
+@dataclass(frozen=True, repr=False)
+class RuleSet(Sequence[Rule]):
+    """Rules, with what they were mined from and how; a sequence of its rules.
+
+    Attributes:
+        rules: Rules of one action dimension never overlap unless a person added some.
+        actions: Action dimensions and their labels.
+        source: Environment, features and fingerprint of the demonstrations.
+        thresholds: In force when it was mined.
+        divider: Number of intervals of continuous dimensions.
+        cut: Where the paths were cut: at the first node that reaches the thresholds
+            (Algorithm 1), or nowhere, so that every leaf is a rule and every state is covered.
+    """
+
+    rules: tuple[Rule, ...]
+    actions: tuple[LabelledDimension, ...]
+    source: Source
+    thresholds: Thresholds
+    divider: int = 2
+    cut: Literal["thresholds", "leaves"] = "thresholds"
+
+    def __len__(self) -> int:
+        """Number of rules."""
+        return len(self.rules)
+
+    def __iter__(self) -> Iterator[Rule]:
+        """The rules in their order."""
+        return iter(self.rules)
+
+    def __contains__(self, rule: object) -> bool:
+        """Whether a rule is one of the set."""
+        return rule in self.rules
+
+    @overload
+    def __getitem__(self, place: int) -> Rule: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Rule, ...]: ...
+    def __getitem__(self, place: int | slice) -> Rule | tuple[Rule, ...]:
+        """The rule at a place, from 0; of a slice, those rules alone."""
+        return self.rules[place]
+
+    def __repr__(self) -> str:
+        """Its size, as `RuleSet('CartPole-v1', rules=12, support>=0.005, confidence>=0.95)`."""
+        if self.cut == "leaves":
+            return f"RuleSet({self.source.env_id!r}, rules={len(self)}, every leaf)"
+        return (
+            f"RuleSet({self.source.env_id!r}, rules={len(self)}, "
+            f"support>={self.thresholds.support:g}, confidence>={self.thresholds.confidence:g})"
+        )
+
+    def _repr_html_(self) -> str:
+        """The first rules as a table, for a notebook."""
+        shown = self.rules[:MOST_ROWS]
+        rows = (
+            (
+                self.name_of(rule),
+                conditions_text(rule, self),
+                action_text(rule.action, self.actions[rule.dimension]),
+                share_text(rule.support),
+                share_text(rule.confidence),
+                f"{rule.samples:,}",
+            )
+            for rule in shown
+        )
+        header = ("rule", "when", "then", "support", "confidence", "states")
+        return table_html(repr(self), header, rows, more=len(self) - len(shown))
+
+    @property
+    def rule_count(self) -> int:
+        """Number of rules."""
+        return len(self.rules)
+
+    @property
+    def mean_length(self) -> float:
+        """Mean number of queries a rule, 0 without rules."""
+        return sum(rule.length for rule in self.rules) / max(len(self), 1)
+
+    @property
+    def coverage(self) -> float:
+        """Share of pairs to which a rule applies, averaged over action dimensions."""
+        pairs = self.source.steps * len(self.actions)
+        return sum(rule.samples for rule in self.rules) / pairs
+
+    @property
+    def fidelity(self) -> float:
+        """Share of the covered pairs whose label the rule gives; NaN where none is covered."""
+        covered = sum(rule.samples for rule in self.rules)
+        return sum(rule.correct for rule in self.rules) / covered if covered else float("nan")
+
+    @cached_property
+    def names(self) -> Mapping[str, str]:
+        """What people call the rules, by id: R1 to Rn, by their place in the set."""
+        return {rule.id: name_at(place) for place, rule in enumerate(self.rules)}
+
+    def name_of(self, rule: Rule) -> str:
+        """What people call a rule; its id is for files and links.
+
+        Args:
+            rule: One of the set.
+
+        Returns:
+            As "R12".
+        """
+        return self.names[rule.id]
+
+    def of_dimension(self, dimension: int) -> tuple[Rule, ...]:
+        """The rules of one action dimension.
+
+        Args:
+            dimension: Its index.
+
+        Returns:
+            In their order.
+        """
+        return tuple(rule for rule in self.rules if rule.dimension == dimension)
+
+    @cached_property
+    def digest(self) -> str:
+        """Fingerprint (blake2b, 32 hex digits) of all that a rule file says.
+
+        With it, of what is known of the data around thresholds: rules that are written differently
+        for people have different ones. `rules_digest` leaves that out.
+        """
+        digest = hashlib.blake2b(digest_size=16)
+        for part in file_parts(self):
+            # A file may have brought half of a pair that UTF-8 cannot write.
+            digest.update(part.encode(errors="surrogatepass"))
+        return digest.hexdigest()
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a rule, in their order.
+
+        Returns:
+            `name` (as "R1"), `id`, `dimension` and `action` in words, `rule` as a sentence,
+            `conditions` in path order with thresholds at full precision, then numbers and
+            flags as `Rule` has them; what held-out episodes say under `held_out_samples` and so
+            on, NaN where there are none.
+        """
+        import pandas as pd
+
+        features = self.source.features
+        return pd.DataFrame(
+            {
+                "name": [self.name_of(rule) for rule in self],
+                "id": [rule.id for rule in self],
+                "dimension": [self.actions[rule.dimension].name for rule in self],
+                "action": [label_text(rule.action, self.actions[rule.dimension]) for rule in self],
+                "rule": [sentence(rule, self, evidence=False) for rule in self],
+                "conditions": [
+                    " and ".join(exact_condition(one, features) for one in rule.conditions)
+                    or "always"
+                    for rule in self
+                ],
+                **{
+                    column: np.array([getattr(rule, column) for rule in self], dtype=dtype)
+                    for column, dtype in _NUMBERS.items()
+                },
+                "origin": [rule.origin for rule in self],
+                **{
+                    f"held_out_{column}": np.array(
+                        [getattr(rule.held_out, column, None) for rule in self], dtype=np.float64
+                    )
+                    for column in HeldOut._fields
+                },
+            }
+        )
+
+    def to_text(self) -> str:
+        """The rules for reading.
+
+        Returns:
+            What they were mined from and how, then every rule as a sentence, by action
+            dimension: those that a person placed in their order, then the most general first.
+        """
+        source = self.source
+        summary = (
+            f"they cover {share_text(self.coverage)} of the states and are right in "
+            f"{share_text(self.fidelity)} of those."
+            if is_plain(self)
+            else f"{edits_counted(self)}."
+        )
+        lines = [
+            f"Rules for {source.env_id or 'an unnamed environment'}",
+            f"Mined from {counted(source.steps, 'step')} in "
+            f"{counted(source.episodes, 'episode')}: {limits_text(self)}.",
+            f"{counted(self.rule_count, 'rule')}, {self.mean_length:.2f} conditions on "
+            f"average; {summary}",
+            "They were learned from examples and guarantee nothing.",
+        ]
+        for index, dimension in enumerate(self.actions):
+            rules = reading_order(self.of_dimension(index))
+            lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
+            lines += [
+                f"{self.name_of(rule):>5}. {sentence(rule, self)}{_mark(rule)}" for rule in rules
+            ]
+        if any(rule.placed for rule in self.rules):
+            lines += ["", "Rules written by hand or pinned come before the others, in their order."]
+        return "\n".join(lines) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the rule file; it appears whole or not at all.
+
+        Args:
+            path: A `.json` file.
+
+        Raises:
+            InputError: If the folder does not exist.
+            WorkError: If it cannot be written to.
+        """
+        with whole_file(Path(path)) as unfinished:
+            write_rules(self, unfinished)
+
+    @classmethod
+    def load(cls, path: str | Path) -> RuleSet:
+        """Read a rule file, as `load_rules` does."""
+        return load_rules(path)
+
+
+def _mark(rule: Rule) -> str:
+    """What a person made of a rule, as " (pinned, off)"."""
+    marks = ["by hand"] if rule.origin == "manual" else ["pinned"] if rule.pinned else []
+    marks += [] if rule.enabled else ["off"]
+    return f" ({', '.join(marks)})" if marks else ""
+
+
+def load_rules(path: str | Path) -> RuleSet:
+    """Read a rule file.
+
+    Args:
+        path: A `.json` file.
+
+    Returns:
+        The rule set.
+
+    Raises:
+        InputError: If it cannot be read, is no rule file, or holds anything this version does not
+            know.
+    """
+    path = Path(path)
+    try:
+        text = limited_bytes(path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); give a rule file") from error
+    return rules_from_json(text, name=str(path))
+
+
+def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSet:
+    """Read the text of a rule file.
+
+    Args:
+        text: JSON, UTF-8.
+        name: Of the file, for errors.
+
+    Returns:
+        The rule set.
+
+    Raises:
+        InputError: If it is no rule file, or holds anything this version does not know.
+    """
+    return RuleSet(*read_rules(text, name))
+
+
+def rules_to_json(rule_set: RuleSet) -> str:
+    """A rule set as the text of a rule file.
+
+    Args:
+        rule_set: To write.
+
+    Returns:
+        JSON; numbers read back as the same floats.
+    """
+    return "".join(file_parts(rule_set))
+
+
+def rules_digest(rule_set: RuleSet) -> str:
+    """Fingerprint of rules, whatever file they came in.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        As `RuleSet.digest`, without what is known of the data around thresholds: that is no part
+        of the rules.
+    """
+    bare = rule_set.source.with_splits([None] * len(rule_set.source.features))
+    return replace(rule_set, source=bare).digest
