@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import streamlit as st
 
 from sarl_core.mining.language import counted
-from sarl_core.mining.rules import Rule, RuleSet, Thresholds
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_dashboard.components.tables import column_config, frame, table_height
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import largest_rules
