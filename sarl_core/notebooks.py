@@ -8,8 +8,8 @@ MOST_ROWS = 30
 """Of a table in a notebook; what is more is counted."""
 
 _TABLE = """\
+<p>{{ caption }}</p>
 <table>
-<caption style="text-align: left">{{ caption }}</caption>
 <thead><tr>{% for name in header %}<th>{{ name }}</th>{% endfor %}</tr></thead>
 <tbody>
 {% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>

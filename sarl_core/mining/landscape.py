@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +19,21 @@ from sarl_core.errors import InputError
 from sarl_core.mining.tree import PolicyTree, highest_above
 from sarl_core.mining.validation.episode_counts import EpisodeCounts
 from sarl_core.mining.validation.evidence import EpisodeSums
+from sarl_core.notebooks import table_html
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Floats = NDArray[np.float64]
 
 # The grid of the paper's Figures 2 and 3. Written as quotients, so that 0.15 is 0.15.
 PAPER_SUPPORTS: Floats = np.arange(11) / 20
 PAPER_CONFIDENCES: Floats = np.arange(21) / 20
+
+LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
+"""What is counted and measured of every rule set."""
+_HELD_OUT_LAYERS = ("held_out_fidelity", "held_out_low", "held_out_high")
+_MOST_IN_NOTEBOOK = 21  # lines of an axis, as the paper's grid has
 
 _CELLS_AT_ONCE = 2_000_000  # of the planes of some episodes: 32 MB
 
@@ -76,6 +85,50 @@ class Landscape:
     held_out_fidelity: Floats | None = None
     held_out_low: Floats | None = None
     held_out_high: Floats | None = None
+
+    def to_frame(self, *, by_dimension: bool = False) -> pd.DataFrame:
+        """One row a cell, by support, then by confidence.
+
+        Args:
+            by_dimension: Whether to give the cells of each action dimension alone, one after the
+                other, with a column `dimension` before the others; else those of all together.
+
+        Returns:
+            `support`, `confidence`, `rule_count`, `mean_length`, `coverage`, `fidelity`, and the
+            layers of pairs held out where there are some.
+        """
+        import pandas as pd
+
+        if by_dimension:
+            parts = [part.to_frame() for part in self.dimensions]
+            return pd.concat(parts, keys=range(len(parts)), names=["dimension", None]).reset_index(
+                "dimension"
+            )
+        layers = {name: getattr(self, name) for name in (*LAYERS, *_HELD_OUT_LAYERS)}
+        return pd.DataFrame(
+            {
+                "support": np.repeat(self.supports, len(self.confidences)),
+                "confidence": np.tile(self.confidences, len(self.supports)),
+                **{name: layer.ravel() for name, layer in layers.items() if layer is not None},
+            }
+        )
+
+    def _repr_html_(self) -> str:
+        """The number of rules over the grid, for a notebook; a large grid is thinned out."""
+        rows, columns = (
+            np.unique(np.linspace(0, len(axis) - 1, _MOST_IN_NOTEBOOK).astype(np.int64))
+            for axis in (self.supports, self.confidences)
+        )
+        shown = self.rule_count[np.ix_(rows, columns)]
+        caption = "Number of rules, by minimum support and, across, minimum confidence"
+        if shown.size < self.rule_count.size:
+            caption += f" ({shown.size:,} of {self.rule_count.size:,} cells)"
+        lines = zip(self.supports[rows].tolist(), shown.tolist(), strict=True)
+        return table_html(
+            caption,
+            ["", *(f"{value:g}" for value in self.confidences[columns])],
+            ([f"{support:g}", *(f"{count:,}" for count in counts)] for support, counts in lines),
+        )
 
 
 def rule_rectangles(

@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.failures import failed, failure_known
 from sarl_core.errors import InputError, SarlError
+from sarl_core.mining.language import share_text
+from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import play
@@ -122,6 +124,22 @@ class Episodes:
             f"Episodes(env_id={self.env_id!r}, agent={self.agent!r}, episodes={len(self)}, "
             f"steps={int(self.lengths.sum())}, mean_return={self.returns.mean():.1f})"
         )
+
+    def _repr_html_(self) -> str:
+        """Returns, failures and what the shield did, for a notebook."""
+        summary, returns, failures = self.summary(), self.statistics, self.failures
+        rows = [
+            ("return", f"mean {returns.mean:.1f} ± {returns.std:.1f}"),
+            ("", f"IQM {returns.iqm:.1f} (95 %: {returns.low:.1f} to {returns.high:.1f})"),
+            ("steps", f"{int(self.lengths.sum()):,}"),
+            ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
+            ("coverage", f"{share_text(summary['coverage'])} of the steps"),
+        ]
+        if failures is not None:
+            between = f"95 %: {share_text(failures.low)} to {share_text(failures.high)}"
+            rows.insert(0, ("failures", f"{failures.count:,} of {failures.of:,} ({between})"))
+        rows += [("note", remark) for remark in self.remarks]
+        return table_html(repr(self), ("what", "value"), rows)
 
     def part(self, start: int, stop: int) -> Episodes:
         """Some of the episodes, as if no others had been run.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import logging
 import os
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
-from sarl_core.mining.landscape import Landscape
+from sarl_core.mining.landscape import LAYERS, Landscape
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -26,8 +24,6 @@ MAX_VALUES = 10_001  # an axis in steps of 0.0001
 MAX_CELLS = 4_000_000  # as a file, half a gigabyte
 
 _BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
-
-_LAYERS = ("rule_count", "mean_length", "coverage", "fidelity")
 
 
 def parse_grid(text: str, name: str) -> NDArray[np.float64]:
@@ -127,7 +123,7 @@ def landscape_document(landscape: Landscape, names: Sequence[str]) -> dict[str, 
 
 
 def _layers(landscape: Landscape) -> dict[str, Any]:
-    layers = {layer: getattr(landscape, layer).tolist() for layer in _LAYERS}
+    layers = {layer: getattr(landscape, layer).tolist() for layer in LAYERS}
     # NaN, the only number that is not itself, is where nothing is covered.
     layers["fidelity"] = [
         [None if value != value else value for value in row] for row in layers["fidelity"]
@@ -137,20 +133,14 @@ def _layers(landscape: Landscape) -> dict[str, Any]:
 
 def _csv(landscape: Landscape, names: Sequence[str]) -> str:
     """One row a cell; with several action dimensions, of the whole and of each."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("dimension", "support", "confidence", *_LAYERS))
+    import pandas as pd
+
     parts = [("all", landscape)]
     if len(names) > 1:
         parts += zip(names, landscape.dimensions, strict=True)
-    for name, part in parts:
-        layers = _layers(part)
-        for row, support in enumerate(part.supports.tolist()):
-            writer.writerows(
-                (name, support, confidence, *(layers[layer][row][column] for layer in _LAYERS))
-                for column, confidence in enumerate(part.confidences.tolist())
-            )
-    return text.getvalue()
+    columns = ["dimension", "support", "confidence", *LAYERS]
+    table = pd.concat(part.to_frame().assign(dimension=name)[columns] for name, part in parts)
+    return table.to_csv(index=False, lineterminator="\n")
 
 
 def figure_to_png(figure: go.Figure) -> bytes:
