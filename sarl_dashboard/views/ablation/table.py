@@ -20,12 +20,13 @@ from sarl_core.explaining.figures.ablation import (
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.mining.language import sentence
 from sarl_core.studies.ablation import Ablation
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
 from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.text import escaped
 
-PLAIN = {"displayModeBar": False}
 TABLE_ROWS = 14
 ROW_HEIGHT = 33  # pixels
 
@@ -81,11 +82,10 @@ def figure(found: Ablation) -> None:
         largest = sorted(ranked, key=lambda effect: -abs(effect.difference.mean))[:FIGURE_ROWS]
         ranked = [effect for effect in ranked if effect in largest]
         st.caption(f"The {FIGURE_ROWS} rules whose removal moves the return most.")
-    st.plotly_chart(
+    chart(
         ablation_figure(found, ranked),
-        config=PLAIN,
-        key="ablation_figure",
-        alt="For each rule, the change of the return without it, with its 95 % interval",
+        "ablation_figure",
+        "For each rule, the change of the return without it, with its 95 % interval",
     )
 
 
@@ -113,14 +113,11 @@ def table(found: Ablation, wanted: Wanted, linked: str | None) -> None:
             width="content",
         )
         name = wanted.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
-        st.download_button(
+        download(
             "Download CSV",
             lambda: csv(found),
             f"ablation-{name}-{wanted.seed}.csv",
-            "text/csv",
             key="ablation_csv",
-            on_click="ignore",
-            icon=":material/download:",
         )
     picked = chosen["selection"]["rows"]
     if picked and picked[0] < rows:

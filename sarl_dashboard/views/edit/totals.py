@@ -10,6 +10,7 @@ from sarl_core.explaining.words.edits import change_text, edit_text
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.shielding.effects import Verdicts, change
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.text import escaped, in_full
@@ -38,15 +39,12 @@ def bar(of: Base) -> None:
                 help=escaped(told) if told else f"Nothing to {name.lower()}",
             )
         source = rule_set.source.env_id.rsplit("/", 1)[-1] or "unnamed"
-        st.download_button(
+        download(
             "Rule file",
             lambda: rules_to_json(rule_set),
             f"rules-{source}-edited.json",
-            "application/json",
-            on_click="ignore",
-            icon=":material/download:",
             key="edited_file",
-            help="The set with all edits: what is off, what is pinned, what was added by hand.",
+            meaning="The set with all edits: what is off, what is pinned, what was added by hand.",
         )
         if history.edits:
             st.page_link(

@@ -18,13 +18,13 @@ from sarl_core.mining.validation.contradictions import (
     find_contradictions,
 )
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
 from sarl_dashboard.state import hold_out
 from sarl_dashboard.text import escaped
 
 AT_ONCE = 50_000  # pairs up to which contradictions are looked for without being asked
-PLAIN = {"displayModeBar": False}
 
 
 @cached(show_spinner="Comparing every state with those near it …")
@@ -100,11 +100,10 @@ def _show(remaining: Demonstrations, rule_set: RuleSet, contradictions: Contradi
         return
     left, right = st.columns(2, gap="medium")
     with left:
-        st.plotly_chart(
+        chart(
             contradictions_figure(episodes),
-            config=PLAIN,
-            key="contradictions",
-            alt="Share of contradicting steps of each episode",
+            "contradictions",
+            "Share of contradicting steps of each episode",
         )
         if len(episodes) > EPISODES_DRAWN:
             st.caption(f"The first {EPISODES_DRAWN} of {len(episodes):,} episodes.")

@@ -10,11 +10,11 @@ from sarl_core.explaining.figures import evidence as figures
 from sarl_core.mining.language import counted
 from sarl_core.mining.validation.learning_curve import LearningCurve, learning_curve
 from sarl_core.progress import Progress
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.worked_out import worked_out
 from sarl_dashboard.views.evidence.evidence import Evidence
 
 ORDERS = 6
-PLAIN = {"displayModeBar": False}
 
 
 def show_curve(evidence: Evidence) -> None:
@@ -66,11 +66,10 @@ def _show_curve(curve: LearningCurve) -> None:
         for layer, title in figures.CURVE_TITLES.items():
             with grid.cell():
                 st.markdown(f"**{title}**")
-                st.plotly_chart(
+                chart(
                     figures.curve_figure(curve, layer),
-                    config=PLAIN,
-                    key=f"curve_{layer}",
-                    alt=f"{title} over the number of episodes",
+                    f"curve_{layer}",
+                    f"{title} over the number of episodes",
                 )
     st.caption(
         f"Line: the mean of {counted(curve.orders, 'order')}. Band: from the least to the most."

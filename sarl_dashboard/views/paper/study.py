@@ -8,12 +8,12 @@ from sarl_core.errors import SarlError
 from sarl_core.paper.report import REPORT, Entry
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import replication
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.paper import report_files
 from sarl_dashboard.views.paper.claims import show_claims
-
-PLAIN = {"displayModeBar": False}
 
 
 def show_study(name: str, entry: Entry | None) -> None:
@@ -65,9 +65,7 @@ def show_study(name: str, entry: Entry | None) -> None:
         drawings = report_files.drawings(name, entry, part, dark=is_dark())
         for number, drawing in enumerate(drawings):
             st.markdown(f"**{drawing.title}**")
-            st.plotly_chart(
-                drawing.figure, key=f"drawing_{name}_{number}", config=PLAIN, alt=drawing.alt
-            )
+            chart(drawing.figure, f"drawing_{name}_{number}", drawing.alt)
     with right:
         show_claims(entry.claims, beside=True)
     how_made(entry)
@@ -79,43 +77,23 @@ def downloads(entry: Entry) -> None:
     files = entry.files
     with st.container(horizontal=True):
         if (report_files.FOLDER / files["page"]).is_file():
-            st.download_button(
+            download(
                 "Page (HTML)",
                 lambda: report_files.whole_page(entry),
                 files["page"],
-                "text/html",
                 key="page_file",
-                on_click="ignore",
-                icon=":material/download:",
             )
-        for label, kind, mime in (
-            ("Picture (PNG)", "picture", "image/png"),
-            ("Data (CSV)", "table", "text/csv"),
-        ):
+        for label, kind in (("Picture (PNG)", "picture"), ("Data (CSV)", "table")):
             path = report_files.FOLDER / files[kind]
             if path.is_file():
-                st.download_button(
-                    label,
-                    path.read_bytes(),
-                    files[kind],
-                    mime,
-                    key=f"{kind}_file",
-                    on_click="ignore",
-                    icon=":material/download:",
-                )
+                download(label, path.read_bytes(), files[kind], key=f"{kind}_file")
         report_download()
 
 
 def report_download() -> None:
     """The report, every number in it."""
-    st.download_button(
-        "All numbers (JSON)",
-        (report_files.FOLDER / REPORT).read_bytes(),
-        REPORT,
-        "application/json",
-        key="report_file",
-        on_click="ignore",
-        icon=":material/download:",
+    download(
+        "All numbers (JSON)", (report_files.FOLDER / REPORT).read_bytes(), REPORT, key="report_file"
     )
 
 
