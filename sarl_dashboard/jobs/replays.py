@@ -38,6 +38,7 @@ EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
 KEPT_PICTURES = 64  # of a replay, some 30 kB each
+_LATEST = "_replay"
 
 Told = Callable[[float, str], None]
 
@@ -149,6 +150,32 @@ class Order:
         made_for = f" made for {request.seed}" if request.agent == "untrained" else ""
         told = request.agent_digest + (made_for if seed != request.seed else "")
         return replace(self, request=replace(request, seed=seed, agent_digest=told))
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """A replay, and the order that it fulfils."""
+
+    order: Order
+    replay: Replay
+
+
+def latest_order() -> Order | None:
+    """What asked for the replay that the visitor ran last."""
+    order: Order | None = st.session_state.get(_LATEST)
+    return order
+
+
+def latest() -> Played | None:
+    """The replay that the visitor ran last, while it is kept."""
+    order = latest_order()
+    replay = None if order is None else kept_replays().get(order.request)
+    return None if order is None or replay is None else Played(order, replay)
+
+
+def show_next(order: Order) -> None:
+    """Make the replay of an order, which is kept, the latest."""
+    st.session_state[_LATEST] = order
 
 
 def compared(order: Order) -> tuple[Order, int] | None:

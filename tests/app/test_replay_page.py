@@ -30,6 +30,13 @@ def test_before_a_run_the_page_says_what_to_do() -> None:
     assert not app.metric
 
 
+def test_work_of_the_page_before_is_not_taken_for_a_chosen_step() -> None:
+    app = open_page("evidence", data="cartpole", support="0.05", confidence="0.9")
+    app.switch_page("replay.py").run()
+    assert not app.exception, app.exception
+    assert "press Run" in texts(app)
+
+
 @pytest.mark.parametrize(
     ("data", "agent", "rules"),
     [

@@ -33,9 +33,9 @@ PLAIN = {"displayModeBar": False}
 def comparison(order: Order) -> None:
     """Several episodes instead of one, on request."""
     st.subheader("Over several episodes")
-    found = compared(order)
-    if found is not None:
-        order = found[0]  # that of the first episode, whichever is on screen
+    ran = compared(order)
+    if ran is not None:
+        order = ran[0]  # that of the first episode, whichever is on screen
     episodes = int(
         st.segmented_control(
             "Episodes",
@@ -59,7 +59,7 @@ def comparison(order: Order) -> None:
                 st.session_state["_compared"] = (order, episodes)
                 st.rerun()
         return
-    if found != (order, episodes):
+    if ran != (order, episodes):
         st.session_state["_compared"] = (order, episodes)
         st.rerun()  # the recorder above shows their steps
     rows, table = [], []

@@ -28,7 +28,8 @@ from sarl_core.mining.language import action_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
-from sarl_dashboard.jobs.replays import Order, Replay, compared, kept_comparisons
+from sarl_dashboard.jobs.replays import Played, Replay, compared, kept_comparisons
+from sarl_dashboard.views.replay.run import jump_to
 
 CHANGED, OUTSIDE = "changed by the rules", "outside the data"
 EVERY_RULE, EVERY_EPISODE = "every rule", "every episode"
@@ -65,16 +66,15 @@ class Recorded:
         return int(np.searchsorted(self.steps.episode, self.shown)) + step
 
 
-def flight_recorder(replay: Replay, order: Order, current: int) -> None:
+def flight_recorder(played: Played, current: int) -> None:
     """The table of steps, in the fragment of the slider: a chosen row is a moved slider.
 
     Args:
-        replay: On screen.
-        order: Asked for it.
+        played: On screen.
         current: The step that is chosen.
     """
     st.html(heading("Flight recorder"))
-    recorded = source(replay, order)
+    recorded = source(played)
     steps = recorded.steps
     chosen, name = filters(recorded)
     rows = chosen.rows(steps)
@@ -86,7 +86,7 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
         )
         return
     place = place_of(rows, recorded.row(current))
-    page = page_of(rows, place, (replay.key, chosen, current))
+    page = page_of(rows, place, (played.replay.key, chosen, current))
     on_page = rows[page * PAGE : (page + 1) * PAGE]
     selected = [] if place is None or place // PAGE != page else [place % PAGE]
     wanted: Any = {"selection": {"rows": selected, "columns": [], "cells": []}}
@@ -115,11 +115,13 @@ def flight_recorder(replay: Replay, order: Order, current: int) -> None:
         downloads(recorded, rows, text)
 
 
-def source(replay: Replay, order: Order) -> Recorded:
+def source(played: Played) -> Recorded:
     """The episode on screen, or all that it was compared over."""
-    found = compared(order)
-    runs = None if found is None else kept_comparisons().get((found[0].request, found[1]))
-    if found is not None and runs is not None and runs[0][1].steps is not None:
+    replay, comparison = played.replay, compared(played.order)
+    runs = None
+    if comparison is not None:
+        runs = kept_comparisons().get((comparison[0].request, comparison[1]))
+    if comparison is not None and runs is not None and runs[0][1].steps is not None:
         several = runs[0][1]
         if (
             st.segmented_control(
@@ -133,7 +135,7 @@ def source(replay: Replay, order: Order) -> Recorded:
             )
             == ALL
         ):
-            shown = order.request.seed - found[0].request.seed
+            shown = replay.key.seed - comparison[0].request.seed
             return Recorded(replay, several, shown)
     return Recorded(replay, replay.shown, 0)
 
@@ -223,8 +225,7 @@ def pick(recorded: Recorded, on_page: NDArray[np.int64]) -> None:
     if episode == recorded.shown:
         st.session_state["step"] = step
         return
-    st.session_state["_elsewhere"] = (int(recorded.episodes.seeds[episode]), step)
-    st.rerun()  # as a whole: it is another replay
+    jump_to(int(recorded.episodes.seeds[episode]), step)
 
 
 def coloured(recorded: Recorded) -> bool:

@@ -1,10 +1,9 @@
-"""What came of a replay: its numbers, and its steps one by one."""
+"""The steps of a replay, one by one."""
 
 from __future__ import annotations
 
 import contextlib
 import html
-from collections.abc import Callable
 
 import numpy as np
 import streamlit as st
@@ -23,81 +22,15 @@ from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.html.step_card import picture, step_card, swatch
 from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import counted, label_text, number_text, share_text
+from sarl_core.mining.language import counted, label_text, number_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
-from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Order, Replay
+from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, Replay
+from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
 
 PLAIN = {"displayModeBar": False}
-FEW = 0.3  # share of the steps below which the rules say little about an episode
-
-
-def numbers(replay: Replay, unfiltered: Callable[[], None] | None) -> None:
-    """Returns, lengths and interventions.
-
-    Args:
-        replay: To show.
-        unfiltered: Runs it with the unfiltered rules; None where that is not to be offered.
-    """
-    plain, shielded = replay.plain, replay.shielded
-    alone = float(plain.returns[0])
-    if shielded is None:
-        with st.grid(6, min_column_width=130):
-            st.metric("Return", f"{alone:,.1f}", border=True)
-            st.metric("Length", f"{int(plain.lengths[0]):,} steps", border=True)
-        return
-    with_rules, length = float(shielded.returns[0]), int(shielded.lengths[0])
-    changed, covered = int(shielded.interventions[0]), int(shielded.covered[0])
-    with st.grid(6, min_column_width=140):
-        st.metric("Return with rules", f"{with_rules:,.1f}", border=True, height="stretch")
-        st.metric("Return without", f"{alone:,.1f}", border=True, height="stretch")
-        st.metric("Length with rules", f"{length:,}", border=True, height="stretch")
-        st.metric("Length without", f"{int(plain.lengths[0]):,}", border=True, height="stretch")
-        st.metric(
-            "Changed",
-            share_text(changed / length),
-            border=True,
-            height="stretch",
-            help=f"The rules changed the action at {changed:,} of {length:,} steps.",
-        )
-        st.metric(
-            "Covered",
-            share_text(covered / length),
-            border=True,
-            height="stretch",
-            help=f"Some rule applied at {covered:,} of {length:,} steps.",
-        )
-    beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
-    if beyond:
-        st.caption(
-            f":material/frame_inspect: At {counted(beyond, 'step')} a rule was broken outside the "
-            "data it was mined from"
-            + (
-                f"; at {withheld:,} of them it left the action as it is."
-                if withheld
-                else ": these interventions are marked as outside the data."
-            )
-        )
-    if covered < FEW * length:
-        followed = "" if changed else ", and the agent did what it says"
-        st.markdown(
-            ":material/info: :gray["
-            + (
-                f"A rule applied at {share_text(covered / length)} of the steps{followed}; "
-                "elsewhere the agent acted alone.]"
-                if covered
-                else "No rule applied at any step: the agent acted alone.]"
-            )
-        )
-        if unfiltered is not None:
-            st.button("Try the unfiltered rules", key="try_unfiltered", on_click=unfiltered)
-    elif not changed:
-        st.markdown(
-            ":material/info: :gray[The rules changed nothing in this episode: wherever one "
-            "applied, the agent did what it says.]"
-        )
 
 
 def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
@@ -136,16 +69,12 @@ def go_to(step: int) -> None:
     st.session_state["step"] = step
 
 
-def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
+def step_by_step(played: Played) -> None:
     """The strip and the return so far, and everything about the step that is looked at.
 
     The figures hold all steps already, so that only the mark over them moves with the slider.
-
-    Args:
-        replay: To show.
-        order: Asked for it.
-        linked: The set under which its rules are found on the Rules page; None if they are not.
     """
+    replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     st.subheader("Step by step")
     legend(replay.dimensions, marks=shielded)
@@ -180,7 +109,7 @@ def step_by_step(replay: Replay, order: Order, *, linked: str | None) -> None:
             key="return",
             alt="Return so far, step by step",
         )
-    at_step(replay, order, timeline, linked)
+    at_step(played, timeline)
 
 
 def mark_style(timeline: Timeline) -> str:
@@ -200,52 +129,31 @@ def mark_style(timeline: Timeline) -> str:
 
 
 @st.fragment(key="at_step")
-def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None) -> None:
+def at_step(played: Played, timeline: Timeline) -> None:
     """The slider, and the step it stands at.
 
     Args:
-        replay: To show.
-        order: Asked for it.
+        played: To show.
         timeline: Of the figures above.
-        linked: The set under which its rules are found on the Rules page; None if they are not.
     """
+    replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
+    # Under which set the Rules page has these rules.
+    linked = SHOWN_AS.get(replay.key.rules)
     last = len(steps) - 1
     if "_step" in st.session_state:
         st.session_state["step"] = st.session_state.pop("_step")
-    kept = st.session_state.get("step")
-    if kept is not None and not 0 <= kept <= last:
-        st.session_state["step"] = min(max(kept, 0), last)
+    step_before = st.session_state.get("step")
+    if step_before is not None and not 0 <= step_before <= last:
+        st.session_state["step"] = min(max(step_before, 0), last)
     current = 0
     if last > 0:
         current = int(st.slider("Step", 0, last, key="step", bind="query-params"))
     mark = f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>"
-    if not shielded:
-        st.html(mark)
+    if shielded:
+        changes(replay, current, mark)
     else:
-        changes = np.flatnonzero(steps.intervened)
-        before, after = changes[changes < current], changes[changes > current]
-        with st.container(horizontal=True, vertical_alignment="center"):
-            st.button(
-                "Previous change",
-                icon=":material/skip_previous:",
-                on_click=go_to,
-                args=(int(before[-1]) if len(before) else current,),
-                disabled=not len(before),
-                key="previous",
-            )
-            st.button(
-                "Next change",
-                icon=":material/skip_next:",
-                on_click=go_to,
-                args=(int(after[0]) if len(after) else current,),
-                disabled=not len(after),
-                key="next",
-            )
-            st.html(
-                f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changes):,} of '
-                f"{len(steps):,} steps were changed. {flips_text(replay.shown)}</span>"
-            )
+        st.html(mark)
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
@@ -263,12 +171,45 @@ def at_step(replay: Replay, order: Order, timeline: Timeline, linked: str | None
         if linked is not None:
             link_rules(view, linked)
     if shielded:
-        fork_section(replay, order, current)
-    flight_recorder(replay, order, current)
+        fork_section(played, current)
+    flight_recorder(played, current)
     # The pictures beside it are made while nobody waits for them.
     for step in (current + 1, current - 1):
         if 0 <= step <= last:
             replay.png(step)
+
+
+def changes(replay: Replay, current: int, mark: str) -> None:
+    """Ways to the changes before and after a step, and how many there are.
+
+    Args:
+        replay: To show.
+        current: The step.
+        mark: Style that puts the mark over the figures; in one piece with the text.
+    """
+    changed = np.flatnonzero(replay.steps.intervened)
+    before, after = changed[changed < current], changed[changed > current]
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.button(
+            "Previous change",
+            icon=":material/skip_previous:",
+            on_click=go_to,
+            args=(int(before[-1]) if len(before) else current,),
+            disabled=not len(before),
+            key="previous",
+        )
+        st.button(
+            "Next change",
+            icon=":material/skip_next:",
+            on_click=go_to,
+            args=(int(after[0]) if len(after) else current,),
+            disabled=not len(after),
+            key="next",
+        )
+        st.html(
+            f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changed):,} of '
+            f"{len(replay.steps):,} steps were changed. {flips_text(replay.shown)}</span>"
+        )
 
 
 def flips_text(episodes: Episodes) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining.html.headings import heading
-from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table
+from sarl_core.explaining.html.lit_path import lit_path_table
 from sarl_core.explaining.html.what_if import (
     PLACED,
     changes_html,
@@ -23,51 +24,61 @@ from sarl_core.explaining.html.what_if_bars import lines_html
 from sarl_core.explaining.words.what_if import node_of_way
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.tree import PolicyTree
-from sarl_core.shielding.near import DecisionChange, Line, Neighbourhood, decision_changes
-from sarl_core.shielding.sampling import Span
+from sarl_core.shielding.near import DecisionChange, Line, decision_changes
 from sarl_dashboard.components.tree_picture import show_tree
+from sarl_dashboard.views.what_if.proposal import proposal
+from sarl_dashboard.views.what_if.rules import RulesOnTrees
+from sarl_dashboard.views.what_if.situation import Situation
+from sarl_dashboard.views.what_if.state import sliders, source_choice
 
 MISSES, PAIRS = 8, 4  # near misses that lack one feature, and two
 
 
-def show(
-    beside: DeltaGenerator,
-    neighbourhood: Neighbourhood,
-    state: NDArray[np.float32],
-    action: Any,
-    spans: Sequence[Span],
-    spreads: NDArray[np.float64],
-    order: Sequence[int],
-    *,
-    trees: tuple[PolicyTree, ...],
-    leaves: bool,
-    finder: Callable[[], PathFinder],
-    key: str,
-) -> None:
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked.
+
+    Attributes:
+        situation: The rules, and where states lie.
+        state: Shape (d,).
+        action: What the agent wants.
+    """
+
+    situation: Situation
+    state: NDArray[np.float32]
+    action: Any
+
+
+@st.fragment
+def question_and_answer(situation: Situation) -> None:
+    """Everything that answers to a slider."""
+    source_choice(situation)
+    left, right = st.columns([4, 7], gap="large")
+    with left:
+        action = proposal(situation.rules.rule_set.actions)
+        st.markdown("**The state**")
+        state = sliders(situation)
+    answer(Question(situation, state, action), right)
+
+
+def answer(question: Question, beside: DeltaGenerator) -> None:
     """What the shield does in a state, and what lies near it.
 
     Args:
+        question: The state.
         beside: Where the decision is shown, beside the sliders.
-        neighbourhood: The shield's.
-        state: Shape (d,).
-        action: What the agent wants.
-        spans: Of each feature.
-        spreads: What a change of each feature is measured in.
-        order: The features, from top to bottom.
-        trees: Of each action dimension, grown from the chosen data.
-        leaves: Whether every leaf of them is a rule.
-        finder: Follows a state through the rules, which may be of other trees.
-        key: Tells the rules from all others.
     """
+    situation, state, action = question.situation, question.state, question.action
+    neighbourhood, spans, spreads = situation.neighbourhood, situation.spans, situation.spreads
+    rules, order = situation.rules, situation.order
     rule_set = neighbourhood.shield.rule_set
     decision = neighbourhood.shield.decide(state, action)
     lines = neighbourhood.lines(state, action)
     # Few pieces of HTML, and not a widget for each table: a moved slider draws all of them anew.
     with beside:
         dimension = chosen_dimension(rule_set)
-        found = decision.rules[dimension]
-        rule = None if found is None else rule_set.rules[found]
+        index = decision.rules[dimension]
+        rule = None if index is None else rule_set.rules[index]
         with st.container(border=True, key="decision"):
             st.html(decision_html(decision, rule, state, rule_set, neighbourhood.shield.outside))
         with st.container(key="lines"):
@@ -90,13 +101,14 @@ def show(
         ]
         st.html(misses_html(misses, rule_set))
     node = None
-    if dimension < len(trees):
-        node = node_of_way(rule, state, rule_set, trees[dimension], leaves=leaves)
+    if dimension < len(rules.trees):
+        tree = rules.trees[dimension]
+        node = node_of_way(rule, state, rule_set, tree, leaves=rules.leaves)
     if node is None:
-        way = finder().path(dimension, state, -1 if found is None else found)
+        way = situation.finder.path(dimension, state, -1 if index is None else index)
         st.html(way_html(lit_path_table(way, rule_set, dimension), rule))
     else:
-        way_through(rule, node, trees[dimension], rule_set, leaves=leaves, key=key)
+        way_through(rules, dimension, rule, node)
 
 
 def chosen_dimension(rule_set: RuleSet) -> int:
@@ -127,16 +139,14 @@ def least_changes(
     )
 
 
-def way_through(
-    rule: Rule | None, node: int, tree: PolicyTree, rule_set: RuleSet, *, leaves: bool, key: str
-) -> None:
-    """The way of the state through the tree."""
+def way_through(rules: RulesOnTrees, dimension: int, rule: Rule | None, node: int) -> None:
+    """The way of the state through the tree, to a node."""
     placed = f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""
     st.html(heading("Its way through the tree") + placed)
     show_tree(
-        key,
-        tree,
-        rule_set.thresholds,
+        rules.key,
+        rules.trees[dimension],
+        rules.rule_set.thresholds,
         node,
         around="Around it",
         widget="whole_tree",
@@ -144,5 +154,5 @@ def way_through(
         if rule is not None and rule.origin == "mined"
         else "The lit path is the state's: it ends at a leaf, and no part of it is a mined rule "
         "that applies.",
-        leaves=leaves,
+        leaves=rules.leaves,
     )

@@ -1,0 +1,70 @@
+"""What a replay is of, and the film of it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import streamlit as st
+
+from sarl_dashboard.components.settings import no_boxes_notice, notes_notice
+from sarl_dashboard.jobs.replays import Replay, movie
+from sarl_dashboard.state.agents import FRESH_SEED
+from sarl_dashboard.state.environments import demonstrated
+from sarl_dashboard.state.rule_files import NO_RULES, OWN_FILE
+from sarl_dashboard.text import escaped
+from sarl_dashboard.views.replay.settings import Settings
+
+
+def headline(replay: Replay, settings: Settings) -> None:
+    """Whose episode it is, and what should be known about it.
+
+    Args:
+        replay: To show.
+        settings: As they are now.
+    """
+    request, rule_set = replay.key, replay.rule_set
+    st.markdown(
+        f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(request.env_id)}**, seed "
+        f"{request.seed}"
+        + (f", {len(rule_set):,} rules ({request.rules})" if rule_set else "")
+        + (
+            ""
+            if settings.ask_for(request)
+            else "  \n:orange[:material/info: The settings have changed since: press Run.]"
+        )
+    )
+    notes_notice(note for episode in replay.film.episodes for note in episode.remarks)
+    no_boxes_notice([] if rule_set is None else [rule_set], request.outside)
+
+
+def film(replay: Replay) -> None:
+    """The episode as a film, and the film as files."""
+    request = replay.key
+    if request.rules not in (OWN_FILE, NO_RULES) and demonstrated(request.env_id, request.seed, 1):
+        st.caption(
+            ":material/casino: The demonstrations have an episode of this seed, where the rules "
+            f"know the way. A seed such as {FRESH_SEED:,} shows what they bring elsewhere."
+        )
+    gif = replay.film.gif()
+    st.image(gif, width="content", alt="The episode, with the rules and without")
+    env = request.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+    name = f"replay-{env}-{request.agent}-{request.seed}"
+    with st.container(horizontal=True):
+        st.download_button(
+            "Download GIF",
+            gif,
+            f"{name}.gif",
+            "image/gif",
+            key="gif",
+            on_click="ignore",
+            icon=":material/download:",
+        )
+        st.download_button(
+            "Download MP4",
+            partial(movie, replay),
+            f"{name}.mp4",
+            "video/mp4",
+            key="mp4",
+            on_click="ignore",
+            icon=":material/download:",
+        )

@@ -1,0 +1,88 @@
+"""What came of a replay, in numbers."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.rules import UNFILTERED
+from sarl_dashboard.jobs.replays import Replay
+from sarl_dashboard.state.rule_files import CHOSEN
+
+FEW = 0.3  # share of the steps below which the rules say little about an episode
+
+
+def numbers(replay: Replay) -> None:
+    """Returns, lengths and interventions."""
+    plain, shielded = replay.plain, replay.shielded
+    alone = float(plain.returns[0])
+    if shielded is None:
+        with st.grid(6, min_column_width=130):
+            st.metric("Return", f"{alone:,.1f}", border=True)
+            st.metric("Length", f"{int(plain.lengths[0]):,} steps", border=True)
+        return
+    with_rules, length = float(shielded.returns[0]), int(shielded.lengths[0])
+    changed, covered = int(shielded.interventions[0]), int(shielded.covered[0])
+    with st.grid(6, min_column_width=140):
+        st.metric("Return with rules", f"{with_rules:,.1f}", border=True, height="stretch")
+        st.metric("Return without", f"{alone:,.1f}", border=True, height="stretch")
+        st.metric("Length with rules", f"{length:,}", border=True, height="stretch")
+        st.metric("Length without", f"{int(plain.lengths[0]):,}", border=True, height="stretch")
+        st.metric(
+            "Changed",
+            share_text(changed / length),
+            border=True,
+            height="stretch",
+            help=f"The rules changed the action at {changed:,} of {length:,} steps.",
+        )
+        st.metric(
+            "Covered",
+            share_text(covered / length),
+            border=True,
+            height="stretch",
+            help=f"Some rule applied at {covered:,} of {length:,} steps.",
+        )
+    beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
+    if beyond:
+        st.caption(
+            f":material/frame_inspect: At {counted(beyond, 'step')} a rule was broken outside the "
+            "data it was mined from"
+            + (
+                f"; at {withheld:,} of them it left the action as it is."
+                if withheld
+                else ": these interventions are marked as outside the data."
+            )
+        )
+    if covered < FEW * length:
+        followed = "" if changed else ", and the agent did what it says"
+        st.markdown(
+            ":material/info: :gray["
+            + (
+                f"A rule applied at {share_text(covered / length)} of the steps{followed}; "
+                "elsewhere the agent acted alone.]"
+                if covered
+                else "No rule applied at any step: the agent acted alone.]"
+            )
+        )
+        if _unfiltered_differ(replay):
+            st.button("Try the unfiltered rules", key="try_unfiltered", on_click=_try_unfiltered)
+    elif not changed:
+        st.markdown(
+            ":material/info: :gray[The rules changed nothing in this episode: wherever one "
+            "applied, the agent did what it says.]"
+        )
+
+
+def _unfiltered_differ(replay: Replay) -> bool:
+    """Whether the rules were filtered, from demonstrations that are at hand."""
+    return (
+        replay.key.rules in (CHOSEN, "filtered")
+        and replay.rule_set is not None
+        and replay.rule_set.thresholds != UNFILTERED
+    )
+
+
+def _try_unfiltered() -> None:
+    """Choose the unfiltered rules and run; for a callback."""
+    st.session_state["rules"] = "unfiltered"
+    st.session_state["_run"] = True

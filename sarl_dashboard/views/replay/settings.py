@@ -1,0 +1,132 @@
+"""The settings of the page Replay, and the order that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import SarlError
+from sarl_core.explaining.replay import named_description
+from sarl_core.rollouts.player import shield_for
+from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Outside, Shield
+from sarl_dashboard.components.settings import (
+    environment_choice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
+from sarl_dashboard.jobs.replays import Order, Request
+from sarl_dashboard.state.agents import (
+    AGENTS,
+    FRESH_SEED,
+    PROJECTIONS,
+    PolicyFile,
+    agent_for,
+    policy_upload,
+)
+from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.environments import continuous, environment_of
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, NO_RULES, OWN_FILE, PAPERS
+from sarl_dashboard.text import digest_of
+
+RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """What the widgets say; what it asks for is put together when it is needed."""
+
+    env: str | None
+    agent: str
+    policy_file: PolicyFile | None
+    rules: str
+    rule_file: UploadedFile | None
+    seed: int
+    projection: Projection
+    outside: Outside
+
+    def order(self) -> Order:
+        """What is asked for.
+
+        Raises:
+            SarlError: If it cannot be had.
+        """
+        env_id = environment_of(self.env)
+        rule_set, rules_digest = rules_for(self.rules, self.rule_file)
+        if rule_set is not None:
+            rule_set = shield_for(env_id, Shield(rule_set)).rule_set
+        make, digest = agent_for(self.agent, self.policy_file, env_id, self.seed)
+        described = named_description(
+            describe_environment(env_id), rule_set, chosen_demonstrations()
+        )
+        request = Request(
+            env_id,
+            self.agent,
+            digest,
+            self.rules,
+            rules_digest,
+            self.projection,
+            self.seed,
+            self.outside,
+            digest_of(repr(described).encode()),
+        )
+        return Order(request, make, rule_set, described)
+
+    def ask_for(self, request: Request) -> bool:
+        """Whether they still ask for what is on screen."""
+        try:
+            return self.order().request == request
+        except SarlError:
+            return False
+
+
+def settings() -> Settings:
+    """The widgets."""
+    with st.container(border=True):
+        in_a_row = 6 if continuous(st.session_state.get("env")) else 5
+        with st.grid(in_a_row, min_column_width=150, gap="small"):
+            env = environment_choice()
+            agent = st.selectbox(
+                "Agent",
+                AGENTS,
+                key="agent",
+                bind="query-params",
+                help="Novice: random actions. Untrained: a fresh network, its actions sampled. "
+                "Expert: the one that is shipped for this environment. Own file: a policy "
+                "of yours.",
+            )
+            rules = st.selectbox(
+                "Rules",
+                offered_rule_sets(RULE_SETS),
+                key="rules",
+                bind="query-params",
+                help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
+                "is shipped for this environment. Edited: what you made of them on the Edit page. "
+                "Own file: rules you saved. None: the agent alone.",
+            )
+            seed = st.number_input(
+                "Seed",
+                0,
+                2**31 - 1,
+                FRESH_SEED,
+                key="seed",
+                bind="query-params",
+                help="Both runs start in the same state and draw the same random numbers; the "
+                "same seed gives the same replay.",
+            )
+            projection = PROJECTIONS[0]
+            if continuous(env):
+                projection = projection_choice()
+            outside = outside_choice()
+        policy_file = rule_file = None
+        if agent == OWN_FILE:
+            policy_file = policy_upload("Policy", "policy_file", env)
+        if rules == OWN_FILE:
+            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+    return Settings(env, agent, policy_file, rules, rule_file, int(seed or 0), projection, outside)

@@ -1,0 +1,73 @@
+"""The rules that the page What if asks about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.rule_order import fits, rules_for
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.state import compact_set, edits
+from sarl_dashboard.state.data import data_key
+from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.thresholds import chosen_divider
+
+IN_FORCE, EDITED = "as mined", "edited"
+
+
+@dataclass(frozen=True, eq=False)
+class RulesOnTrees:
+    """Rules, and the trees on which the way of a state is shown.
+
+    Attributes:
+        rule_set: The rules.
+        key: Tells them from all others.
+        trees: Of each action dimension, grown from the chosen data.
+        leaves: Whether every leaf of them is a rule.
+    """
+
+    rule_set: RuleSet
+    key: str
+    trees: tuple[PolicyTree, ...]
+    leaves: bool
+
+
+def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
+    """The set in force, or the same with the edits."""
+    compact = compact_set.chosen_compact(demonstrations)
+    if compact is not None:
+        in_force = RulesOnTrees(compact.counted, compact.digest, compact.trees, True)
+    else:
+        trees = grown_trees(demonstrations, chosen_divider())
+        mined = mined_rules(trees)
+        key = repr((data_key(), mined.source.digest, mined.thresholds, mined.divider))
+        in_force = RulesOnTrees(mined, key, trees, False)
+    if (
+        not edits.offered()
+        or st.segmented_control(
+            "Rules",
+            [IN_FORCE, EDITED],
+            default=IN_FORCE,
+            key="edits",
+            bind="query-params",
+            required=True,
+        )
+        != EDITED
+    ):
+        return in_force
+    edited, digest = edits.edited_rules()
+    if fits(edited, demonstrations):
+        edited, notes = rules_for(edited, demonstrations)
+        notes_notice(notes)
+        return RulesOnTrees(edited, f"edited {digest}", in_force.trees, in_force.leaves)
+    st.info(
+        "The edited rules speak of other features or actions than the chosen demonstrations, "
+        "so the rules in force are shown instead; choose the demonstrations of their "
+        "environment in the sidebar.",
+        icon=":material/swap_horiz:",
+    )
+    return in_force

@@ -1,0 +1,81 @@
+"""What the page What if asks about: the shield, and where states lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.html.lit_path import PathFinder
+from sarl_core.explaining.words.what_if import by_use
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.shielding.near import Neighbourhood, feature_spreads
+from sarl_core.shielding.sampling import Span, feature_spans
+from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.cache import cached
+from sarl_dashboard.views.what_if.rules import RulesOnTrees
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Rules in force, and the demonstrations that states are taken from and measured by.
+
+    Attributes:
+        demonstrations: The chosen ones.
+        rules: The rules.
+        neighbourhood: The shield, laid out for questions about single states.
+        spans: Where the values of each feature lie.
+        spreads: What a change of each feature is measured in.
+    """
+
+    demonstrations: Demonstrations
+    rules: RulesOnTrees
+    neighbourhood: Neighbourhood
+    spans: tuple[Span, ...]
+    spreads: NDArray[np.float64]
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """The features, those first that most rules ask about."""
+        return _order(self.rules.key, self.rules.rule_set)
+
+    @property
+    def finder(self) -> PathFinder:
+        """Follows a state through rules that are of no tree at hand."""
+        return _finder(self.rules.key, self.rules.rule_set)
+
+
+def situation_of(
+    demonstrations: Demonstrations, rules: RulesOnTrees, projection: Projection, outside: Outside
+) -> Situation:
+    """Rules in force; they are laid out once."""
+    neighbourhood = _neighbourhood(rules.key, projection, outside, rules.rule_set)
+    spans, spreads = _spans(demonstrations.digest, demonstrations)
+    return Situation(demonstrations, rules, neighbourhood, spans, spreads)
+
+
+@cached(show_spinner="Laying out the rules …")
+def _neighbourhood(
+    key: str, projection: Projection, outside: Outside, _rule_set: RuleSet
+) -> Neighbourhood:
+    return Neighbourhood(Shield(_rule_set, projection=projection, outside=outside))
+
+
+@cached()
+def _spans(
+    digest: str, _demonstrations: Demonstrations
+) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
+    observations = _demonstrations.observations
+    return feature_spans(observations), feature_spreads(observations)
+
+
+@cached()
+def _order(key: str, _rule_set: RuleSet) -> tuple[int, ...]:
+    return by_use(_rule_set)
+
+
+@cached()
+def _finder(key: str, _rule_set: RuleSet) -> PathFinder:
+    return PathFinder(_rule_set)
