@@ -132,21 +132,30 @@ def test_imports_go_one_way():
     assert done.returncode == 0, done.stdout
 
 
-def test_the_contract_would_notice_a_dashboard_in_the_library(tmp_path):
-    """The line is drawn where the design draws it: a copy that crosses it is refused."""
+@pytest.mark.parametrize(
+    ("crossing", "name"),
+    [
+        ("sarl_core.errors", "streamlit"),
+        ("sarl_dashboard.state.url", "pages.evidence"),
+        ("sarl_dashboard.views.edit.table", "sarl_dashboard.views.replay.steps"),
+        ("pages.edit", "pages.replay"),
+    ],
+)
+def test_the_contracts_would_notice_who_crosses_a_line(tmp_path, crossing, name):
+    """The lines are drawn where the design draws them: a copy that crosses one is refused."""
     (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
-    for path in [path for name in PACKAGES for path in (ROOT / name).rglob("*.py")]:
+    for path in [path for name in (*PACKAGES, "pages") for path in (ROOT / name).rglob("*.py")]:
         copy = tmp_path / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text())
-    with (tmp_path / "sarl_core" / "errors.py").open("a") as file:
-        file.write("\nimport streamlit\n")
+    with tmp_path.joinpath(*crossing.split(".")).with_suffix(".py").open("a") as file:
+        file.write(f"\nimport {name}\n")
     linter = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run(
         [linter, "--no-cache"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode != 0
-    assert "sarl_core.errors -> streamlit" in done.stdout
+    assert f"{crossing} -> {name}" in done.stdout
 
 
 def test_no_folder_holds_more_files_than_one_finds_something_in():
