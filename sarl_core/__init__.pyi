@@ -1,18 +1,23 @@
 # The public names, each with its home: what is loaded when, and what type checkers see.
+from .agents.agent import make_agent as make_agent
 from .demonstrations.dataset import Demonstrations as Demonstrations
 from .demonstrations.formats import load_demonstrations as load_demonstrations
 from .demonstrations.formats import save_demonstrations as save_demonstrations
 from .errors import InputError as InputError
 from .errors import SarlError as SarlError
 from .errors import WorkError as WorkError
+from .explaining.exports.export import export_rules as export_rules
+from .explaining.report.report import make_report as make_report
 from .mining.algorithm_1 import mine_rules as mine_rules
 from .mining.classifier import RuleClassifier as RuleClassifier
 from .mining.landscape import Landscape as Landscape
 from .mining.landscape import threshold_landscape as threshold_landscape
 from .mining.rule_set import RuleSet as RuleSet
+from .mining.rule_set import load_rules as load_rules
 from .mining.rules import Rule as Rule
 from .mining.tree import PolicyTree as PolicyTree
 from .mining.tree import grow_policy_trees as grow_policy_trees
+from .rendering.replay import render_episode as render_episode
 from .rollouts.episodes import Episodes as Episodes
 from .rollouts.episodes import rollout as rollout
 from .rollouts.recording import record as record

@@ -73,13 +73,19 @@ def export(
             else "--demonstrations are for --rounded; give both, or neither"
         )
     with terminal.working("Exporting"):
-        from sarl_core.explaining.exports.export import prepare, save_export
+        from sarl_core.explaining.exports.export import export_rules
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
         given = None if demonstrations is None else read_demonstrations(demonstrations, env)
-        prepared = prepare(rule_set, merged=merged, demonstrations=given)
-        vectors = save_export(prepared.rule_set, out, projection, on_invalid)
+        vectors, prepared = export_rules(
+            rule_set,
+            out,
+            merged=merged,
+            demonstrations=given,
+            projection=projection,
+            on_invalid=on_invalid,
+        )
         notes = (*(given.notes if given is not None else ()), *prepared.notes)
     if as_json:
         terminal.print_json({**_document(prepared, out, vectors), "notes": list(notes)})

@@ -15,7 +15,7 @@ from sarl_core.cli.options import Json, MaxSteps, Normalise
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
 
-# Those of `Wishes`, which is not loaded for --help.
+# Those of `make_report`, which is not loaded for --help.
 _IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
 
 
@@ -94,9 +94,8 @@ def report(
     with terminal.working("Making the report") as advance:
         from sarl_core.explaining.report.comparison import read_results
         from sarl_core.explaining.report.provenance import command_line, mining_command
-        from sarl_core.explaining.report.report import Wishes, make_report
+        from sarl_core.explaining.report.report import make_report
         from sarl_core.explaining.report.thresholds import read_card
-        from sarl_core.files import whole_file
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
@@ -117,7 +116,9 @@ def report(
             "--out": out,
         }
         mined = mining_command(rule_set, rules, demonstrations, given, env=env)
-        wishes = Wishes(
+        found = make_report(
+            rule_set,
+            given,
             in_full=in_full,
             frames=frames,
             env_id=env or "",
@@ -131,17 +132,11 @@ def report(
             ),
             rules_name=rules.name,
             demonstrations_name=demonstrations.name,
-        )
-        found = make_report(
-            rule_set,
-            given,
-            wishes,
             card=card,
             comparison=results,
             progress=advance,
         )
-        with whole_file(out) as unfinished:
-            unfinished.write_text(found.html, encoding="utf-8", newline="\n")
+        found.save(out)
     size = len(found.html.encode())
     if as_json:
         terminal.print_json(

@@ -95,7 +95,7 @@ class Reporting(Job):
         report = make_report(
             order.rule_set,
             order.demonstrations,
-            order.wishes,
+            **vars(order.wishes),
             card=order.card,
             comparison=order.comparison,
             trees=order.trees,

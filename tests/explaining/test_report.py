@@ -24,7 +24,7 @@ from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 
 DATA = Path(__file__).parents[2] / "data"
-PLAIN = Wishes(frames=0)
+PLAIN = {"frames": 0}
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>{{ 7*7 }}"
 VOID = {"meta", "img", "br", "rect", "line", "circle"}
 
@@ -87,8 +87,8 @@ def named(demonstrations: Demonstrations, text: str) -> Demonstrations:
 
 
 def test_a_report_is_one_file_that_asks_for_nothing(cart: Demonstrations, rules: RuleSet) -> None:
-    wishes = Wishes(frames=1, in_full=3, episodes=2)
-    report = make_report(rules, cart, wishes)
+    wishes = {"frames": 1, "in_full": 3, "episodes": 2}
+    report = make_report(rules, cart, **wishes)
     page = Page(report.html)
     assert not {"script", "link", "iframe", "object", "form"} & {tag for tag, _ in page.tags}
     for tag, attributes in page.tags:
@@ -114,13 +114,13 @@ def test_a_report_is_one_file_that_asks_for_nothing(cart: Demonstrations, rules:
     assert len(set(ids)) == len(ids)
     targets = {(a["href"] or "")[1:] for tag, a in page.tags if tag == "a"}
     assert targets <= set(ids)
-    assert make_report(rules, cart, wishes).html == report.html
+    assert make_report(rules, cart, **wishes).html == report.html
 
 
 def test_headings_do_not_skip_a_level(cart: Demonstrations, two_torques: Demonstrations) -> None:
     for data in (cart, two_torques):
         found = mine_rules(data, supp_min=0.05, conf_min=0.9)
-        page = Page(make_report(found, data, PLAIN).html)
+        page = Page(make_report(found, data, **PLAIN).html)
         levels = [int(tag[1]) for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
         assert levels[0] == 1
         assert levels.count(1) == 1
@@ -128,7 +128,7 @@ def test_headings_do_not_skip_a_level(cart: Demonstrations, two_torques: Demonst
 
 
 def test_counts_are_those_of_the_data(cart: Demonstrations, rules: RuleSet) -> None:
-    text = Page(make_report(rules, cart, PLAIN).html).text
+    text = Page(make_report(rules, cart, **PLAIN).html).text
     covered = np.zeros(len(cart), dtype=bool)
     for rule in rules.rules:
         inside = np.ones(len(cart), dtype=bool)
@@ -142,7 +142,7 @@ def test_counts_are_those_of_the_data(cart: Demonstrations, rules: RuleSet) -> N
 
 
 def test_the_plane_holds_what_mining_gives(cart: Demonstrations, rules: RuleSet) -> None:
-    html = make_report(rules, cart, PLAIN).html
+    html = make_report(rules, cart, **PLAIN).html
     plane = html.split('<table class="plane">')[1].split("</table>")[0]
     supports = [float(value) for value in re.findall(r'<th scope="col">([\d.]+)</th>', plane)]
     rows = re.findall(r'<tr><th scope="row">([\d.]+)</th>(.*?)</tr>', plane, flags=re.S)
@@ -164,7 +164,9 @@ def test_names_from_files_are_only_ever_text(cart: Demonstrations) -> None:
     report = make_report(
         found,
         data,
-        Wishes(rules_name=HOSTILE, demonstrations_name=HOSTILE, commands=(HOSTILE,)),
+        rules_name=HOSTILE,
+        demonstrations_name=HOSTILE,
+        commands=(HOSTILE,),
         card={"chosen_by": HOSTILE, "reported_on": HOSTILE, "command": HOSTILE},
         comparison=(result,),
     )
@@ -179,7 +181,7 @@ def test_names_from_files_are_only_ever_text(cart: Demonstrations) -> None:
 
 def test_of_a_large_set_some_stand_in_full_and_the_rest_in_a_table(cart: Demonstrations) -> None:
     found = mine_rules(cart, supp_min=0.0, conf_min=1.0)
-    report = make_report(found, cart, dataclasses.replace(PLAIN, in_full=20))
+    report = make_report(found, cart, **PLAIN, in_full=20)
     page = Page(report.html)
     assert report.in_full == 20
     assert sum(a.get("class") == "rule" for tag, a in page.tags if tag == "article") == 20
@@ -193,7 +195,7 @@ def test_of_a_large_set_some_stand_in_full_and_the_rest_in_a_table(cart: Demonst
 
 def test_continuous_actions_in_several_dimensions(two_torques: Demonstrations) -> None:
     found = mine_rules(two_torques, supp_min=0.05, conf_min=0.8, divider=12)
-    page = Page(make_report(found, two_torques, dataclasses.replace(PLAIN, in_full=4)).html)
+    page = Page(make_report(found, two_torques, **PLAIN, in_full=4).html)
     assert "divided into 12 equal intervals" in page.text
     assert {"hip", "knee"} <= {word.strip() for word in page.words}
     for dimension in range(2):
@@ -213,7 +215,7 @@ def test_compact_rules_are_told_by_their_budget_and_their_card() -> None:
     card = read_card(path)
     assert card is not None
     rule_set = RuleSet.load(path)
-    page = Page(make_report(rule_set, data, PLAIN, card=card).html)
+    page = Page(make_report(rule_set, data, **PLAIN, card=card).html)
     assert f"The budget was {card['budget']:,} rules" in page.text
     assert f"{card['reported']['mean']:.0f}" in page.text
     assert "made from other data than the demonstrations" in page.text
@@ -232,19 +234,19 @@ def test_an_environment_that_cannot_be_had_leaves_a_report_without_pictures(
         data = dataclasses.replace(cart, env_id=env_id)
         source = dataclasses.replace(rules.source, env_id=env_id, digest=data.digest)
         found = dataclasses.replace(rules, source=source)
-        report = make_report(found, data, Wishes(episodes=1))
+        report = make_report(found, data, episodes=1)
         assert reason in report.without
         assert report.pictures == 0
         assert report.without in Page(report.html).text
     with pytest.raises(InputError, match="Nowhere-v9"):
-        make_report(rules, cart, Wishes(env_id="Nowhere-v9"))
+        make_report(rules, cart, env_id="Nowhere-v9")
 
 
 def test_held_out_episodes_stand_beside_what_was_mined(cart: Demonstrations) -> None:
     split = hold_out(cart, 0.3, seed=1)
     found = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
     assert tally(found, cart).split
-    text = Page(make_report(found, cart, PLAIN).html).text
+    text = Page(make_report(found, cart, **PLAIN).html).text
     assert f"mined from {split.mined.n_episodes} episodes of these" in text
     for rule in found.rules:
         held = rule.held_out
@@ -272,7 +274,7 @@ def test_other_features_and_actions_are_refused_in_one_sentence(
         (continuous, "continuous"),
     ):
         with pytest.raises(InputError, match=words) as caught:
-            make_report(rules, data, PLAIN)
+            make_report(rules, data, **PLAIN)
         assert "\n" not in str(caught.value)
 
 
@@ -283,7 +285,7 @@ def test_of_one_environment_the_report_speaks_as_the_demonstrations_do(
         cart, feature_names=("a", "b", "tilt", "d"), label_names=(("left!", "right!"),)
     )
     assert data.env_id == rules.source.env_id
-    html = make_report(rules, data, PLAIN).html
+    html = make_report(rules, data, **PLAIN).html
     text = Page(html).text
     assert "the tilt is" in text
     assert "right!" in text
@@ -297,8 +299,8 @@ def test_only_a_command_that_makes_these_rules_is_printed(
     mined = mining_command(rules, "rules.json", "cart.parquet", cart, env="CartPole-v1")
     assert mined is not None
     assert "--setting filtered --env CartPole-v1 --out rules.json" in mined
-    wishes = dataclasses.replace(PLAIN, commands=(mined, "python -m sarl_core report rules.json"))
-    text = Page(make_report(rules, cart, wishes).html).text
+    wishes = PLAIN | {"commands": (mined, "python -m sarl_core report rules.json")}
+    text = Page(make_report(rules, cart, **wishes).html).text
     assert mined in text
     assert "These commands make the rules and this file again" in text
     changed = (
@@ -309,7 +311,7 @@ def test_only_a_command_that_makes_these_rules_is_printed(
     )
     for rule_set in changed:
         assert rule_set.rules != rules.rules or rule_set.actions != rules.actions
-        text = Page(make_report(rule_set, cart, wishes).html).text
+        text = Page(make_report(rule_set, cart, **wishes).html).text
         assert "sarl_core mine" not in text
         assert "This command makes this file again" in text
 
@@ -329,7 +331,7 @@ def test_what_rules_were_made_from_has_no_interval_and_other_episodes_have(
 ) -> None:
     mined, other = hold_out(cart, 0.3)
     rules = with_held_out(mine_rules(mined, supp_min=0.005, conf_min=0.95), other)
-    text = Page(make_report(rules, cart, PLAIN).html).text
+    text = Page(make_report(rules, cart, **PLAIN).html).text
     for rule in rules.rules:
         told = rule.held_out
         assert f"{rule.correct:,} of {rule.samples:,} states" in text
@@ -341,7 +343,7 @@ def test_what_rules_were_made_from_has_no_interval_and_other_episodes_have(
             f"{share_text(told.high)} is what that can tell"
         ) in text
     # Of what they were mined from alone, nothing of that kind is said.
-    plain = Page(make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, PLAIN).html)
+    plain = Page(make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, **PLAIN).html)
     assert "of its states in an episode" not in plain.text
 
 
@@ -349,7 +351,7 @@ def test_rules_of_other_demonstrations_are_judged_by_episodes(cart: Demonstratio
     first, rest = hold_out(cart, 0.5)
     rules = mine_rules(first, supp_min=0.02, conf_min=0.95)
     told = with_held_out(rules, rest).rules[0].held_out
-    text = Page(make_report(rules, rest, PLAIN).html).text
+    text = Page(make_report(rules, rest, **PLAIN).html).text
     assert f"{told.correct:,} of {told.samples:,} states" in text
     assert f"on average over {told.episodes} episodes; between {share_text(told.low)[:-2]}" in text
 
@@ -360,7 +362,7 @@ def test_rules_that_know_few_episodes_are_doubted(cart: Demonstrations) -> None:
         len(np.unique(cart.episodes[rule.applies(cart.observations)])) < 5 for rule in rules.rules
     )
     assert 0 < few < len(rules)
-    text = Page(make_report(rules, cart, PLAIN).html).text
+    text = Page(make_report(rules, cart, **PLAIN).html).text
     assert f"{few:,} rules have their states in fewer than 5 of the 30 episodes" in text
 
 
@@ -374,7 +376,7 @@ def test_a_card_that_is_none_is_refused(content: str, tmp_path: Path) -> None:
 def test_a_card_with_odd_values_is_told_as_far_as_it_goes(cart: Demonstrations) -> None:
     path = DATA / "rules" / "cartpole_compact.json"
     odd = {"budget": "many", "rounds": 3, "reported": {"mean": float("nan")}, "refined": "yes"}
-    page = Page(make_report(RuleSet.load(path), cart, PLAIN, card=odd).html)
+    page = Page(make_report(RuleSet.load(path), cart, **PLAIN, card=odd).html)
     assert "The budget" not in page.text
 
 
@@ -383,9 +385,9 @@ def test_what_rules_are_worth_elsewhere_stands_below_what_they_are_here(
 ) -> None:
     rules = mine_rules(cart, supp_min=0.0, conf_min=1.0)
     found = cross_fit(cart).at(UNFILTERED)
-    text = Page(make_report(rules, cart, PLAIN).html).text
+    text = Page(make_report(rules, cart, **PLAIN).html).text
     assert judged_sentence(found) in text
     assert parting_text(1.0, found) in text
     # Rules that were changed cannot be mined again without an episode.
     some = dataclasses.replace(rules, rules=rules.rules[1:])
-    assert "mined without it" not in Page(make_report(some, cart, PLAIN).html).text
+    assert "mined without it" not in Page(make_report(some, cart, **PLAIN).html).text

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
-from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.report.report import make_report
 from sarl_core.explaining.report.tally import tally
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 
 DATA = Path(__file__).parents[2] / "data"
-PLAIN = Wishes(frames=0)
+PLAIN = {"frames": 0}
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def words_of(text: str) -> str:
 
 
 def test_a_plain_set_is_told_as_ever(cart: Demonstrations, rules: RuleSet) -> None:
-    told = words_of(make_report(rules, cart, PLAIN).html)
+    told = words_of(make_report(rules, cart, **PLAIN).html)
     assert "at most one rule for each action applies" in told
     assert "were then" not in told
     assert "it decides" not in told
@@ -52,7 +52,7 @@ def test_a_plain_set_is_told_as_ever(cart: Demonstrations, rules: RuleSet) -> No
 
 def test_an_edited_set_is_told_as_it_is(cart: Demonstrations, rules: RuleSet) -> None:
     changed = edited(rules)
-    told = words_of(make_report(changed, cart, PLAIN).html)
+    told = words_of(make_report(changed, cart, **PLAIN).html)
     assert "at most one rule for each action" not in told
     assert "Several may apply; the first, in this order, decides" in told
     assert "1 rule was then switched off, 1 written by hand." in told
@@ -62,7 +62,7 @@ def test_an_edited_set_is_told_as_it_is(cart: Demonstrations, rules: RuleSet) ->
 
 def test_each_rule_says_how_many_states_it_decides(cart: Demonstrations, rules: RuleSet) -> None:
     changed = edited(rules)
-    told = words_of(make_report(changed, cart, PLAIN).html)
+    told = words_of(make_report(changed, cart, **PLAIN).html)
     column = cart.observations[:, 3]
     taken = column > 0
     assert f"({int(taken.sum()):,})" in told
@@ -84,7 +84,7 @@ def test_the_states_of_a_rule_that_decides_none_are_shown(
 ) -> None:
     def bars(rule_set: RuleSet) -> list[list[str]]:
         cards = re.findall(
-            r"<article.*?</article>", make_report(rule_set, cart, PLAIN).html, flags=re.S
+            r"<article.*?</article>", make_report(rule_set, cart, **PLAIN).html, flags=re.S
         )
         return [re.findall(r'<td class="wide">.*?</td>', card) for card in cards]
 
@@ -97,7 +97,7 @@ def test_the_headline_counts_rules_that_are_on(cart: Demonstrations, rules: Rule
         dataclasses.replace(rule, enabled=index == 0) for index, rule in enumerate(rules.rules)
     )
     off = dataclasses.replace(rules, rules=only)
-    told = words_of(make_report(off, cart, PLAIN).html)
+    told = words_of(make_report(off, cart, **PLAIN).html)
     merged = len({condition.feature for condition in only[0].conditions})
     assert re.search(rf"\b1 rule {merged}\.0 conditions a rule", told)
     assert "A rule that is switched off decides nothing." in told
@@ -108,11 +108,11 @@ def test_rules_tried_on_episodes_kept_aside_stay_so_when_edited(cart: Demonstrat
     split = hold_out(cart, 0.3, seed=1)
     found = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
     assert tally(edited(found), cart).split
-    told = words_of(make_report(edited(found), cart, PLAIN).html)
+    told = words_of(make_report(edited(found), cart, **PLAIN).html)
     assert "made from other data" not in told
 
 
 def test_what_an_interval_counts_is_said(cart: Demonstrations, rules: RuleSet) -> None:
-    told = words_of(make_report(rules, cart, PLAIN).html)
+    told = words_of(make_report(rules, cart, **PLAIN).html)
     assert "each of them counts once, however long it is" in told
     assert "Wilson" not in told

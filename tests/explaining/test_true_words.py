@@ -20,7 +20,7 @@ from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.figures.tree import path_queries
 from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table
-from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.report.report import make_report
 from sarl_core.explaining.rule_evidence import example_columns
 from sarl_core.explaining.words.what_if import condition_views
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
@@ -406,7 +406,7 @@ def test_rules_that_came_without_it_learn_what_was_demonstrated() -> None:
     )
     shown = with_splits(taught, half)
     assert [conditions_text(rule, shown) for rule in shown.rules] == said
-    report = make_report(bare, demonstrations, Wishes(frames=0)).html
+    report = make_report(bare, demonstrations, frames=0).html
     assert all(text.split()[-1] in report for text in said)
     assert bare.rules[0].conditions[0].threshold != float(said[0].split()[-1])
     assert conditions_text(bare.rules[0], bare).split()[-1] not in report

@@ -1,6 +1,6 @@
 """Rule sets for other programs and for reading, every rule, never cut short.
 
-CSV and text are written here; the other formats have files of their own and are found from here.
+CSV is written here; the other formats have files of their own and are found from here.
 """
 
 from __future__ import annotations
@@ -69,6 +69,18 @@ class Prepared(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
+class Exported(NamedTuple):
+    """What `export_rules` did.
+
+    Attributes:
+        vectors: Where the test vectors are.
+        prepared: The rules as they were written.
+    """
+
+    vectors: Path
+    prepared: Prepared
+
+
 def prepare(
     rule_set: RuleSet, *, merged: bool = False, demonstrations: Demonstrations | None = None
 ) -> Prepared:
@@ -124,7 +136,7 @@ def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstra
     return int(np.count_nonzero(differs.any(axis=1)))
 
 
-def export_rules(
+def export_content(
     rule_set: RuleSet,
     suffix: str,
     projection: Projection = "centre",
@@ -189,34 +201,43 @@ def vectors_name(name: str) -> str:
     return f"{name}.vectors.csv"
 
 
-def save_export(
+def export_rules(
     rule_set: RuleSet,
-    path: Path,
+    path: str | Path,
+    *,
+    merged: bool = False,
+    demonstrations: Demonstrations | None = None,
     projection: Projection = "centre",
     on_invalid: OnInvalid = "raise",
-) -> Path:
-    """Write a rule set in the format that the file's name ends in, and its test vectors beside it.
+) -> Exported:
+    """Write rules for other programs or for reading, and test vectors beside them.
 
     Args:
         rule_set: To carry away.
-        path: Ends in one of `FORMATS`.
+        path: Its ending says the format, one of `FORMATS`.
+        merged: Whether several conditions on one feature become one interval.
+        demonstrations: Round the thresholds to what changes no decision on these; None for not.
         projection: What a continuous action that breaks a rule becomes.
         on_invalid: What becomes of a step whose state is no state, or whose action is none.
 
     Returns:
-        Where the test vectors are.
+        Where the test vectors are, and what rounding did.
 
     Raises:
-        InputError: As `export_rules`, or if the folder does not exist.
-        WorkError: If it cannot be written to, or a package is missing.
+        InputError: If the format is not known, there are no rules, code is asked of rules none of
+            which is switched on, the demonstrations are for other features or actions, or the
+            folder does not exist.
+        WorkError: If it cannot be written to, or a package is missing that the format needs.
     """
-    content = export_rules(rule_set, path.suffix.lower(), projection, on_invalid)
-    vectors = export_vectors(rule_set, projection, on_invalid)
+    path = Path(path)
+    prepared = prepare(rule_set, merged=merged, demonstrations=demonstrations)
+    content = export_content(prepared.rule_set, path.suffix.lower(), projection, on_invalid)
+    vectors = export_vectors(prepared.rule_set, projection, on_invalid)
     beside = path.with_name(vectors_name(path.name))
     for place, data in ((beside, vectors), (path, content)):
         with whole_file(place) as unfinished:
             unfinished.write_bytes(data)
-    return beside
+    return Exported(beside, prepared)
 
 
 def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: OnInvalid) -> str:

@@ -25,6 +25,7 @@ from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report.thresholds import kept
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
+from sarl_core.files import whole_file
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import counted, share_text
@@ -50,18 +51,7 @@ _MOST_FITTED = 50_000  # steps; to grow ten trees of more takes minutes
 class Wishes:
     """What a report is to hold.
 
-    Attributes:
-        in_full: So many rules in full, with pictures; the others stand in a table.
-        frames: Pictures a rule; 0 for none.
-        env_id: Where they are played; "" for the environment of the demonstrations.
-        agent: Who plays; None for the shipped expert and, where it does not come by or there is
-            none, a novice that the rules shield.
-        seed: Of the first episode that is played.
-        episodes: How many each player plays.
-        max_steps: After which one is cut off; `episodes.MAX_STEPS` where None.
-        commands: How the rules and the report are made again, one line each.
-        rules_name: Of the rule file, "" where there is none.
-        demonstrations_name: Of their file, likewise.
+    Attributes: As the arguments of `make_report`.
     """
 
     in_full: int = MOST_IN_FULL
@@ -112,12 +102,34 @@ class Report:
     without: str
     notes: tuple[str, ...] = ()
 
+    def save(self, path: str | Path) -> None:
+        """Write the file; it appears whole or not at all.
+
+        Args:
+            path: An `.html` file.
+
+        Raises:
+            InputError: If the folder does not exist.
+            WorkError: If it cannot be written to.
+        """
+        with whole_file(Path(path)) as unfinished:
+            unfinished.write_text(self.html, encoding="utf-8", newline="\n")
+
 
 def make_report(
     rule_set: RuleSet,
     demonstrations: Demonstrations,
-    wishes: Wishes | None = None,
     *,
+    in_full: int = MOST_IN_FULL,
+    frames: int = 3,
+    env_id: str = "",
+    agent: str | Path | Agent | None = None,
+    seed: int = FIRST_SEED,
+    episodes: int = EPISODES,
+    max_steps: int | None = None,
+    commands: Sequence[str] = (),
+    rules_name: str = "",
+    demonstrations_name: str = "",
     card: Mapping[str, Any] | None = None,
     comparison: Sequence[Result] = (),
     trees: Sequence[PolicyTree] | None = None,
@@ -128,7 +140,17 @@ def make_report(
     Args:
         rule_set: The rules.
         demonstrations: N pairs of the same features and actions.
-        wishes: What it is to hold.
+        in_full: So many rules in full, with pictures; the others stand in a table.
+        frames: Pictures a rule; 0 for none.
+        env_id: Where they are played; "" for the environment of the demonstrations.
+        agent: Who plays, as `make_agent` takes it; None for the shipped expert and, where it does
+            not come by or there is none, a novice that the rules shield.
+        seed: Of the first episode that is played.
+        episodes: How many each player plays.
+        max_steps: After which one is cut off; `episodes.MAX_STEPS` where None.
+        commands: How the rules and the report are made again, one line each.
+        rules_name: Of the rule file, "" where there is none.
+        demonstrations_name: Of their file, likewise.
         card: Of the rule file, as `read_card` gives it.
         comparison: Results to show.
         trees: Grown from the demonstrations with the rules' divider; grown here where not given
@@ -139,11 +161,22 @@ def make_report(
         The report; the same arguments give the same one, byte for byte.
 
     Raises:
-        InputError: If the demonstrations have other features or actions than the rules, or an
-            agent that was named cannot play.
+        InputError: If a number is out of range, the demonstrations have other features or actions
+            than the rules, or an agent that was named cannot play.
         CancelledError: If `progress` returned False.
     """
-    wishes = wishes or Wishes()
+    wishes = Wishes(
+        in_full=in_full,
+        frames=frames,
+        env_id=env_id,
+        agent=agent,
+        seed=seed,
+        episodes=episodes,
+        max_steps=max_steps,
+        commands=tuple(commands),
+        rules_name=rules_name,
+        demonstrations_name=demonstrations_name,
+    )
     as_given = rule_set
     rule_set, notes = report_rules(rule_set, demonstrations)
     if same_environment(rule_set, demonstrations):
@@ -155,9 +188,9 @@ def make_report(
         trees = grow_policy_trees(demonstrations, divider=rule_set.divider)
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
-    env_id = demonstrations.env_id or rule_set.source.env_id
+    about = demonstrations.env_id or rule_set.source.env_id
     html = _template().render(
-        title=f"Rules for {task_name(env_id)}" if env_id else "Rules from demonstrations",
+        title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
         elsewhere=_elsewhere(as_given, demonstrations, trees),
         shown=shown(rule_set, demonstrations, counts),

@@ -10,7 +10,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.explaining.exports.export import (
     Prepared,
-    export_rules,
+    export_content,
     export_vectors,
     prepare,
     vectors_name,
@@ -49,7 +49,7 @@ def prepared_for(
 @cached(show_spinner="Writing …")
 def content_of(key: str, suffix: str, projection: Projection, _rule_set: RuleSet) -> bytes:
     """The file."""
-    return export_rules(_rule_set, suffix, projection)
+    return export_content(_rule_set, suffix, projection)
 
 
 @cached()
