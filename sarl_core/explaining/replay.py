@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
@@ -115,39 +114,6 @@ def named_description(
         if found is not None:
             return found
     return description
-
-
-def environment_dimensions(
-    description: EnvironmentDescription, rule_set: RuleSet | None, *, divider: int = 2
-) -> tuple[LabelledDimension, ...]:
-    """The labels by which an environment's actions are named and coloured.
-
-    Args:
-        description: Of the environment.
-        rule_set: Whose intervals are used where the actions are continuous, or None.
-        divider: Number of intervals without a rule set.
-
-    Returns:
-        One entry an action dimension.
-    """
-    if description.action_low is None or description.action_high is None:
-        return tuple(
-            LabelledDimension(name, labels, first=first)
-            for name, labels, first in zip(
-                description.action_names,
-                description.label_names,
-                description.label_first,
-                strict=True,
-            )
-        )
-    if rule_set is not None:
-        return rule_set.actions
-    return tuple(
-        LabelledDimension.of_edges(name, _edges(low, high, divider).tolist())
-        for name, low, high in zip(
-            description.action_names, description.action_low, description.action_high, strict=True
-        )
-    )
 
 
 def tracks(
@@ -310,10 +276,3 @@ def margin_text(margin: float) -> str:
         f"Smallest distance to a threshold on the way: {number_text(margin)} "
         "(in that feature's unit)"
     )
-
-
-def _edges(low: float, high: float, divider: int) -> NDArray[np.float64]:
-    """Edges of equal intervals; of [-1, 1] where a side is open, since any will do to colour."""
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        low, high = -1.0, 1.0
-    return np.linspace(low, high, divider + 1)

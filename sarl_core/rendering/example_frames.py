@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,17 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.agents.spaces import SpaceAdapter, adapt
-from sarl_core.environments.description import make_environment
+from sarl_core.agents.spaces import Actions
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rendering.film import Palette
-from sarl_core.rendering.filming import _no_display as no_display
-from sarl_core.rendering.filming import _picture as draw
-from sarl_core.rendering.filming import picture_speed
-from sarl_core.rollouts.episodes import rollout
-from sarl_core.rollouts.player import check_environment
+from sarl_core.rendering.filming import no_display, picture_of, picture_speed
+from sarl_core.rollouts.episodes import rollout, run_seeds
+from sarl_core.rollouts.player import View, check_environment
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Shield
@@ -273,30 +271,51 @@ def _pictures(
     return found
 
 
+class _AstrayError(Exception):
+    """The environment went another way than it did."""
+
+
+@dataclass
+class _Repeating:
+    """An agent that does what was done, step by step."""
+
+    steps: StepTable
+    name: str = "repeating"
+    n_uniforms: int = 0
+    done: int = 0
+
+    def act(self, observations: NDArray[np.float32], uniforms: Any) -> Actions:
+        self.done += 1
+        return self.steps.executed[self.done - 1 : self.done]
+
+
 def _draw(
     env_id: str, seed: int, steps: StepTable, wanted: set[int], width: int
 ) -> dict[int, NDArray[np.uint8]]:
     """Play an episode again up to the last step that is wanted."""
-    env = make_environment(env_id, render_mode="rgb_array")
-    found = {}
-    try:
-        adapter = adapt(env)
-        observation, _ = env.reset(seed=seed)
-        for step in range(max(wanted) + 1):
-            # Every state is drawn: flames and dust fade as they are drawn.
-            picture = draw(env, env_id)
-            if not np.array_equal(adapter.flat(observation), steps.observation[step]):
-                break  # the environment went another way; a picture would show another state
-            if step in wanted:
-                found[step] = _smaller(picture, width)
-            observation, *_ = env.step(_action(adapter, steps, step))
-    finally:
-        env.close()
-    return found
+    pictures = {}
 
+    def observer(view: View) -> None:
+        if view.step > max(wanted):
+            return
+        # Every state is drawn: flames and dust fade as they are drawn.
+        picture = picture_of(view.env, env_id)
+        if not np.array_equal(view.state, steps.observation[view.step]):
+            raise _AstrayError  # a picture would show another state
+        if view.step in wanted:
+            pictures[view.step] = _smaller(picture, width)
 
-def _action(adapter: SpaceAdapter, steps: StepTable, step: int) -> Any:
-    return adapter.native(adapter.shaped(steps.executed[step : step + 1])[0])
+    with suppress(_AstrayError):
+        run_seeds(
+            env_id,
+            _Repeating(steps),
+            None,
+            np.array([seed]),
+            max_steps=max(wanted) + 1,
+            observer=observer,
+            render_mode="rgb_array",
+        )
+    return pictures
 
 
 def _smaller(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:

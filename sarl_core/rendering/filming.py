@@ -5,20 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, order_notes
-from sarl_core.agents.spaces import SpaceAdapter
+from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.errors import InputError, WorkError
 from sarl_core.rendering.film import Film
-from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.flips import count_flips
-from sarl_core.rollouts.player import added, check_environment
-from sarl_core.rollouts.steps import StepTable
+from sarl_core.rollouts.episodes import Episodes, run_seeds
+from sarl_core.rollouts.player import View
 
 if TYPE_CHECKING:
     from sarl_core.shielding.shield import Shield
@@ -57,22 +54,6 @@ def picture_speed(env_id: str, max_steps: int | None = None) -> tuple[float, int
     return float(fps) if fps else _DEFAULT_FPS, min(limit, most)
 
 
-class _Row(NamedTuple):
-    """One step, with the columns of a `StepTable`."""
-
-    episode: int
-    step: int
-    observation: NDArray[np.float32]
-    proposed: Any
-    executed: Any
-    rules: list[int]
-    intervened: bool
-    margin: float
-    reward: float
-    outside: bool
-    invalid: str | None
-
-
 def film_episode(
     env_id: str,
     agent: Agent,
@@ -82,7 +63,7 @@ def film_episode(
     limit: int,
     told: Callable[[int, int], None],
 ) -> Episodes:
-    """Play one episode in the wrapped environment, and film it.
+    """Play one episode, and film it.
 
     Args:
         env_id: What ``gymnasium.make`` takes.
@@ -100,131 +81,40 @@ def film_episode(
         InputError: If the pictures are of another kind, or the shield does not fit.
         WorkError: If drawing fails.
     """
-    adapter, shield, notes = check_environment(env_id, shield)
-    notes = (*notes, *order_notes(agent, env_id))
-    generator = np.random.default_rng(seed)
-    rows: list[_Row] = []
-    with _no_display(), _drawing(env_id, shield) as env:
-        observation, _ = env.reset(seed=seed)
-        terminated = truncated = False
-        cost = float("nan")
-        while not (terminated or truncated):
-            film.add(_picture(env, env_id))
-            row, observation, terminated, truncated, info = _film_step(
-                env, adapter, agent, generator, observation, len(rows)
-            )
-            rows.append(row)
-            if "cost" in info:
-                cost = added(cost, info["cost"])
-            told(len(rows), limit)
-            if len(rows) >= limit:
-                break
-        film.add(_picture(env, env_id))
-        told(limit, limit)
-    steps = _table(rows, adapter)
-    return Episodes(
-        env_id=env_id,
-        agent=agent.name,
-        seeds=np.array([seed]),
-        returns=np.array([np.cumsum(steps.reward)[-1]]),
-        lengths=np.array([len(rows)]),
-        interventions=np.array([int(steps.intervened.sum())]),
-        covered=np.array([int(steps.covered.sum())]),
-        terminated=np.array([bool(terminated)]),
-        truncated=np.array([not terminated]),
-        cut=np.array([not (terminated or truncated)]),
-        last_rewards=steps.reward[-1:].copy(),
-        steps=steps,
-        outside=np.array([int(steps.outside.sum())]),
-        withheld=np.array([int((steps.outside & ~steps.intervened).sum())]),
-        flips=count_flips(steps.intervened, steps.episode),
-        freedom=np.array([1.0 if shield is None else _freedom(shield, steps)]),
-        costs=np.array([cost]),
-        notes=notes,
-        invalid=np.array([int(steps.is_invalid.sum())])
-        if shield is not None and shield.on_invalid == "pass"
-        else None,
-    )
 
+    def observer(view: View) -> None:
+        film.add(picture_of(view.env, env_id))
+        if view.step:
+            told(view.step, limit)
 
-def _freedom(shield: Shield, steps: StepTable) -> float:
-    return float(shield.freedom(steps.observation, steps.rules).mean())
-
-
-def _film_step(
-    env: Any,
-    adapter: SpaceAdapter,
-    agent: Agent,
-    generator: np.random.Generator,
-    observation: Any,
-    step: int,
-) -> tuple[_Row, Any, bool, bool, dict[str, Any]]:
-    state = np.array(adapter.flat(observation))
-    uniforms = generator.random((1, agent.n_uniforms)) if agent.n_uniforms else None
-    proposed = agent.act(state[None], uniforms)
-    following, reward, terminated, truncated, info = env.step(
-        adapter.native(adapter.shaped(proposed)[0])
-    )
-    record = info.get("shield")
-    if record is None:
-        rules = [-1] * adapter.n_dimensions
-        action = proposed[0]
-        row = _Row(0, step, state, action, action, rules, False, np.inf, float(reward), False, None)
-    else:
-        rules = [-1 if rule is None else rule for rule in record.rules]
-        row = _Row(
-            0,
-            step,
-            state,
-            record.proposed,
-            record.executed,
-            rules,
-            record.intervened,
-            record.margin,
-            float(reward),
-            record.outside,
-            record.invalid,
+    with no_display():
+        episodes = run_seeds(
+            env_id,
+            agent,
+            shield,
+            np.array([seed]),
+            max_steps=limit,
+            observer=observer,
+            render_mode="rgb_array",
         )
-    return row, following, bool(terminated), bool(truncated), info
+    told(limit, limit)
+    return episodes
 
 
-def _table(rows: list[_Row], adapter: SpaceAdapter) -> StepTable:
-    columns = _Row(*(list(column) for column in zip(*rows, strict=True)))  # type: ignore[arg-type]
-    kind = np.int64 if adapter.is_discrete else np.float32
+def picture_of(env: Any, env_id: str) -> NDArray[np.uint8]:
+    """Draw the state that an environment is in.
 
-    def actions(values: Any) -> Any:
-        return np.array([np.asarray(value).reshape(-1) for value in values], dtype=kind)
+    Args:
+        env: Made with the render mode rgb_array.
+        env_id: Its name.
 
-    return StepTable(
-        episode=np.array(columns.episode, dtype=np.int64),
-        step=np.array(columns.step, dtype=np.int64),
-        observation=np.array(columns.observation, dtype=np.float32),
-        proposed=actions(columns.proposed),
-        executed=actions(columns.executed),
-        rules=np.array(columns.rules, dtype=np.int64),
-        intervened=np.array(columns.intervened, dtype=np.bool_),
-        margin=np.array(columns.margin, dtype=np.float64),
-        reward=np.array(columns.reward, dtype=np.float64),
-        outside=np.array(columns.outside, dtype=np.bool_),
-        invalid=np.array(columns.invalid, dtype=np.object_),
-    )
+    Returns:
+        Shape (height, width, 3).
 
-
-@contextmanager
-def _drawing(env_id: str, shield: Shield | None) -> Iterator[Any]:
-    """The environment, shielded where there is a shield, closed at the end."""
-    env = make_environment(env_id, render_mode="rgb_array")
-    try:
-        if shield is not None:
-            from sarl_core.shielding.wrappers import ShieldedEnv
-
-            env = ShieldedEnv(env, shield)
-        yield env
-    finally:
-        env.close()
-
-
-def _picture(env: Any, env_id: str) -> NDArray[np.uint8]:
+    Raises:
+        InputError: If the pictures are of another kind.
+        WorkError: If drawing fails.
+    """
     import gymnasium
 
     try:
@@ -240,7 +130,7 @@ def _picture(env: Any, env_id: str) -> NDArray[np.uint8]:
 
 
 @contextmanager
-def _no_display() -> Iterator[None]:
+def no_display() -> Iterator[None]:
     """Let pygame draw where there is no screen and no sound; leaves the environment as it was."""
     wanted = {"PYGAME_HIDE_SUPPORT_PROMPT": "1", "SDL_AUDIODRIVER": "dummy"}
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,16 +16,18 @@ from numpy.typing import ArrayLike
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
+from sarl_core.mining.environment_actions import environment_dimensions
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.progress import Progress, report
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
 from sarl_core.rendering.filming import film_episode, picture_speed
 from sarl_core.rendering.gif_and_mp4 import gif_bytes
-from sarl_core.rendering.overlay import Caption, Panel, action_text, side_by_side_picture
-from sarl_core.rendering.replay import DescribeRule, Replay, plain_descriptions
+from sarl_core.rendering.overlay import Caption, Panel, side_by_side_picture
+from sarl_core.rendering.replay import DescribeRule, Replay, sentences
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
-from sarl_core.shielding.shield import Decision, Shield
+from sarl_core.shielding.shield import BatchDecision, Shield
 
 Rest = Literal["shielded", "alone"]
 """After the change that is withheld: the shield goes on, or the agent acts alone to the end."""
@@ -137,7 +139,7 @@ def fork(
         rest: Whether the shield goes on after that step or is off to the end.
         seed: Of both episodes.
         stochastic: Whether a trained policy is sampled.
-        describe_rule: A sentence for the index of a rule; its conditions where not given.
+        describe_rule: A sentence for the index of a rule; that of `language` where not given.
         progress: Called with (steps done, most steps); returning False stops.
 
     Returns:
@@ -157,7 +159,8 @@ def fork(
     fps, limit = picture_speed(env_id)
     palette = Palette(OVERLAY_COLOURS)
     shield = shield_for(env_id, shield)
-    describe = describe_rule or plain_descriptions(shield.rule_set)
+    describe = describe_rule or sentences(shield.rule_set)
+    dimensions = environment_dimensions(describe_environment(env_id), shield.rule_set)
     episodes: list[Episodes] = []
     panels: list[Panel] = []
     titles = (f"{actor.name}, change kept", f"{actor.name}, change withheld")
@@ -181,7 +184,7 @@ def fork(
                 steps=episode.steps,
                 shielded=True,
                 describe_rule=describe,
-                description=describe_environment(env_id),
+                dimensions=dimensions,
                 fps=fps,
                 withheld_at=step if part else None,
                 rest=rest,
@@ -239,15 +242,23 @@ class _Withholding(Shield):
         self.__dict__.update(shield.__dict__)
         self._withheld_at, self._rest, self._decided = step, rest, 0
 
-    def decide(self, observation: ArrayLike, action: Any) -> Decision:
-        """As the shield decides; the change that is withheld is none."""
-        decision = super().decide(observation, action)
+    def decide_batch(self, observations: ArrayLike, actions: ArrayLike) -> BatchDecision:
+        """As the shield decides, one state a time; the change that is withheld is none."""
+        decision = super().decide_batch(observations, actions)
         now, self._decided = self._decided, self._decided + 1
+        if now < self._withheld_at or (now > self._withheld_at and self._rest == "shielded"):
+            return decision
+        passed = decision._replace(
+            executed=decision.proposed, intervened=np.zeros_like(decision.intervened)
+        )
         if now == self._withheld_at:
-            return decision._replace(executed=action, intervened=False)
-        if now > self._withheld_at and self._rest == "alone":
-            return Decision(action, action, (None,) * len(decision.rules), False, float("inf"))
-        return decision
+            return passed
+        return passed._replace(
+            rules=np.full_like(decision.rules, NO_RULE),
+            margin=np.full_like(decision.margin, np.inf),
+            outside=np.zeros_like(decision.outside),
+            invalid=np.full_like(decision.invalid, None),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,7 +275,7 @@ class _ForkedPanel(Panel):
 
     def caption(self, step: int) -> Caption:
         """See `Panel.caption`."""
-        executed = action_text(self.description, self.steps.executed[step])
+        executed = self.executed_text(step)
         if step == self.withheld_at:
             rules = [rule for rule in self.steps.rules[step].tolist() if rule >= 0]
             reasons = [self.describe_rule(rule) for rule in rules]

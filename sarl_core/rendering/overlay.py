@@ -6,7 +6,7 @@ text that stayed longer would name rules that are no longer in force. Who wants 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.environments.description import EnvironmentDescription
-from sarl_core.mining.written import amount_text
+from sarl_core.agents.spaces import Actions
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import done_text
 from sarl_core.rendering.canvas import INKS, PAPER_INDEX, TRACK_INDEX, Canvas, fitted, wrapped
 from sarl_core.rendering.film import Film
 from sarl_core.rollouts.steps import StepTable
@@ -39,7 +40,7 @@ class Panel:
         steps: The T steps.
         shielded: Whether there was a shield.
         describe_rule: A sentence for the index of a rule.
-        description: Of the environment, for the names of the actions.
+        dimensions: Of the actions, with their names.
         fps: Pictures a second.
     """
 
@@ -49,7 +50,7 @@ class Panel:
     steps: StepTable
     shielded: bool
     describe_rule: Callable[[int], str]
-    description: EnvironmentDescription
+    dimensions: tuple[LabelledDimension, ...]
     fps: float
 
     @property
@@ -183,51 +184,53 @@ class Panel:
         Returns:
             Its words.
         """
-        proposed, executed = self.steps.proposed[step], self.steps.executed[step]
-        rules = [int(rule) for rule in self.steps.rules[step] if rule >= 0]
+        done = self.executed_text(step)
         if not self.shielded:
-            return Caption(
-                "",
-                action_text(self.description, executed),
-                "No shield: every action is executed as proposed.",
-                False,
-            )
+            return Caption("", done, "No shield: every action is executed as proposed.", False)
         invalid = self.steps.invalid[step]
         if invalid is not None:
-            return Caption(
-                "NOT CHECKED",
-                action_text(self.description, executed),
-                f"No rule was asked, and the action stays as it is: {invalid}.",
-                False,
-            )
+            reason = f"No rule was asked, and the action stays as it is: {invalid}."
+            return Caption("NOT CHECKED", done, reason, False)
+        rules = [int(rule) for rule in self.steps.rules[step] if rule >= 0]
         if not rules:
-            return Caption(
-                "NO RULE",
-                action_text(self.description, executed),
-                "No rule applies to this state: the action stays as it is.",
-                False,
-            )
+            reason = "No rule applies to this state: the action stays as it is."
+            return Caption("NO RULE", done, reason, False)
         outside = bool(self.steps.outside[step])
         if not self.steps.intervened[step]:
-            reason = "; ".join(self.describe_rule(rule) for rule in rules)
+            reason = " ".join(map(self.describe_rule, rules))
             if outside:
-                return Caption(
-                    "ABSTAINS",
-                    action_text(self.description, executed),
-                    f"Outside the data behind it, the rule leaves the action as it is: {reason}",
-                    True,
+                reason = (
+                    f"Outside the data behind it, the rule leaves the action as it is: {reason}"
                 )
-            return Caption("AGREES", action_text(self.description, executed), reason, True)
-        changed = [index for index in range(len(proposed)) if proposed[index] != executed[index]]
-        reasons = [self.describe_rule(int(self.steps.rules[step, index])) for index in changed]
+                return Caption("ABSTAINS", done, reason, True)
+            return Caption("AGREES", done, reason, True)
+        proposed, executed = self.steps.proposed[step], self.steps.executed[step]
+        changed = np.flatnonzero(proposed != executed).tolist()
+        reason = " ".join(self.describe_rule(int(self.steps.rules[step, at])) for at in changed)
+        action = (
+            f"{self._words(proposed, changed, executed)} → "
+            f"{self._words(executed, changed, proposed)}"
+        )
         return Caption(
-            "CHANGED",
-            f"{action_text(self.description, proposed, changed, beside=executed)} → "
-            + action_text(
-                self.description, executed, changed, beside=proposed, named=len(changed) > 1
-            ),
-            ("Outside the data behind it: " if outside else "") + "; ".join(reasons),
-            True,
+            "CHANGED", action, f"{'Outside the data behind it: ' if outside else ''}{reason}", True
+        )
+
+    def executed_text(self, step: int) -> str:
+        """The action that the environment got.
+
+        Args:
+            step: At which.
+
+        Returns:
+            As "fire main engine" or "torque -1.2".
+        """
+        executed = self.steps.executed[step]
+        return self._words(executed, range(len(executed)), executed)
+
+    def _words(self, action: Actions, dimensions: Iterable[int], beside: Actions) -> str:
+        return ", ".join(
+            done_text(float(action[at]), self.dimensions[at], beside=(float(beside[at]),))
+            for at in dimensions
         )
 
 
@@ -263,40 +266,6 @@ def side_by_side_picture(panels: tuple[Panel, ...], number: int) -> NDArray[np.u
     for picture in pictures[1:]:
         parts += [gap, picture]
     return np.concatenate(parts, axis=1)
-
-
-def action_text(
-    description: EnvironmentDescription,
-    action: NDArray[np.int64] | NDArray[np.float32],
-    dimensions: list[int] | None = None,
-    *,
-    beside: NDArray[np.int64] | NDArray[np.float32] | None = None,
-    named: bool = True,
-) -> str:
-    """An action in words, as "fire main engine" or "torque −1.2".
-
-    Args:
-        description: Of the environment.
-        action: Shape (m,).
-        dimensions: Those to speak of; all where not given.
-        beside: Another action that is shown with it.
-        named: Whether a continuous action's name is said.
-
-    Returns:
-        The words.
-    """
-    several = len(action) > 1
-    words = []
-    for index in range(len(action)) if dimensions is None else dimensions:
-        name, labels = description.action_names[index], description.label_names[index]
-        if description.is_discrete:
-            text = labels[int(action[index]) - description.label_first[index]]
-            words.append(f"{name}: {text}" if several and named else text)
-        else:
-            others = () if beside is None else (float(beside[index]),)
-            text = amount_text(float(action[index]), beside=others).replace("-", "−")
-            words.append(f"{name} {text}" if named else text)
-    return ", ".join(words)
 
 
 def signed(value: float, digits: int) -> str:

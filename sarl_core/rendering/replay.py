@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.environments.description import EnvironmentDescription, describe_environment
+from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
-from sarl_core.mining.written import limit_texts
+from sarl_core.mining.environment_actions import environment_dimensions
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import sentence
 from sarl_core.progress import Progress, report
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
@@ -24,6 +26,7 @@ from sarl_core.rendering.filming import film_episode, picture_speed
 from sarl_core.rendering.gif_and_mp4 import encode_gif, encode_mp4, gif_bytes
 from sarl_core.rendering.overlay import Panel, side_by_side_picture
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.rollouts.player import shield_for
 
 if TYPE_CHECKING:
     from sarl_core.mining.rule_set import RuleSet
@@ -48,13 +51,13 @@ class Replay:
     panels: tuple[Panel, ...]
     fps: float
 
-    def named(self, description: EnvironmentDescription) -> Replay:
+    def named(self, dimensions: tuple[LabelledDimension, ...]) -> Replay:
         """The same pictures under other names of the actions.
 
         Args:
-            description: Of the same environment.
+            dimensions: Of the same environment.
         """
-        panels = tuple(replace(panel, description=description) for panel in self.panels)
+        panels = tuple(replace(panel, dimensions=dimensions) for panel in self.panels)
         return Replay(self.episodes, panels, self.fps)
 
     def __len__(self) -> int:
@@ -180,7 +183,7 @@ def render_episode(
         shield: Checks every action; None for none.
         seed: Of the episode.
         stochastic: Whether a trained policy is sampled.
-        describe_rule: A sentence for the index of a rule; its conditions where not given.
+        describe_rule: A sentence for the index of a rule; that of `language` where not given.
         max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
         progress: Called with (steps done, most steps); returning False stops.
 
@@ -216,7 +219,7 @@ def side_by_side(
         shield: Of the left panel.
         seed: Of both episodes.
         stochastic: Whether a trained policy is sampled.
-        describe_rule: A sentence for the index of a rule; its conditions where not given.
+        describe_rule: A sentence for the index of a rule; that of `language` where not given.
         max_steps: An episode that has not ended by then is cut off; 5,000 where not given.
         progress: Called with (steps done, most steps); returning False stops.
 
@@ -247,6 +250,9 @@ def _replay(
         raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     fps, limit = picture_speed(env_id, max_steps)
+    # Whose words are used for the panel without rules, too.
+    rule_set = None if shields[0] is None else shield_for(env_id, shields[0]).rule_set
+    dimensions = environment_dimensions(describe_environment(env_id), rule_set)
     palette = Palette(OVERLAY_COLOURS)
     episodes: list[Episodes] = []
     panels: list[Panel] = []
@@ -259,9 +265,6 @@ def _replay(
         episode = film_episode(env_id, actor, shield, seed, film, limit, told)
         assert episode.steps is not None
         episodes.append(episode)
-        describe = describe_rule
-        if describe is None and shield is not None:
-            describe = plain_descriptions(shield.rule_set)
         ending = (
             ""
             if len(shields) == 1 and shield is None
@@ -274,37 +277,26 @@ def _replay(
                 film=film,
                 steps=episode.steps,
                 shielded=shield is not None,
-                describe_rule=describe or str,
-                description=describe_environment(env_id),
+                describe_rule=describe_rule or sentences(rule_set),
+                dimensions=dimensions,
                 fps=fps,
             )
         )
     return Replay(tuple(episodes), tuple(panels), fps)
 
 
-def plain_descriptions(rule_set: RuleSet) -> DescribeRule:
-    """Sentences for rules, from names and bounds alone.
+def sentences(rule_set: RuleSet | None) -> DescribeRule:
+    """The sentences of rules, as they stand everywhere.
 
     Args:
-        rule_set: The rules.
+        rule_set: The rules; None where there are none to speak of.
 
     Returns:
-        A function from the index of a rule to "If angle ≤ 0.1: fire main engine".
+        A function from the index of a rule to its sentence.
     """
 
     def describe(index: int) -> str:
-        rule = rule_set.rules[index]
-        parts = []
-        for bounds in rule.bounds:
-            asked = rule_set.source.features[bounds.feature]
-            limits = [text.replace("-", "−") for text in limit_texts(bounds, asked)]
-            left = f"{limits[0]} < " if len(limits) > 1 else ""
-            right = f" {'≤' if np.isfinite(bounds.high) else '>'} {limits[-1]}"
-            parts.append(f"{left}{asked.name}{right}")
-        action = rule_set.actions[rule.dimension]
-        conclusion = action.label_names[rule.action]
-        if len(rule_set.actions) > 1 or action.is_interval:
-            conclusion = f"{action.name} {conclusion}"
-        return f"If {' and '.join(parts)}: {conclusion}" if parts else f"Always: {conclusion}"
+        assert rule_set is not None
+        return sentence(rule_set.rules[index], rule_set, evidence=False)
 
     return describe

@@ -25,7 +25,7 @@ from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.player import play
+from sarl_core.rollouts.player import Observer, play
 from sarl_core.rollouts.statistics import Interval, Rate, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 
@@ -458,6 +458,8 @@ def run_seeds(
     keep_steps: bool = True,
     max_steps: int | None = None,
     finished: Callable[[], None] | None = None,
+    observer: Observer | None = None,
+    render_mode: str | None = None,
 ) -> Episodes:
     """Run the episodes of some seeds, which need not follow each other, in this process.
 
@@ -470,6 +472,8 @@ def run_seeds(
         keep_steps: Whether to keep the record of every step.
         max_steps: An episode that has not ended by then is cut off; `MAX_STEPS` where not given.
         finished: Called after every episode; may raise to stop.
+        observer: Sees every state, the last ones included.
+        render_mode: Of the environments.
 
     Returns:
         The episodes in the order of the seeds; each is what `rollout` makes of its seed.
@@ -486,5 +490,7 @@ def run_seeds(
         max_steps=MAX_STEPS if max_steps is None else max_steps,
         keep_steps=keep_steps,
         finished=finished,
+        observer=observer,
+        render_mode=render_mode,
     )
     return Episodes(env_id=env_id, agent=agent.name, seeds=seeds, **outcome._asdict())

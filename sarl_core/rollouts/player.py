@@ -1,4 +1,4 @@
-"""The loop that steps environments side by side; `episodes` and `recording` stand on it."""
+"""The loop that steps environments side by side; whoever wants to see more of it observes it."""
 
 from __future__ import annotations
 
@@ -51,6 +51,26 @@ class Choice(NamedTuple):
     invalid: NDArray[np.object_]
 
 
+class View(NamedTuple):
+    """What an observer sees: a state before an action is chosen in it, or the last one.
+
+    Attributes:
+        env: The environment, in that state.
+        episode: Index of the episode.
+        step: Steps of the episode so far.
+        state: Shape (d,), float32.
+    """
+
+    env: Any
+    episode: int
+    step: int
+    state: NDArray[np.float32]
+
+
+Observer = Callable[[View], None]
+"""Called with every state, the first and the last included; may raise to stop."""
+
+
 @dataclass
 class _Lane:
     """One environment on its way through one episode."""
@@ -70,6 +90,8 @@ def play(
     max_steps: int,
     keep_steps: bool,
     finished: Callable[[], None] | None = None,
+    observer: Observer | None = None,
+    render_mode: str | None = None,
 ) -> Outcome:
     """Run one episode for each seed.
 
@@ -82,6 +104,8 @@ def play(
         max_steps: An episode that has not ended by then is cut off.
         keep_steps: Whether to keep the record of every step.
         finished: Called after every episode; may raise to stop.
+        observer: Sees every state.
+        render_mode: Of the environments.
 
     Returns:
         The episodes in the order of the seeds.
@@ -89,7 +113,7 @@ def play(
     Raises:
         InputError: If the environment cannot be used, or the shield is not for it.
     """
-    run = _Run(env_id, agent, shield, seeds, max_steps, keep_steps)
+    run = _Run(env_id, agent, shield, seeds, max_steps, keep_steps, observer, render_mode)
     try:
         for _ in range(min(batch, len(seeds))):
             run.start()
@@ -114,8 +138,11 @@ class _Run:
         seeds: NDArray[np.int64],
         max_steps: int,
         keep_steps: bool,
+        observer: Observer | None,
+        render_mode: str | None,
     ) -> None:
         self.env_id, self.agent = env_id, agent
+        self.observer, self.render_mode = observer, render_mode
         self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
         self.adapter, self.shield, notes = check_environment(env_id, shield)
         self.notes = (*notes, *order_notes(agent, env_id))
@@ -139,13 +166,16 @@ class _Run:
         # A fresh environment: what an earlier episode left behind cannot matter.
         lane = _Lane(
             self.started,
-            make_environment(self.env_id),
+            make_environment(self.env_id, render_mode=self.render_mode),
             np.random.default_rng(int(self.seeds[self.started])),
         )
         self.lanes.append(lane)
         self.started += 1
         observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
-        self.states = np.concatenate([self.states, self.adapter.flat(observation)[None]])
+        state = self.adapter.flat(observation)
+        self.states = np.concatenate([self.states, state[None]])
+        if self.observer is not None:
+            self.observer(View(lane.env, lane.episode, 0, state))
 
     def step(self) -> int:
         """Step every lane once, and give the number of episodes that ended."""
@@ -168,9 +198,12 @@ class _Run:
             following[index] = adapter.flat(observation)
             rewards[index] = reward
             if "cost" in info:
-                self.costs[lane.episode] = added(self.costs[lane.episode], info["cost"])
+                self.costs[lane.episode] = _added(self.costs[lane.episode], info["cost"])
             if terminated or truncated:
                 ended.append((index, bool(terminated), bool(truncated)))
+            if self.observer is not None:
+                step = int(self.lengths[lane.episode]) + 1
+                self.observer(View(lane.env, lane.episode, step, following[index]))
         if self.keep_steps:
             self.chunks.append(
                 (
@@ -300,16 +333,8 @@ def choose(
     )
 
 
-def added(cost: float, more: Any) -> float:
-    """What an episode has cost, with one more step.
-
-    Args:
-        cost: Of the steps before; NaN before the first.
-        more: What stands in the step's ``info["cost"]``.
-
-    Returns:
-        The sum; what is no number counts as nothing.
-    """
+def _added(cost: float, more: Any) -> float:
+    """What an episode has cost, with one more step; what is no number counts as nothing."""
     try:
         value = float(more)
     except (TypeError, ValueError):

@@ -21,7 +21,7 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import SarlError
 from sarl_core.explaining.html.lit_path import PathFinder
-from sarl_core.explaining.replay import environment_dimensions
+from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import RuleSet
@@ -228,13 +228,14 @@ def run(order: Order, tell: Told) -> Replay:
         tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
 
     description = order.description
-    film = film.named(description)
+    dimensions = environment_dimensions(description, rule_set)
+    film = film.named(dimensions)
     film.gif(progress=encoding)
     return Replay(
         key=request,
         film=film,
         rule_set=rule_set,
-        dimensions=environment_dimensions(description, rule_set),
+        dimensions=dimensions,
         features=tuple(
             Feature(name, unit)
             for name, unit in zip(description.feature_names, description.feature_units, strict=True)
@@ -312,7 +313,8 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
         describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         progress=playing,
     )
-    found = replace(found, replay=found.replay.named(order.description))
+    dimensions = environment_dimensions(order.description, rule_set)
+    found = replace(found, replay=found.replay.named(dimensions))
     found.gif(progress=encoding)
     return found
 

@@ -20,7 +20,6 @@ from sarl_core.explaining.exports.steps import (
     steps_to_parquet,
 )
 from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table, lit_paths_html
-from sarl_core.explaining.replay import environment_dimensions
 from sarl_core.explaining.tables.recorder import (
     PAGE,
     filter_text,
@@ -28,6 +27,7 @@ from sarl_core.explaining.tables.recorder import (
     place_of,
     recorder_columns,
 )
+from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter
 

@@ -20,13 +20,13 @@ from sarl_core.explaining.figures.replay import (
     shortened,
 )
 from sarl_core.explaining.replay import (
-    environment_dimensions,
     margin_text,
     named_description,
     step_texts,
     step_view,
     tracks,
 )
+from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.steps import StepTable
 

@@ -28,7 +28,7 @@ from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import conditions_text, number_text, sentence
 from sarl_core.mining.rule_set import rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import node_of
-from sarl_core.rendering.replay import plain_descriptions
+from sarl_core.rendering.replay import sentences
 
 # --- what a reader understands -----------------------------------------------------------------
 
@@ -160,7 +160,7 @@ def test_a_sentence_read_back_selects_the_states_of_the_rule(
     for mined in mined_sets(demonstrations):
         # A file keeps what its sentences need, and a person may have no demonstrations at hand.
         for rule_set in (mined, rules_from_json(rules_to_json(mined))):
-            describe = plain_descriptions(rule_set)
+            describe = sentences(rule_set)
             for place, rule in enumerate(rule_set.rules):
                 own = applies_to(rule, demonstrations)
                 said = sentence(rule, rule_set, evidence=False)
@@ -168,9 +168,8 @@ def test_a_sentence_read_back_selects_the_states_of_the_rule(
                 table = conditions_text(rule, rule_set)
                 parts = [] if table == "always" else table.split(" and ")
                 assert told(parts, signs, count).tolist() == own, table
-                drawn = describe(place).replace("−", "-").rpartition(": ")[0]
-                parts = drawn.removeprefix("If ").split(" and ") if rule.conditions else []
-                assert told(parts, signs, count).tolist() == own, drawn
+                drawn = describe(place)
+                assert told(in_words(drawn), words, count).tolist() == own, drawn
 
 
 @settings(deadline=None)

@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.environment_actions import environment_dimensions
+from sarl_core.mining.language import done_text, sentence
 from sarl_core.progress import CancelledError
 from sarl_core.rendering.canvas import INKS, OVERLAY_COLOURS, fitted, text_width, wrapped
-from sarl_core.rendering.overlay import BOTTOM, GAP, TOP, action_text, signed
+from sarl_core.rendering.overlay import BOTTOM, GAP, TOP, signed
 from sarl_core.rendering.replay import (
     Replay,
     check_picture_path,
-    plain_descriptions,
     render_episode,
     side_by_side,
 )
@@ -224,14 +226,22 @@ def test_the_rules_can_be_described_otherwise(shields: dict[str, Shield]) -> Non
     assert asked == [int(replay.episodes[0].steps.rules[0, 0])]
 
 
-def test_plain_descriptions_name_features_and_actions(shields: dict[str, Shield]) -> None:
+def test_a_picture_says_the_sentence_that_stands_everywhere(shields: dict[str, Shield]) -> None:
     shield = shields["Pendulum-v1"]
-    describe = plain_descriptions(shield.rule_set)
-    for index, rule in enumerate(shield.rule_set.rules):
-        text = describe(index)
-        assert text.startswith("If ")
-        assert text.count(" and ") == rule.merged_length - 1
-        assert ": torque " in text
+    replay = side_by_side("Pendulum-v1", "novice", shield, seed=2, max_steps=60)
+    panel, steps = replay.panels[0], replay.episodes[0].steps
+    assert steps is not None
+    step = int(np.flatnonzero(steps.intervened)[0])
+    rule = shield.rule_set.rules[int(steps.rules[step, 0])]
+    assert panel.caption(step).reason == sentence(rule, shield.rule_set, evidence=False)
+    (dimension,) = shield.rule_set.actions
+    proposed, executed = float(steps.proposed[step, 0]), float(steps.executed[step, 0])
+    assert panel.caption(step).action == (
+        f"{done_text(proposed, dimension, beside=(executed,))} → "
+        f"{done_text(executed, dimension, beside=(proposed,))}"
+    )
+    alone = replay.panels[1]
+    assert alone.caption(step).action == done_text(float(alone.steps.executed[step, 0]), dimension)
 
 
 def test_rendering_tells_how_far_it_is_and_can_be_stopped() -> None:
@@ -311,17 +321,37 @@ gymnasium.register("toy/Tiny-v0", entry_point=Tiny)
 
 
 def test_actions_in_words() -> None:
-    from sarl_core.environments.description import describe_environment
-
-    tiny = describe_environment("toy/Tiny-v0")
-    assert action_text(tiny, np.array([1, 2])) == "action 0: 1, action 1: 2"
-    assert action_text(tiny, np.array([1, 2]), [1]) == "action 1: 2"
-    pendulum = describe_environment("Pendulum-v1")
-    assert action_text(pendulum, np.array([-1.2], np.float32)) == "torque −1.2"
-    tiny_torques = np.array([[0.0004], [0.0]], np.float32)
-    assert action_text(pendulum, tiny_torques[0], beside=tiny_torques[1]) == "torque 0.0004"
-    near = np.array([[0.5004], [0.5]], np.float32)
-    assert action_text(pendulum, near[0], beside=near[1]) == "torque 0.5004"
+    replay = render_episode("toy/Tiny-v0", "novice")
+    panel, steps = replay.panels[0], replay.episodes[0].steps
+    assert steps is not None
+    first, second = steps.executed[0].tolist()
+    assert panel.caption(0).action == f"action 0 {first}, action 1 {second}"
+    # Of two dimensions the one is named that was changed.
+    changed = replace(
+        steps,
+        proposed=np.array([[0, 2], *steps.proposed[1:].tolist()]),
+        executed=np.array([[0, 1], *steps.executed[1:].tolist()]),
+        rules=np.zeros_like(steps.rules),
+        intervened=np.ones_like(steps.intervened),
+    )
+    shielded = replace(panel, steps=changed, shielded=True, describe_rule=lambda rule: "Always 1.")
+    assert shielded.caption(0).action == "action 1 2 → action 1 1"
+    pendulum = environment_dimensions(describe_environment("Pendulum-v1"), None)
+    torques = np.array([[-1.2], [0.5004], [0.0004]], np.float32)
+    wanted = np.array([[-1.2], [0.5], [0.0]], np.float32)
+    pushed = replace(
+        steps.take(slice(3)),
+        proposed=wanted,
+        executed=torques,
+        rules=np.zeros((3, 1), dtype=np.int64),
+        intervened=np.array([False, True, True]),
+    )
+    shielded = replace(shielded, steps=pushed, dimensions=pendulum)
+    assert [shielded.caption(step).action for step in range(3)] == [
+        "torque -1.2",
+        "torque 0.5 → torque 0.5004",
+        "torque 0 → torque 0.0004",
+    ]
     assert (signed(-0.001, 2), signed(-1234.5, 1)) == ("0.00", "−1,234.5")
 
 

@@ -9,7 +9,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts import episodes as episodes_module
-from sarl_core.rollouts.episodes import Episodes, join, rollout
+from sarl_core.rollouts.episodes import Episodes, join, rollout, run_seeds
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Shield
@@ -295,3 +295,25 @@ def test_a_shield_of_another_environment_is_refused(shields: dict[str, Shield]) 
 def test_an_unknown_environment_is_one_sentence() -> None:
     with pytest.raises(InputError, match="'NoSuch-v0' cannot be made"):
         rollout("NoSuch-v0", "novice")
+
+
+def test_an_observer_sees_every_state_and_changes_nothing() -> None:
+    agent, seeds = make_agent("novice", "CartPole-v1"), np.array([4, 5, 6])
+    views: dict[int, list[Any]] = {}
+    watched = run_seeds(
+        "CartPole-v1",
+        agent,
+        None,
+        seeds,
+        batch=2,
+        observer=lambda view: views.setdefault(view.episode, []).append(view),
+    )
+    alone = run_seeds("CartPole-v1", agent, None, seeds)
+    assert watched.returns.tolist() == alone.returns.tolist()
+    assert alone.steps is not None
+    for episode, seen in views.items():
+        steps = alone.steps.of_episode(episode)
+        assert [view.step for view in seen] == list(range(len(steps) + 1))
+        assert np.array_equal([view.state for view in seen[:-1]], steps.observation)
+        assert np.array_equal(seen[-1].state, np.float32(seen[-1].env.unwrapped.state))
+    assert len(views) == 3
