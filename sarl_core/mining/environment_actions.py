@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rules import RuleSet
+from sarl_core.mining.rule_set import RuleSet
 
 
 def environment_dimensions(
