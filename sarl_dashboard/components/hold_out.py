@@ -36,13 +36,13 @@ def leave_out_choice(demonstrations: Demonstrations) -> None:
     Args:
         demonstrations: All there are.
     """
-    there = demonstrations.episodes[demonstrations.episode_starts].tolist()
+    episodes = demonstrations.episodes[demonstrations.episode_starts].tolist()
     gone = set(chosen().left_out)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
-    st.session_state["_left_out_choice"] = [episode for episode in there if episode in gone]
+    st.session_state["_left_out_choice"] = [episode for episode in episodes if episode in gone]
     st.multiselect(
         "Episodes left out",
-        there,
+        episodes,
         key="_left_out_choice",
         format_func=lambda episode: f"episode {episode}",
         placeholder="none: choose one, and every page follows",

@@ -163,8 +163,8 @@ def upload_section(*, expanded: bool) -> None:
         if len(files) == 1:
             names = columns_of(*files[0])
             # An error about a row is not mended by another map; one about columns is.
-            asked = error is not None and "column" in error and not re.search(r"\brow \d", error)
-            if names and (asked or st.toggle("Map the columns myself", key="map_columns")):
+            mendable = error is not None and "column" in error and not re.search(r"\brow \d", error)
+            if names and (mendable or st.toggle("Map the columns myself", key="map_columns")):
                 mapping_form(names)
 
 
