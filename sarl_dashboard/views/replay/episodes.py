@@ -16,6 +16,7 @@ from sarl_core.rendering.forking import endings
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
 from sarl_core.rollouts.statistics import summarise
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import flips_rate, flips_title
 from sarl_dashboard.jobs.replays import (
     EPISODES,
@@ -26,8 +27,6 @@ from sarl_dashboard.jobs.replays import (
     kept_comparisons,
     with_progress,
 )
-
-PLAIN = {"displayModeBar": False}
 
 
 def comparison(order: Order) -> None:
@@ -88,11 +87,8 @@ def comparison(order: Order) -> None:
                 flips_title(run.env_id): f"{flips_rate(run):.2f}" if name == WITH else "–",
             }
         )
-    st.plotly_chart(
-        comparison_figure(rows),
-        config=PLAIN,
-        key="comparison",
-        alt="Returns of the episodes with the rules and without",
+    chart(
+        comparison_figure(rows), "comparison", "Returns of the episodes with the rules and without"
     )
     st.dataframe(table, hide_index=True)
     st.caption(

@@ -6,6 +6,7 @@ from functools import partial
 
 import streamlit as st
 
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import no_boxes_notice, notes_notice
 from sarl_dashboard.jobs.replays import Replay, movie
 from sarl_dashboard.state.agents import FRESH_SEED
@@ -50,21 +51,5 @@ def film(replay: Replay) -> None:
     env = request.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
     name = f"replay-{env}-{request.agent}-{request.seed}"
     with st.container(horizontal=True):
-        st.download_button(
-            "Download GIF",
-            gif,
-            f"{name}.gif",
-            "image/gif",
-            key="gif",
-            on_click="ignore",
-            icon=":material/download:",
-        )
-        st.download_button(
-            "Download MP4",
-            partial(movie, replay),
-            f"{name}.mp4",
-            "video/mp4",
-            key="mp4",
-            on_click="ignore",
-            icon=":material/download:",
-        )
+        download("Download GIF", gif, f"{name}.gif", key="gif")
+        download("Download MP4", partial(movie, replay), f"{name}.mp4", key="mp4")

@@ -7,6 +7,7 @@ import streamlit as st
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.forking import Fork, Rest
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.jobs.replays import Played, kept_forks, run_fork, with_progress
 from sarl_dashboard.text import escaped
 
@@ -77,12 +78,4 @@ def show(branched: Fork) -> None:
         st.metric("Length without it", f"{without.steps:,}", border=True, height="stretch")
     gif = branched.gif()
     st.image(gif, width="content", alt="Left: with the change. Right: without it.")
-    st.download_button(
-        "Download GIF",
-        gif,
-        f"fork-{branched.step}-{branched.rest}.gif",
-        "image/gif",
-        key="fork_gif",
-        on_click="ignore",
-        icon=":material/download:",
-    )
+    download("Download GIF", gif, f"fork-{branched.step}-{branched.rest}.gif", key="fork_gif")

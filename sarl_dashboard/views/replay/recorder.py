@@ -5,8 +5,8 @@ The row of a step, its picture, its path and its place in the strip are one sele
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from sarl_core.mining.language import action_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.jobs.replays import Played, Replay, compared, kept_comparisons
 from sarl_dashboard.views.replay.run import jump_to
 
@@ -327,17 +328,13 @@ def downloads(recorded: Recorded, rows: NDArray[np.int64], text: str) -> None:
 
     short = episodes.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
     name = f"steps-{short}-{episodes.agent}-{int(episodes.seeds[recorded.shown])}"
-    kinds: Sequence[tuple[str, str, str, Callable[[StepRecord], bytes]]] = (
-        ("CSV", "csv", "text/csv", steps_to_csv),
-        ("Parquet", "parquet", "application/vnd.apache.parquet", steps_to_parquet),
-    )
-    for label, ending, mime, make in kinds:
-        st.download_button(
+    for label, ending, write in (
+        ("CSV", "csv", steps_to_csv),
+        ("Parquet", "parquet", steps_to_parquet),
+    ):
+        download(
             label,
-            lambda make=make: make(record()),  # type: ignore[misc]
+            partial(lambda write: write(record()), write),
             f"{name}.{ending}",
-            mime,
             key=f"steps_{ending}",
-            on_click="ignore",
-            icon=":material/download:",
         )

@@ -25,6 +25,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, label_text, number_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, Replay
 from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.views.replay.fork import fork_section
@@ -103,12 +104,7 @@ def step_by_step(played: Played) -> None:
             config=PLAIN,
             alt="What the agent wanted, what was done, and where the two differ, step by step",
         )
-        st.plotly_chart(
-            return_figure(lines, timeline),
-            config=PLAIN,
-            key="return",
-            alt="Return so far, step by step",
-        )
+        chart(return_figure(lines, timeline), "return", "Return so far, step by step")
     at_step(played, timeline)
 
 
