@@ -9,7 +9,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_dashboard.state.agents import FRESH_SEED
+from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.ablation.outcome import outcome
 from sarl_dashboard.views.ablation.settings import settings
@@ -25,9 +25,5 @@ except SarlError as error:
     st.error(in_full(str(error)), icon=":material/error:")
     st.stop()
 if choice.on_demonstrated_seeds:
-    st.warning(
-        "Some of these seeds are those of the demonstrations, where the rules know the way. A "
-        f"first seed such as {FRESH_SEED:,} shows what they bring elsewhere.",
-        icon=":material/casino:",
-    )
+    known_seeds_notice()
 outcome(choice)

@@ -1,68 +1,129 @@
-"""The button that runs episodes beside the page, how far they are, and what came of them."""
+"""The button that begins work beside the page, how far it is, and what came of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic
 
 import streamlit as st
 
 from sarl_core.mining.language import counted
-from sarl_dashboard.jobs.episodes import Comparing, Row, job, known
+from sarl_dashboard.jobs.episodes import Batch, Row, known, run_batch
+from sarl_dashboard.jobs.job import Job, Place, Result
 from sarl_dashboard.text import in_full
 
 
-def run_bar(name: str, rows: Sequence[Row], episodes: int) -> None:
-    """Run what is missing; or how far that is, and a way to call it off.
+@dataclass(frozen=True, eq=False)
+class Offer(Generic[Result]):
+    """Work that can be begun.
+
+    Attributes:
+        key: Of everything that its result depends on.
+        start: Begins it.
+        about: What it is, beside the button.
+        complete: Whether all of it is known already.
+        cancelled: What is said where it was called off.
+        problems: Sentences on what of it could not be done.
+        label: Of the button.
+        icon: Of the button.
+    """
+
+    key: object
+    start: Callable[[], Job[Result]]
+    about: str
+    complete: bool
+    cancelled: str = "Cancelled. What had been finished is kept; Run goes on from there."
+    problems: Sequence[str] = ()
+    label: str = "Run"
+    icon: str = ":material/play_arrow:"
+
+
+def run_bar(
+    place: Place[Result],
+    offer: Offer[Result] | None,
+    *,
+    cancel: str = "Cancel",
+    cancel_icon: str = ":material/close:",
+) -> None:
+    """Begin work; or how far it is, and a way to call it off.
 
     Args:
-        name: Of the place on screen; the buttons are "run_<name>" and "cancel_<name>".
+        place: Of it; the buttons' keys are "run_<name>" and "cancel_<name>".
+        offer: What the present choices ask for; None where they ask for nothing that can be had.
+        cancel: The button that calls it off.
+        cancel_icon: Of that button.
+    """
+    job = place.job
+    if job is not None and job.running:
+        with st.container(horizontal=True, vertical_alignment="center"):
+            st.progress(job.share, job.text)
+            st.button(cancel, icon=cancel_icon, on_click=job.cancel, key=f"cancel_{place.name}")
+        return
+    if place.at_work:
+        st.info(place.gathering, icon=":material/hourglass_top:")
+        return
+    if offer is None:
+        return
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.button(
+            offer.label,
+            type="primary",
+            icon=offer.icon,
+            key=f"run_{place.name}",
+            on_click=place.begin,
+            args=(offer.start,),
+            disabled=offer.complete,
+        )
+        st.caption(offer.about, width="content")
+    if job is None or job.key != offer.key or offer.complete:
+        return
+    for sentence in (*offer.problems, *([str(job.error)] if job.error is not None else [])):
+        st.error(in_full(sentence), icon=":material/error:")
+    if job.cancelled:
+        st.info(offer.cancelled, icon=":material/pause_circle:")
+
+
+def watched(place: Place[Any], draw: Callable[[bool], None], *, seconds: float = 1.0) -> None:
+    """Draw what work beside the page changes, anew as long as it goes on.
+
+    Args:
+        place: Of the work.
+        draw: Draws it; told whether the work goes on.
+        seconds: Until it is drawn again.
+    """
+    at_work = place.at_work
+
+    @st.fragment(run_every=seconds if at_work else None)
+    def watch() -> None:
+        if at_work != place.at_work:
+            st.rerun()  # as a whole: from now on again and again, or no longer
+        draw(at_work)
+
+    watch()
+
+
+def episodes_bar(place: Place[Batch], rows: Sequence[Row], episodes: int) -> None:
+    """Run what is missing of some episodes.
+
+    Args:
+        place: Of the work.
         rows: What is to be run.
         episodes: How many of each.
     """
-    asked = job(name)
-    if asked is not None and asked.running:
-        with st.container(horizontal=True, vertical_alignment="center"):
-            st.progress(asked.share, asked.text)
-            st.button(
-                "Cancel", icon=":material/close:", on_click=asked.cancel, key=f"cancel_{name}"
-            )
-        return
-    ready = sum(found is not None and len(found) == episodes for found in known(rows, episodes))
-    with st.container(horizontal=True, vertical_alignment="center"):
-        st.button(
-            "Run",
-            type="primary",
-            icon=":material/play_arrow:",
-            key=f"run_{name}",
-            on_click=_start,
-            args=(name, tuple(rows), episodes),
-            disabled=ready == len(rows),
-        )
-        done = "all done already" if ready == len(rows) else f"{ready} done already"
-        st.caption(
-            f"{counted(episodes, 'episode')} for each of {counted(len(rows), 'combination')}"
-            f"{f'; {done}.' if ready else '.'}",
-            width="content",
-        )
-    _say_what_came_of_it(asked, rows)
-
-
-def _start(name: str, rows: Sequence[Row], episodes: int) -> None:
-    st.session_state[f"_job_{name}"] = Comparing(rows, episodes)
-
-
-def _say_what_came_of_it(asked: Comparing | None, rows: Sequence[Row]) -> None:
-    """What the last work has to say besides its numbers."""
-    if asked is None:
-        return
+    batch = place.job.result if place.job is not None else None
     keys = {row.key for row in rows}
-    sentences = sorted({str(error) for key, error in asked.problems.items() if key in keys})
-    if asked.error is not None:
-        sentences.append(str(asked.error))
-    for sentence in sentences:
-        st.error(in_full(sentence), icon=":material/error:")
-    if asked.cancelled:
-        st.info(
-            "Cancelled. What had been finished is kept; Run goes on from there.",
-            icon=":material/pause_circle:",
-        )
+    problems = batch.problems.items() if batch is not None else ()
+    ready = sum(some is not None and len(some) == episodes for some in known(rows, episodes))
+    done = "all done already" if ready == len(rows) else f"{ready} done already"
+    run_bar(
+        place,
+        Offer(
+            key=None,  # each row is kept by itself, so it goes on from whatever was run before
+            start=lambda: run_batch(rows, episodes),
+            about=f"{counted(episodes, 'episode')} for each of {counted(len(rows), 'combination')}"
+            f"{f'; {done}.' if ready else '.'}",
+            complete=ready == len(rows),
+            problems=sorted({str(error) for key, error in problems if key in keys}),
+        ),
+    )

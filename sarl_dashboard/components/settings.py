@@ -10,7 +10,7 @@ import streamlit as st
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
-from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS
 from sarl_dashboard.state.edits import offered as edits_offered
 from sarl_dashboard.state.environments import ENVIRONMENTS
 from sarl_dashboard.state.rule_choice import EDITED
@@ -85,3 +85,12 @@ def no_boxes_notice(rule_sets: list[RuleSet], outside: Outside) -> None:
             "Mine them again to have the boxes.",
             icon=":material/frame_inspect:",
         )
+
+
+def known_seeds_notice() -> None:
+    """Say that rules are tried on seeds that they were mined from."""
+    st.warning(
+        "Some of these seeds are those of the demonstrations, where the rules know the way. A "
+        f"first seed such as {FRESH_SEED:,} shows what they bring elsewhere.",
+        icon=":material/casino:",
+    )

@@ -9,6 +9,7 @@ from functools import partial
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
+from sarl_core.processes import Processes
 from sarl_core.rollouts.tasks import run_tasks
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import Ablation
@@ -55,25 +56,26 @@ def records() -> Kept[AblationRecord]:
     return Kept(MOST_RECORDS)
 
 
-class Ablating(Job):
-    """The episodes of an ablation that are not known yet."""
+def ablating(wanted: Wanted) -> Job[AblationRecord]:
+    """Run the episodes of an ablation that are not known yet.
 
-    def __init__(self, wanted: Wanted) -> None:
-        self.key, self._wanted = wanted.key, wanted
-        # Streamlit's caches are asked here: the work's own thread has no session.
-        self._records, self._processes = records(), processes()
-        super().__init__(self._ablate, wanted.episodes)
+    Args:
+        wanted: What is asked for.
+    """
+    kept, executor = records(), processes()
+    return Job(wanted.key, lambda job: _ablate(job, wanted, kept, executor), wanted.episodes)
 
-    def _ablate(self, _: Job) -> None:
-        wanted = self._wanted
-        record = self._records.get(wanted.key)
-        if record is None:
-            self.text = "Making the agent …"
-            record = AblationRecord(wanted.env_id, wanted.agent(), wanted.shield(), wanted.seed)
-            self._records.put(wanted.key, record)
-        runner = partial(run_tasks, executor=self._processes)
-        work = record.run(wanted.episodes, wanted.most, runner)
-        for self.done, self.total, self.text in work:
-            if not self.wanted():
-                work.close()
-                return
+
+def _ablate(
+    job: Job[AblationRecord], wanted: Wanted, kept: Kept[AblationRecord], executor: Processes
+) -> None:
+    record = kept.get(wanted.key)
+    if record is None:
+        job.text = "Making the agent …"
+        record = AblationRecord(wanted.env_id, wanted.agent(), wanted.shield(), wanted.seed)
+        kept.put(wanted.key, record)
+    work = record.run(wanted.episodes, wanted.most, partial(run_tasks, executor=executor))
+    for job.done, job.total, job.text in work:
+        if not job.wanted():
+            work.close()
+            return

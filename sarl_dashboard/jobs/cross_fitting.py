@@ -20,14 +20,15 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.progress import Progress
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
-from sarl_dashboard.jobs.mining import Mining
+from sarl_dashboard.jobs.job import Job, Place
+from sarl_dashboard.jobs.mining import mining
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 from sarl_dashboard.text import in_full
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
-_JOB = "_elsewhere"
+_PLACE = Place[CrossFit]("elsewhere")
 _LOOK_SECONDS = 1.0
 
 
@@ -59,22 +60,21 @@ def _judged(key: tuple[object, ...], thresholds: Thresholds, _fit: CrossFit) -> 
     return _fit.at(thresholds)
 
 
-def _job(key: tuple[object, ...]) -> Mining | None:
+def _job(key: tuple[object, ...]) -> Job[CrossFit] | None:
     """The work of this session, if it is about these data."""
-    found = st.session_state.get(_JOB)
-    return found if isinstance(found, Mining) and found.key == key else None
+    job = _PLACE.job
+    return job if job is not None and job.key == key else None
 
 
 def _begin(demonstrations: Demonstrations, divider: int) -> None:
     key, whose = _key(demonstrations, divider), owner()
-    before = st.session_state.get(_JOB)
-    if isinstance(before, Mining):
-        before.cancel()
+    if _PLACE.job is not None:
+        _PLACE.job.cancel()
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         return cross_fit(demonstrations, divider=divider, executor=executor, progress=progress)
 
-    st.session_state[_JOB] = Mining(key, work, lambda found: keep(key, found, whose))
+    _PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, whose)))
 
 
 def make_ready() -> None:

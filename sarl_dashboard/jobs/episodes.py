@@ -9,19 +9,19 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from threading import Lock
-from typing import cast
 
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
 from sarl_core.errors import SarlError
+from sarl_core.processes import Processes
 from sarl_core.rollouts.episodes import Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.tasks import Task, run_tasks
 from sarl_core.shielding.shield import Shield
-from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.text import digest_of
 
@@ -123,92 +123,79 @@ def results() -> Results:
     return Results()
 
 
-class Comparing(Job):
-    """Episodes of several rows, run one row after the other.
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Rows that were asked for together.
 
     Attributes:
+        rows: Each once; two names may mean the same, as "filtered" and these very thresholds.
+        episodes: How many of each.
         problems: By key, why a row's episodes cannot be run; the others are run all the same.
     """
 
-    def __init__(self, rows: Sequence[Row], episodes: int) -> None:
-        self.problems: dict[str, SarlError] = {}
-        # Two names may mean the same, as "filtered" and these very thresholds.
-        self._rows = tuple({row.key: row for row in reversed(rows)}.values())[::-1]
-        self._episodes = episodes
-        # Streamlit's caches are asked here: the work's own thread has no session.
-        self._results, self._processes = results(), processes()
-        super().__init__(self._compare, len(self._rows) * episodes)
+    rows: tuple[Row, ...]
+    episodes: int
+    problems: dict[str, SarlError] = field(default_factory=dict)
 
-    @property
-    def rows(self) -> tuple[Row, ...]:
-        """What was asked for."""
-        return self._rows
 
-    @property
-    def episodes(self) -> int:
-        """How many of each row."""
-        return self._episodes
+COMPARISON = Place[Batch]("comparison")  # of the page Shield
 
-    def _compare(self, _: Job) -> None:
-        todo, tasks = [], []
-        for row in self._rows:
-            have = self._results.get(row.key, self._episodes)
-            count = len(have) if have is not None else 0
-            self.done += count
-            if count < self._episodes:
-                self.text = f"Preparing {row.name} …"
-                try:
-                    tasks.append(self._task(row, count))
-                    todo.append(row)
-                except SarlError as error:
-                    self.problems[row.key] = error
-                    self.done += self._episodes - count
-            if not self.wanted():
-                return
-        self.text = "Starting …"
-        work = run_tasks(tasks, self._processes)
-        for index, found in work:
-            row = todo[index]
-            if isinstance(found, SarlError):
-                self.problems[row.key] = found
-                continue
-            self._results.add(row, found)
-            self.done += len(found)
-            self.text = f"{row.name}: {self._count(row)} of {self._episodes} episodes"
-            if not self.wanted():
-                work.close()
-                return
 
-    def _count(self, row: Row) -> int:
-        have = self._results.get(row.key, self._episodes)
+def run_batch(rows: Sequence[Row], episodes: int) -> Job[Batch]:
+    """Run what is missing of the episodes of several rows, one row after the other.
+
+    Args:
+        rows: What is looked at.
+        episodes: How many of each.
+    """
+    batch = Batch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
+    kept, executor = results(), processes()
+    return Job(
+        None,
+        lambda job: _run(job, batch, kept, executor),
+        len(batch.rows) * episodes,
+        batch,
+    )
+
+
+def _run(job: Job[Batch], batch: Batch, kept: Results, executor: Processes) -> None:
+    def count(row: Row) -> int:
+        have = kept.get(row.key, batch.episodes)
         return len(have) if have is not None else 0
 
-    def _task(self, row: Row, have: int) -> Task:
-        agent, shield = row.agent(), row.shield()
-        check_environment(row.env_id, shield)
-        return Task(row.env_id, agent, shield, row.seed + have, self._episodes - have)
+    todo, tasks = [], []
+    for row in batch.rows:
+        have = count(row)
+        job.done += have
+        if have < batch.episodes:
+            job.text = f"Preparing {row.name} …"
+            try:
+                tasks.append(_task(row, have, batch.episodes))
+                todo.append(row)
+            except SarlError as error:
+                batch.problems[row.key] = error
+                job.done += batch.episodes - have
+        if not job.wanted():
+            return
+    job.text = "Starting …"
+    work = run_tasks(tasks, executor)
+    for index, outcome in work:
+        row = todo[index]
+        if isinstance(outcome, SarlError):
+            batch.problems[row.key] = outcome
+            continue
+        kept.add(row, outcome)
+        job.done += len(outcome)
+        job.text = f"{row.name}: {count(row)} of {batch.episodes} episodes"
+        if not job.wanted():
+            work.close()
+            return
 
 
-def job(name: str) -> Comparing | None:
-    """The work that this visitor asked for last.
-
-    Args:
-        name: Of the place on screen.
-
-    Returns:
-        None if nothing was asked for.
-    """
-    return cast("Comparing | None", st.session_state.get(f"_job_{name}"))
-
-
-def working(name: str) -> bool:
-    """Whether it goes on.
-
-    Args:
-        name: Of the place on screen.
-    """
-    asked = job(name)
-    return asked is not None and asked.running
+def _task(row: Row, have: int, episodes: int) -> Task:
+    agent, shield = row.agent(), row.shield()
+    check_environment(row.env_id, shield)
+    return Task(row.env_id, agent, shield, row.seed + have, episodes - have)
 
 
 def known(rows: Sequence[Row], episodes: int) -> list[Episodes | None]:

@@ -17,7 +17,7 @@ from sarl_core.improving.gaps import Gaps, gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.progress import CancelledError
+from sarl_core.processes import Processes
 from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
@@ -83,116 +83,117 @@ def _one_at_a_time() -> Lock:
     return Lock()
 
 
-class Working(Job):
-    """A run, beside the page.
+def improving(order: Order) -> Job[Outcome]:
+    """Improve rules, or find their gaps where there is nobody to ask.
 
-    Attributes:
-        order: What was asked for.
-        outcome: What is known so far.
+    Args:
+        order: What is asked for.
     """
+    kept, lock, executor = kept_outcomes(), _one_at_a_time(), processes()
 
-    def __init__(self, order: Order) -> None:
-        self.order = order
-        self.outcome = Outcome(order)
-        # Streamlit's caches are asked here: the work's own thread has no session.
-        self._kept, self._lock = kept_outcomes(), _one_at_a_time()
-        self._processes = processes()
-        self._began = time.monotonic()
-        super().__init__(self._in_turn, order.plan.rounds * order.plan.episodes)
-
-    @property
-    def stopping(self) -> bool:
-        """Whether it was called off and what it has finished is still being gathered."""
-        return self._cancelled and not self._finished
-
-    def _in_turn(self, _: Job) -> None:
-        with self._turn() as mine:
+    def in_turn(job: Job[Outcome]) -> None:
+        with _turn(job, lock) as mine:
             if not mine:
                 return
-            self._began = time.monotonic()
-            try:
-                finished = self._find_gaps() if self.order.expert is None else self._improve()
-            except CancelledError:
-                return
+            run = _Run(job, order, executor, time.monotonic())
+            outcome, finished = run.find_gaps() if order.expert is None else run.improve()
+        job.result = outcome
         if finished:
-            self._kept.put(self.order.key, self.outcome)
+            kept.put(order.key, outcome)
 
-    @contextmanager
-    def _turn(self) -> Iterator[bool]:
-        """Wait for other visitors' runs; False where this one is no longer wanted by then."""
-        while not self._lock.acquire(timeout=0.3):
-            self.text = "Waiting until another run has ended …"
-            if not self.wanted():
-                yield False
-                return
-        try:
-            yield True
-        finally:
-            self._lock.release()
+    return Job(order.key, in_turn, order.plan.rounds * order.plan.episodes, Outcome(order))
 
-    def _improve(self) -> bool:
-        order = self.order
+
+@contextmanager
+def _turn(job: Job[Outcome], lock: Lock) -> Iterator[bool]:
+    """Wait for other visitors' runs; False where this one is no longer wanted by then."""
+    while not lock.acquire(timeout=0.3):
+        job.text = "Waiting until another run has ended …"
+        if not job.wanted():
+            yield False
+            return
+    try:
+        yield True
+    finally:
+        lock.release()
+
+
+@dataclass
+class _Run:
+    """A run, and what it tells of itself meanwhile."""
+
+    job: Job[Outcome]
+    order: Order
+    executor: Processes
+    began: float
+    rounds: tuple[Round, ...] = ()
+
+    def improve(self) -> tuple[Outcome, bool]:
+        """What came of asking the expert, and whether it was finished."""
+        order, job = self.order, self.job
         assert order.expert is not None
-        self.text = "Growing the first trees …"
+        job.text = "Growing the first trees …"
 
         def progress(done: int, total: int) -> bool:
-            self.done, self.total = done, total
-            self.text = self._phase() + self._time_left()
-            return self.wanted()
+            wanted = job.progress(done, total)
+            job.text = self._phase() + self._time_left()
+            return wanted
 
         def watch(finished: Round) -> None:
-            self.outcome = Outcome(order, (*self.outcome.rounds, finished))
-            self.text = self._phase() + self._time_left()
+            self.rounds = (*self.rounds, finished)
+            job.result = Outcome(order, self.rounds)
+            job.text = self._phase() + self._time_left()
 
-        found = aggregate(
+        improved = aggregate(
             order.start,
             order.plan,
             env_id=order.env_id,
             expert=order.expert(),
-            jobs=self._processes.workers,
-            executor=self._processes,
+            jobs=self.executor.workers,
+            executor=self.executor,
             progress=progress,
             watch=watch,
         )
-        self.outcome = Outcome(order, found.rounds, found)
-        return found.is_finished
+        return Outcome(order, improved.rounds, improved), improved.is_finished
+
+    def find_gaps(self) -> tuple[Outcome, bool]:
+        """States that need a demonstration; always finished, unless it was called off."""
+        order, job = self.order, self.job
+        assert order.rules is not None
+        outcome = Outcome(order)
+
+        def progress(done: int, total: int) -> bool:
+            job.done = done
+            job.text = f"{done} of {counted(total, 'episode')}{self._time_left()}"
+            return job.wanted()
+
+        progress(0, order.plan.episodes)
+        for gaps in gaps_so_far(
+            order.env_id,
+            order.rules,
+            episodes=order.plan.episodes,
+            seed=order.plan.seed,
+            jobs=self.executor.workers,
+            executor=self.executor,
+            progress=progress,
+        ):
+            job.result = outcome = Outcome(order, gaps=gaps)
+        return outcome, True
 
     def _phase(self) -> str:
-        plan, finished = self.order.plan, len(self.outcome.rounds)
+        plan, finished = self.order.plan, len(self.rounds)
         if finished < plan.rounds:
             return f"Round {finished + 1} of {plan.rounds}: the rules act, the expert answers"
-        if self.done > self.total - plan.report:
+        if self.job.done > self.job.total - plan.report:
             return "The best rules on fresh episodes"
         if plan.generations:
             return "Choosing the best round and refining its rules"
         return "Choosing the best round on other episodes"
 
     def _time_left(self) -> str:
-        if self.share < _SOON:
+        if self.job.share < _SOON:
             return " …"
-        left = (time.monotonic() - self._began) * (1 / self.share - 1)
+        left = (time.monotonic() - self.began) * (1 / self.job.share - 1)
         if left < 50:
             return f" · about {max(5, 5 * round(left / 5))} s left"
         return f" · about {counted(max(1, round(left / 60)), 'minute')} left"
-
-    def _find_gaps(self) -> bool:
-        order = self.order
-        assert order.rules is not None
-
-        def progress(done: int, total: int) -> bool:
-            self.done = done
-            self.text = f"{done} of {counted(total, 'episode')}{self._time_left()}"
-            return self.wanted()
-
-        progress(0, order.plan.episodes)
-        for found in gaps_so_far(
-            order.env_id,
-            order.rules,
-            episodes=order.plan.episodes,
-            seed=order.plan.seed,
-            jobs=self._processes.workers,
-            executor=self._processes,
-            progress=progress,
-        ):
-            self.outcome = Outcome(order, gaps=found)
-        return True

@@ -9,34 +9,51 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from threading import Thread
+from typing import Generic, TypeVar, cast
 
+import streamlit as st
 from streamlit import runtime
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.errors import SarlError, WorkError
+from sarl_core.progress import CancelledError
 
 GONE_AFTER = 20.0  # seconds without a connection: longer than a reload, or a tunnel
 
+Result = TypeVar("Result")
 
-class Job:
+
+class Job(Generic[Result]):
     """One piece of work in a thread of its own.
 
     Attributes:
+        key: Of everything that its result depends on.
+        result: What came of it so far, for the page; None where there is nothing yet.
         total: Units of work in all.
         done: Units finished.
         text: What is being done.
         error: Why it ended early; None if it did not, or was called off.
     """
 
-    def __init__(self, work: Callable[[Job], None], total: int) -> None:
+    def __init__(
+        self,
+        key: object,
+        work: Callable[[Job[Result]], None],
+        total: int,
+        result: Result | None = None,
+    ) -> None:
         """Start at once.
 
         Args:
+            key: Of everything that its result depends on.
             work: Does it, tells how far it is, and stops when no longer `wanted`. No Streamlit in
-                there: it has no page to write to.
+                there: it has no page to write to, and no session for caches.
             total: Units of work in all.
+            result: What there is of it before it begins.
         """
+        self.key, self.result = key, result
         self.total, self.done, self.text = total, 0, "Starting …"
         self.error: SarlError | None = None
         self._work = work
@@ -57,6 +74,11 @@ class Job:
         return self._cancelled
 
     @property
+    def stopping(self) -> bool:
+        """Whether it was called off, and still gathers what it has finished."""
+        return self._cancelled and not self._finished
+
+    @property
     def share(self) -> float:
         """How far it is, 0 to 1."""
         return min(self.done / self.total, 1.0) if self.total else 1.0
@@ -73,9 +95,16 @@ class Job:
             self._seen = now
         return not self._cancelled and now - self._seen < GONE_AFTER
 
+    def progress(self, done: int, total: int) -> bool:
+        """Tell how far it is, and ask whether to go on; for the work itself."""
+        self.done, self.total = done, total
+        return self.wanted()
+
     def _run(self) -> None:
         try:
             self._work(self)
+        except CancelledError:
+            pass
         except SarlError as error:
             self.error = error
         except Exception:  # a mistake of ours: the page has a sentence, the log the rest
@@ -83,3 +112,32 @@ class Job:
             self.error = WorkError("the work failed unexpectedly; the server's log says more")
         finally:
             self._finished = True
+
+
+@dataclass(frozen=True)
+class Place(Generic[Result]):
+    """Where on screen a visitor begins work of one kind, and looks at the latest of it.
+
+    Attributes:
+        name: Tells it from others.
+        gathering: What is said while work that was called off gathers what it has finished; ""
+            where nobody waits for that.
+    """
+
+    name: str
+    gathering: str = ""
+
+    @property
+    def job(self) -> Job[Result] | None:
+        """What this visitor began last; None if nothing was."""
+        return cast("Job[Result] | None", st.session_state.get(f"_job_{self.name}"))
+
+    @property
+    def at_work(self) -> bool:
+        """Whether more is to come of it."""
+        job = self.job
+        return job is not None and (job.running or bool(self.gathering and job.stopping))
+
+    def begin(self, start: Callable[[], Job[Result]]) -> None:
+        """Begin work in the place of the one before; for a callback."""
+        st.session_state[f"_job_{self.name}"] = start()

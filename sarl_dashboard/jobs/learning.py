@@ -32,6 +32,7 @@ from sarl_core.learning.study_files import (
     make_folder,
     policy_path,
 )
+from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.shield import Projection
 from sarl_core.shipped import DATA
@@ -44,7 +45,7 @@ MOST_TRAININGS = 2  # at once, of all visitors: each takes a core
 MOST_FOLDERS = 24  # the oldest go first; one takes a few MB
 LEFT_ALONE = 6 * 3600.0  # seconds without a look before a folder may go
 PATIENCE = 30.0  # seconds that a process gets to save what it has learned
-_LOOKED_AT_EVERY = 0.5  # seconds
+_LOOKED_AT_EVERY = 1.0  # seconds
 _NICE = 10  # the dashboard answers first
 
 
@@ -242,51 +243,70 @@ def trainings() -> Trainings:
     return Trainings()
 
 
-class Learning(Job):
-    """A study that a visitor waits for.
-
-    Attributes:
-        order: What was asked for.
-        began: When, on the clock of `time.monotonic`.
-        already: Steps that had been made before.
-    """
-
-    def __init__(self, order: Order) -> None:
-        """Begin, or go on.
-
-        Args:
-            order: What is asked for.
-        """
-        self.order = order
-        self.began = time.monotonic()
-        self.already = steps_made(order)
-        everyone = trainings()
-        super().__init__(lambda job: _wait(job, order, everyone), order.steps_in_all)
-
-
-def steps_made(order: Order) -> int:
-    """How many steps of a study have been made.
+def learning(order: Order) -> Job[LearningStudy]:
+    """Wait for a study, which begins or goes on; what there is of it is the result so far.
 
     Args:
-        order: What was asked for.
+        order: What is asked for.
     """
-    try:
-        study = study_of(order)
-    except SarlError:
-        return 0
-    return sum(run.done for run in study.runs) if study is not None else 0
+    everyone = trainings()
+    return Job(
+        order.folder, lambda job: _wait(job, order, everyone), order.steps_in_all, _so_far(order)
+    )
 
 
-def _wait(job: Job, order: Order, everyone: Trainings) -> None:
+def _so_far(order: Order) -> LearningStudy | None:
+    with suppress(SarlError):
+        return study_of(order)
+    return None
+
+
+def _wait(job: Job[LearningStudy], order: Order, everyone: Trainings) -> None:
+    began, already = time.monotonic(), _steps_made(job.result)
     training = everyone.join(order)
     try:
         while job.wanted() and training.running:
+            job.result = _so_far(order) or job.result
+            job.done = _steps_made(job.result)
+            job.text = _progress_text(job, order, job.done - already, time.monotonic() - began)
             time.sleep(_LOOKED_AT_EVERY)
         ended = not training.running
     finally:
         everyone.leave(training)
     if ended and job.wanted() and (problem := training.problem()):
         raise WorkError(problem)
+
+
+def _steps_made(study: LearningStudy | None) -> int:
+    return sum(run.done for run in study.runs) if study is not None else 0
+
+
+def _progress_text(job: Job[LearningStudy], order: Order, made: int, seconds: float) -> str:
+    """Who learns, and how long it may still take.
+
+    Args:
+        job: The work.
+        order: What is asked for.
+        made: Steps since it began.
+        seconds: Since it began.
+    """
+    left = ""
+    if made > 0 and seconds > 10:
+        minutes = seconds / made * (job.total - job.done) / 60
+        left = (
+            f", about {counted(round(minutes), 'minute')} left"
+            if minutes >= 1.5
+            else (", about a minute left")
+        )
+    run = next((run for run in job.result.runs if not run.finished), None) if job.result else None
+    who = (
+        f"{run.arm.title}, learner {run.seed + 1}: {run.done:,} of {order.steps:,} steps"
+        if run is not None
+        else "Starting …"
+        if made <= 0
+        else "Next one …"
+    )
+    return who + left
 
 
 def _take_over_finished(order: Order) -> None:

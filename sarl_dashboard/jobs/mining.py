@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import Any, TypeVar
+from typing import Any
 
 import streamlit as st
 
-from sarl_core.progress import CancelledError, Progress
+from sarl_core.progress import Progress
 from sarl_dashboard.byte_cache import Kept
-from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.job import Job, Result
 from sarl_dashboard.jobs.processes import processes
 
 KEPT = 24
 
-Result = TypeVar("Result")
 Work = Callable[[Executor, Progress], Result]
 
 
@@ -25,26 +24,21 @@ def mining_results() -> Kept[Any]:
     return Kept(KEPT)
 
 
-class Mining(Job):
-    """One piece of such work.
+def mining(key: object, work: Work[Result], keep: Callable[[Result], None]) -> Job[Result]:
+    """Mine in these processes.
 
-    Attributes:
-        key: Of what it depends on.
+    Args:
+        key: Of what the result depends on.
+        work: Gives the result.
+        keep: Called with it.
     """
+    executor = processes()
 
-    def __init__(self, key: object, work: Work[Any], keep: Callable[[Any], None]) -> None:
-        self.key, self._todo, self._keep = key, work, keep
-        # Streamlit's caches are asked here: the work's own thread has no session.
-        self._processes = processes()
-        super().__init__(self._mine, 1)
-
-    def _mine(self, _: Job) -> None:
+    def mine(job: Job[Result]) -> None:
         def progress(done: int, total: int) -> bool:
-            self.done, self.total = done, total
-            self.text = f"{done} of {total} rule sets mined"
-            return self.wanted()
+            job.text = f"{done} of {total} rule sets mined"
+            return job.progress(done, total)
 
-        try:
-            self._keep(self._todo(self._processes, progress))
-        except CancelledError:
-            return
+        keep(work(executor, progress))
+
+    return Job(key, mine, 1)

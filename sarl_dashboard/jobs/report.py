@@ -15,8 +15,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
 from sarl_dashboard.byte_cache import Kept
-from sarl_dashboard.jobs.episodes import job as shield_job
-from sarl_dashboard.jobs.episodes import results
+from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.text import digest_of
 
@@ -60,8 +59,8 @@ def order_key(
     Returns:
         Hexadecimal digits.
     """
-    asked = (wishes.in_full, wishes.frames, wishes.commands, wishes.rules_name)
-    return digest_of(repr((rules, demonstrations.digest, asked, tuple(comparison))).encode())
+    contents = (wishes.in_full, wishes.frames, wishes.commands, wishes.rules_name)
+    return digest_of(repr((rules, demonstrations.digest, contents, tuple(comparison))).encode())
 
 
 @st.cache_resource
@@ -70,44 +69,34 @@ def kept_reports() -> Kept[Report]:
     return Kept(KEPT)
 
 
-class Reporting(Job):
-    """One report in the making.
+def reporting(order: Order) -> Job[Report]:
+    """Make a report.
 
-    Attributes:
-        order: What was asked for.
+    Args:
+        order: What is asked for.
     """
-
-    def __init__(self, order: Order) -> None:
-        self.order = order
-        self._kept = kept_reports()  # the work's own thread has no session
-        super().__init__(self._make, 100)
-
-    def _make(self, _: Job) -> None:
-        order = self.order
-        self.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
-
-        def told(done: int, total: int) -> bool:
-            self.done, self.total = done, total
-            if done == total:
-                self.text = "Writing …"
-            return self.wanted()
-
-        report = make_report(
-            order.rule_set,
-            order.demonstrations,
-            **vars(order.wishes),
-            card=order.card,
-            comparison=order.comparison,
-            trees=order.trees,
-            progress=told,
-        )
-        self._kept.put(order.key, report)
+    kept = kept_reports()
+    return Job(order.key, lambda job: _make(job, order, kept), 100)
 
 
-def kept_report(key: str) -> Report | None:
-    """The report of an order, if it has been made."""
-    found = kept_reports().get(key)
-    return found if isinstance(found, Report) else None
+def _make(job: Job[Report], order: Order, kept: Kept[Report]) -> None:
+    job.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
+
+    def progress(done: int, total: int) -> bool:
+        if done == total:
+            job.text = "Writing …"
+        return job.progress(done, total)
+
+    report = make_report(
+        order.rule_set,
+        order.demonstrations,
+        **vars(order.wishes),
+        card=order.card,
+        comparison=order.comparison,
+        trees=order.trees,
+        progress=progress,
+    )
+    kept.put(order.key, report)
 
 
 def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:
@@ -120,23 +109,22 @@ def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:
         The comparison, None where there is none; and the name of the file that the page Shield
         downloads of it.
     """
-    asked = shield_job("comparison")
-    if asked is None or asked.running:
+    job = COMPARISON.job
+    if job is None or job.running or job.result is None:
         return None, ""
-    arms, found = [], []
-    rows = [row for row in asked.rows if row.env_id == env_id]
-    for row in rows:
-        episodes = results().get(row.key, asked.episodes)
-        shield = row.shield()
+    arms, finished = [], []
+    rows = [row for row in job.result.rows if row.env_id == env_id]
+    for row, episodes in zip(rows, known(rows, job.result.episodes), strict=True):
         if episodes is not None:
+            shield = row.shield()
             rules = shield.rule_set if shield is not None else None
             arms.append(Arm(row.name, episodes.agent, rules))
-            found.append(episodes)
-    if not found:
+            finished.append(episodes)
+    if not finished:
         return None, ""
     seed = rows[0].seed
     name = f"comparison-{env_id.rsplit('/', 1)[-1]}-{seed}.csv"
-    return Comparison(env_id, seed, tuple(arms), tuple(found)), name
+    return Comparison(env_id, seed, tuple(arms), tuple(finished)), name
 
 
 def as_results(comparison: Comparison | None) -> tuple[Result, ...]:

@@ -68,6 +68,11 @@ def set_upload(demonstrations: Demonstrations, *, file_name: str = "") -> None:
     choose_dataset(UPLOAD)
 
 
+def upload_name() -> str:
+    """Of the file that was uploaded, as the command line would name it."""
+    return str(st.session_state.get("_upload_name") or "demonstrations.parquet")
+
+
 def uploaded_demonstrations() -> Demonstrations | None:
     """The demonstrations uploaded in this session, if any."""
     return cast("Demonstrations | None", st.session_state.get("_upload"))

@@ -37,7 +37,7 @@ def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of shipped rules, empty at first."""
     open_page("demonstrations", data="cartpole")  # finds the modules of the pages
     monkeypatch.setattr("sarl_dashboard.state.rule_files.RULES_FOLDER", tmp_path)
-    monkeypatch.setattr("sarl_dashboard.views.improve.outcome.RULES_FOLDER", tmp_path)
+    monkeypatch.setattr("sarl_dashboard.views.improve.shipped.RULES_FOLDER", tmp_path)
     return tmp_path
 
 

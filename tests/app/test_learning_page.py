@@ -87,7 +87,7 @@ def until_over(app: AppTest) -> AppTest:
     for _ in range(600):
         app.run()
         assert not app.exception, app.exception
-        if button(app, "learn_stop") is None:
+        if button(app, "cancel_learning") is None:
             return app
         time.sleep(0.3)
     raise AssertionError(texts(app))
@@ -161,13 +161,13 @@ def test_before_the_start_it_says_what_to_do() -> None:
 
 def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None:
     app = own("none", "imitate", learn_steps="1000")
-    app.button(key="learn_start").click().run()
+    app.button(key="run_learning").click().run()
     assert not app.exception
-    assert button(app, "learn_stop") is not None
+    assert button(app, "cancel_learning") is not None
     until_over(app)
     assert not errors(app), errors(app)
     assert "2 runs of 1,000 steps in CartPole-v1, all finished" in texts(app)
-    assert app.button(key="learn_start").disabled
+    assert app.button(key="run_learning").disabled
     assert app.dataframe[0].value["Way to learn"].tolist() == ["No shield", "Mask and imitate"]
     assert [each.label for each in app.get("download_button")] == [
         "Download policy (.npz)",
@@ -182,13 +182,13 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
     app = own("none", learn_steps="20000")  # so many that it cannot have ended when it is stopped
-    app.button(key="learn_start").click().run()
-    job = app.session_state["_learning"]
+    app.button(key="run_learning").click().run()
+    job = app.session_state["_job_learning"]
     for _ in range(600):
-        if learning.steps_made(job.order):
+        if job.done:
             break
         time.sleep(0.1)
-    app.button(key="learn_stop").click().run()
+    app.button(key="cancel_learning").click().run()
     assert not app.exception
     assert "Stopped." in texts(app)
     for _ in range(600):
@@ -199,8 +199,8 @@ def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
     (folder,) = own_folder.iterdir()
     assert load_study(folder).runs[0].done > 0
     app.run()
-    assert app.button(key="learn_start").label == "Go on"
-    app.button(key="learn_start").click().run()
+    assert app.button(key="run_learning").label == "Go on"
+    app.button(key="run_learning").click().run()
     until_over(app)
     assert "all finished" in texts(app)
     assert load_study(folder).runs[0].sittings == 2
@@ -211,11 +211,11 @@ def test_a_study_that_cannot_be_learned_says_why(monkeypatch: pytest.MonkeyPatch
     # As when the disk is full, or a package is missing: the process says one line and ends.
     monkeypatch.setattr(learning.Training, "problem", lambda _: "there is no room left; make some")
     monkeypatch.setattr(learning.subprocess, "Popen", failing)
-    app.button(key="learn_start").click().run()
+    app.button(key="run_learning").click().run()
     until_over(app)
     (sentence,) = errors(app)
     assert sentence == "There is no room left; make some."
-    assert button(app, "learn_start") is not None
+    assert button(app, "run_learning") is not None
 
 
 def failing(*_: Any, **settings: Any) -> subprocess.Popen[bytes]:
@@ -240,7 +240,7 @@ def test_what_cannot_be_learned_is_said_in_a_sentence(
     (sentence,) = errors(app)
     assert fragment in sentence
     assert "\n" not in sentence
-    assert button(app, "learn_start") is None
+    assert button(app, "run_learning") is None
 
 
 def test_without_a_way_to_learn_it_asks_for_one() -> None:
@@ -338,7 +338,7 @@ def test_a_folder_that_cannot_be_made_is_said(
 ) -> None:
     own_folder.write_text("in the way")
     app = own("none", learn_steps="1000")
-    app.button(key="learn_start").click().run()
+    app.button(key="run_learning").click().run()
     until_over(app)
     (sentence,) = errors(app)
     assert "cannot be made" in sentence

@@ -17,7 +17,7 @@ CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
 
 def made(app: AppTest) -> AppTest:
     """Press the button, and look in until the report is there, as the browser does."""
-    app.button(key="make_report").click().run()
+    app.button(key="run_report").click().run()
     for _ in range(3_000):
         assert not app.exception, app.exception
         if "cancel_report" not in [button.key for button in app.button]:
@@ -41,7 +41,7 @@ def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkey
     assert "5 rules, 5 of them in full" in texts(app)
     assert not app.get("iframe")
     html = shown(made(app))
-    assert app.button(key="make_report").disabled
+    assert app.button(key="run_report").disabled
     assert [button.label for button in app.get("download_button")] == ["Download the report"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(DATA)
@@ -72,7 +72,7 @@ def test_rules_for_other_features_are_refused_in_place() -> None:
     app.file_uploader(key="report_rule_file").set_value(("cart.json", content, "")).run()
     (sentence,) = errors(app)
     assert "4 features and the demonstrations have 8" in sentence
-    assert "make_report" not in [button.key for button in app.button]
+    assert "run_report" not in [button.key for button in app.button]
 
 
 def test_without_demonstrations_the_page_says_what_to_do() -> None:

@@ -3,59 +3,55 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import streamlit as st
 
-from sarl_core.explaining.figures.comparison import ArmStyle, returns_figure, typical_figure
+from sarl_core.explaining.figures.comparison import returns_figure, typical_figure
 from sarl_core.explaining.words.comparison import POLICY_TEXT, verdict_on_all
 from sarl_core.mining.language import at_least_text, share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
-from sarl_core.studies.comparison import Arm, Comparison
+from sarl_core.studies.comparison import Comparison
 from sarl_dashboard.components.flips import flips_rate, flips_title
-from sarl_dashboard.jobs.episodes import Row
+from sarl_dashboard.components.run_bar import episodes_bar, watched
+from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
+from sarl_dashboard.views.shield.lines import Line
 
 PLAIN = {"displayModeBar": False}
 HEIGHT = 400
 ROW = 46  # pixels a row of the first figure
 
+Finished = Sequence[tuple[Line, Episodes]]
 
-@dataclass(frozen=True, eq=False)
-class Line:
-    """One agent with one shield.
 
-    Attributes:
-        row: What is run.
-        arm: What it is in a comparison.
-        style: How it is drawn.
-        agent: Name on screen.
-        shield: Name on screen.
+def comparison_of(lines: Sequence[Line], episodes: int) -> None:
+    """The button or the progress, and all that is known so far.
+
+    Args:
+        lines: What is compared; at least one.
+        episodes: How many of each.
     """
+    rows = [line.row for line in lines]
 
-    row: Row
-    arm: Arm
-    style: ArmStyle
-    agent: str
-    shield: str
+    def outcome(at_work: bool) -> None:
+        episodes_bar(COMPARISON, rows, episodes)
+        of_each = zip(lines, known(rows, episodes), strict=True)
+        show([(line, some) for line, some in of_each if some is not None], at_work=at_work)
+
+    watched(COMPARISON, outcome)
 
 
-Found = Sequence[tuple[Line, Episodes]]
-
-
-def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
+def show(finished: Finished, *, at_work: bool) -> None:
     """The comparison, or what to do where there is none.
 
     Args:
-        found: What has been run of the present choices.
-        env_id: Environment.
-        seed: Of the first episode.
+        finished: What has been run of the present choices.
         at_work: Whether more is on its way.
     """
-    if not found:
+    if not finished:
         if not at_work:
             st.info(
                 "Choose agents and shields, then press Run. The work goes on while you look at "
@@ -63,15 +59,16 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
                 icon=":material/play_circle:",
             )
         return
-    lines = [line for line, _ in found]
+    lines = [line for line, _ in finished]
+    env_id, seed = lines[0].row.env_id, lines[0].row.seed
     comparison = Comparison(
-        env_id, seed, tuple(line.arm for line in lines), tuple(episodes for _, episodes in found)
+        env_id, seed, tuple(line.arm for line in lines), tuple(episodes for _, episodes in finished)
     )
     styles = [line.style for line in lines]
     height = max(HEIGHT, 60 + ROW * len(lines))
     if not at_work:
-        told = [*verdicts(found), *policies(found), *remarks(found)]
-        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in told))
+        sentences = [*verdicts(finished), *policies(finished), *remarks(finished)]
+        st.markdown("\n".join(f"- {escaped(sentence)}" for sentence in sentences))
     left, right = st.columns([2, 3], gap="medium")
     with left:
         st.markdown("**Typical return**")
@@ -97,7 +94,7 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
         "alone."
     )
     st.dataframe(
-        [table_row(line, episodes) for line, episodes in found],
+        [table_row(line, episodes) for line, episodes in finished],
         hide_index=True,
         height="content",
         column_config=column_config(env_id),
@@ -116,11 +113,11 @@ def show(found: Found, env_id: str, seed: int, *, at_work: bool) -> None:
         )
 
 
-def verdicts(found: Found) -> list[str]:
+def verdicts(finished: Finished) -> list[str]:
     """For each agent, what every shield did to it."""
     sentences = []
-    for agent in dict.fromkeys(line.agent for line, _ in found):
-        own = [(line, episodes) for line, episodes in found if line.agent == agent]
+    for agent in dict.fromkeys(line.agent for line, _ in finished):
+        own = [(line, episodes) for line, episodes in finished if line.agent == agent]
         alone = next((episodes for line, episodes in own if line.arm.rules is None), None)
         if alone is None:
             continue
@@ -134,21 +131,21 @@ def verdicts(found: Found) -> list[str]:
     return sentences
 
 
-def policies(found: Found) -> list[str]:
+def policies(finished: Finished) -> list[str]:
     """Which of the rules leave an agent nothing to choose from."""
     names = dict.fromkeys(
         line.shield
-        for line, episodes in found
+        for line, episodes in finished
         if line.arm.rules is not None and episodes.summary().get("freedom") == 0.0
     )
     return [f"The {rules_name(name)}: {POLICY_TEXT[0].lower()}{POLICY_TEXT[1:]}." for name in names]
 
 
-def remarks(found: Found) -> list[str]:
+def remarks(finished: Finished) -> list[str]:
     """What is to be said of how the episodes came about, each once."""
     notes = dict.fromkeys(
         (line.shield if line.arm.rules is not None else "", note)
-        for line, episodes in found
+        for line, episodes in finished
         for note in episodes.remarks
     )
     return [

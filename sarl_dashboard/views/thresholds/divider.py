@@ -18,14 +18,15 @@ from sarl_core.mining.quantisation import (
 from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
-from sarl_dashboard.components.run_bar import run_bar
-from sarl_dashboard.jobs.episodes import Row, known, row_key, working
+from sarl_dashboard.components.run_bar import episodes_bar, watched
+from sarl_dashboard.jobs.episodes import Batch, Row, known, row_key
+from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.state.agents import FRESH_SEED, agent_for, has_expert, named_agent
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.text import escaped, in_full
 
-PLACE = "divider"
+PLACE = Place[Batch]("divider")
 MOST_EPISODES = 200
 
 Divided = tuple[tuple[Quantisation, ...], ...]
@@ -111,13 +112,9 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
         )
     )
     rows = snapped_rows(demonstrations, env_id, divided)
-    at_work = working(PLACE)
 
-    @st.fragment(run_every=1.0 if at_work else None)
-    def returns() -> None:
-        if at_work != working(PLACE):
-            st.rerun()  # as a whole: from now on every second, or no longer
-        run_bar(PLACE, list(rows.values()), episodes)
+    def returns(_: bool) -> None:
+        episodes_bar(PLACE, list(rows.values()), episodes)
         ready = dict(zip(rows, known(list(rows.values()), episodes), strict=True))
         cells = {
             (divider, snapping): run
@@ -138,7 +135,7 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
             "value in its interval, which is the action itself: that row is the expert as it is."
         )
 
-    returns()
+    watched(PLACE, returns)
 
 
 def unchanged_as(divider: int, snapping: Snapping) -> Combination:

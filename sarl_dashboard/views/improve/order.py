@@ -1,0 +1,113 @@
+"""What a run depends on, and the command that does the same."""
+
+from __future__ import annotations
+
+import shlex
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import in_order_of
+from sarl_core.environments.description import describe_environment
+from sarl_core.errors import InputError
+from sarl_core.improving.plan import Plan
+from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.mining.rules import Thresholds
+from sarl_core.rollouts.seeds import FRESH
+from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.jobs.improving import Order
+from sarl_dashboard.state.agents import agent_for, has_expert
+from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, upload_name
+from sarl_dashboard.state.environments import environment_of
+from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.rule_files import OWN_FILE
+from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_thresholds
+from sarl_dashboard.text import digest_of
+from sarl_dashboard.views.improve.settings import AT_THRESHOLDS, MOST, NOBODY, Choices
+
+GAPS_SEEDS_A_RUN = MOST
+
+
+def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
+    """What the choices ask for.
+
+    Args:
+        choices: What the widgets say.
+        demonstrations: What the expert has shown so far.
+
+    Raises:
+        InputError: If it cannot be had.
+    """
+    env_id = environment_of(choices.env)
+    demonstrations, notes = in_order_of(demonstrations, describe_environment(env_id))
+    notes_notice(notes)
+    if choices.expert == NOBODY:
+        return gaps_order(choices, demonstrations, env_id)
+    if choices.expert == OWN_FILE:
+        if choices.policy_file is None:
+            raise InputError("no policy has been uploaded; upload one, or choose another expert")
+        make, digest = agent_for(OWN_FILE, choices.policy_file, env_id, choices.seed)
+    else:
+        if not has_expert(env_id):
+            raise InputError(
+                f"no expert is shipped for {env_id}; give a policy of your own, or choose nobody "
+                "to see which states need a demonstration"
+            )
+        make, digest = agent_for("expert", None, env_id, choices.seed)
+    thresholds = None
+    if choices.cut == AT_THRESHOLDS:
+        in_force = chosen_thresholds()
+        thresholds = Thresholds(in_force.support, in_force.confidence)
+    plan = Plan(
+        choices.max_rules,
+        rounds=choices.rounds,
+        episodes=choices.episodes,
+        thresholds=thresholds,
+        divider=choices.divider,
+        generations=choices.refinement,
+        validation=choices.validation,
+        seed=choices.seed,
+    )
+    key = digest_of(repr((demonstrations.digest, env_id, plan, digest)).encode())
+    command = command_for(choices, demonstrations, env_id, thresholds)
+    return Order(key, demonstrations, env_id, plan, make, None, command)
+
+
+def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) -> Order:
+    """Which states need a demonstration, at the thresholds in force."""
+    rules = mined_rules(grown_trees(demonstrations, choices.divider))
+    plan = Plan(
+        MIN_RULES,
+        rounds=1,
+        episodes=choices.episodes,
+        thresholds=rules.thresholds,
+        divider=choices.divider,
+        seed=FRESH + choices.seed * GAPS_SEEDS_A_RUN,
+    )
+    key = digest_of(repr((demonstrations.digest, env_id, plan, NOBODY)).encode())
+    return Order(key, demonstrations, env_id, plan, None, rules, "")
+
+
+def command_for(
+    choices: Choices, demonstrations: Demonstrations, env_id: str, thresholds: Thresholds | None
+) -> str:
+    """The same on the command line, for the card."""
+    name = chosen_dataset()
+    file = f"data/demonstrations/{name}.parquet" if name in SHIPPED_SETS else upload_name()
+    statistics = choices.policy_file.statistics if choices.policy_file else None
+    words = ["python", "-m", "sarl_core", "aggregate", file]
+    for option, value, usual in (
+        ("--max-rules", choices.max_rules, None),
+        ("--env", env_id, demonstrations.env_id),
+        ("--expert", choices.policy_file.name if choices.policy_file else "expert", "expert"),
+        ("--normalise", statistics.name if statistics else None, None),
+        ("--rounds", choices.rounds, None),
+        ("--episodes", choices.episodes, None),
+        ("--support", thresholds and thresholds.support, None),
+        ("--confidence", thresholds and thresholds.confidence, None),
+        ("--divider", choices.divider, MIN_DIVIDER),
+        ("--refine", choices.refinement, 0),
+        ("--validation", choices.validation, None),
+        ("--seed", choices.seed, 0),
+    ):
+        if value is not None and value != usual:
+            words += [option, str(value)]
+    return shlex.join([*words, "--out", "rules.json"])

@@ -1,0 +1,143 @@
+"""What the Improve page asks for: who is asked, for how many rules, and how often."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.improving.refinement import generation_cost
+from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_dashboard.components.settings import environment_choice
+from sarl_dashboard.state.agents import PolicyFile, policy_upload
+from sarl_dashboard.state.rule_files import OWN_FILE
+from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER
+
+SHIPPED_EXPERT, NOBODY = "shipped", "nobody"
+EVERY_LEAF, AT_THRESHOLDS = "every leaf", "at the thresholds"
+MOST = 1_000  # of rules, episodes and steps; what needs more is for the command line
+MOST_ROUNDS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What the widgets say."""
+
+    env: str | None
+    expert: str
+    policy_file: PolicyFile | None
+    max_rules: int
+    cut: str
+    rounds: int
+    episodes: int
+    refinement: int
+    validation: int
+    seed: int
+    divider: int
+
+
+def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> int:
+    """A whole number."""
+    value = st.number_input(label, low, high, usual, key=key, bind="query-params", help=hint)
+    return int(usual if value is None else value)
+
+
+def settings(demonstrations: Demonstrations) -> Choices:
+    """The widgets."""
+    expert = st.session_state.get("expert") or st.query_params.get("expert")
+    is_asked = expert != NOBODY
+    max_rules, cut, rounds, refinement, validation = MIN_RULES, EVERY_LEAF, 1, 0, 1
+    divider, policy_file = MIN_DIVIDER, None
+    with st.container(border=True):
+        with st.grid(5, min_column_width=150, gap="small"):
+            env = environment_choice()
+            expert = st.selectbox(
+                "Expert",
+                (SHIPPED_EXPERT, OWN_FILE, NOBODY),
+                key="expert",
+                bind="query-params",
+                help="Who is asked. Shipped: the expert that comes with this environment. Own "
+                "file: a policy of yours. Nobody: the page shows which states need a "
+                "demonstration.",
+            )
+            if is_asked:
+                max_rules = number(
+                    "Most rules",
+                    "max_rules",
+                    MIN_RULES,
+                    MOST,
+                    24,
+                    "Of each action. Few can be read, more achieve more.",
+                )
+                cut = st.selectbox(
+                    "Rules are",
+                    (EVERY_LEAF, AT_THRESHOLDS),
+                    key="cut",
+                    bind="query-params",
+                    help="Every leaf: in every state some rule applies. At the thresholds: only "
+                    "where support and confidence reach those in the sidebar; elsewhere the agent "
+                    "acts alone.",
+                )
+                rounds = number(
+                    "Rounds",
+                    "rounds",
+                    1,
+                    MOST_ROUNDS,
+                    10,
+                    "How often the rules act and the expert answers. The best round is kept.",
+                )
+            episodes = number(
+                "Episodes a round" if is_asked else "Episodes",
+                "round_episodes",
+                1,
+                MOST,
+                20,
+                "In each of them the rules shield a novice, which acts at random.",
+            )
+            if is_asked:
+                validation = number(
+                    "Episodes to choose by",
+                    "validation",
+                    1,
+                    MOST,
+                    128,
+                    "All rounds are tried on a few episodes, the better half on twice as many, "
+                    "and so on; the last one left on this many.",
+                )
+                refinement = number(
+                    "Refinement steps",
+                    "refine",
+                    0,
+                    MOST,
+                    0,
+                    "Afterwards the rules' numbers and actions are moved to where they achieve "
+                    "more, so many times. "
+                    f"Each step takes {generation_cost()} episodes. 0: not at all.",
+                )
+            seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
+            if not demonstrations.is_discrete:
+                divider = st.slider(
+                    "Divider",
+                    MIN_DIVIDER,
+                    MAX_DIVIDER,
+                    key="divider",
+                    value=MIN_DIVIDER,
+                    bind="query-params",
+                    help="Number of equal intervals each continuous action is divided into.",
+                )
+        if expert == OWN_FILE:
+            policy_file = policy_upload("The expert", "expert_file", env)
+    return Choices(
+        env,
+        expert,
+        policy_file,
+        max_rules,
+        cut,
+        rounds,
+        episodes,
+        refinement,
+        validation,
+        seed,
+        divider,
+    )

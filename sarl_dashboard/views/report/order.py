@@ -1,0 +1,125 @@
+"""What a report is made of, and the commands that make it again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.explaining.report.comparison import Result, results_from_text
+from sarl_core.explaining.report.provenance import command_line, mining_command
+from sarl_core.explaining.report.report import Wishes
+from sarl_core.explaining.report.tally import report_rules
+from sarl_core.explaining.report.thresholds import read_card
+from sarl_core.mining.rule_set import RuleSet
+from sarl_dashboard.jobs.report import Order, as_results, comparison_of_session, order_key
+from sarl_dashboard.state.data import (
+    UPLOAD,
+    chosen_dataset,
+    data_key,
+    raw_demonstrations,
+    upload_name,
+)
+from sarl_dashboard.state.mined import grown_trees
+from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
+from sarl_dashboard.views.report.settings import Choices
+
+
+@dataclass(frozen=True)
+class Named:
+    """Files as the command line would name them."""
+
+    rules: str
+    demonstrations: str
+    results: tuple[str, ...]
+
+
+def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
+    """What the choices ask for.
+
+    Args:
+        choices: What the widgets say.
+        demonstrations: The report is about.
+
+    Raises:
+        InputError: If it cannot be had.
+    """
+    rule_set, digest = rules_for(choices.rules, choices.rule_file)
+    if rule_set is None:
+        raise InputError("there are no rules to report; choose some")
+    report_rules(rule_set, demonstrations)
+    results, files = results_of_choices(choices, demonstrations)
+    named = Named(*file_names(choices), files)
+    wishes = Wishes(
+        in_full=choices.in_full,
+        frames=choices.frames,
+        commands=commands(choices, rule_set, demonstrations, named),
+        rules_name=named.rules.rsplit("/", 1)[-1],
+        demonstrations_name=named.demonstrations.rsplit("/", 1)[-1],
+    )
+    grown = None
+    if rule_set.cut == "thresholds":
+        grown = grown_trees(demonstrations, rule_set.divider)
+    # The card of the shipped compact rules says how they came about.
+    card = read_card(compact_file()) if choices.rules == COMPACT else None
+    key = order_key(f"{digest} {data_key()}", demonstrations, wishes, results)
+    return Order(key, rule_set, demonstrations, wishes, card, results, grown)
+
+
+def results_of_choices(
+    choices: Choices, demonstrations: Demonstrations
+) -> tuple[tuple[Result, ...], tuple[str, ...]]:
+    """The results to show, and the names of their files."""
+    results: list[Result] = []
+    names: list[str] = []
+    if choices.with_session:
+        comparison, name = comparison_of_session(demonstrations.env_id)
+        results += as_results(comparison)
+        names += [name] if name else []
+    for file in choices.files:
+        content = file.getvalue()
+        try:
+            results += results_from_text(content.decode("utf-8-sig"), file.name)
+        except UnicodeDecodeError as error:
+            raise InputError(f"{file.name} is no text; give a CSV or JSON file") from error
+        names.append(file.name)
+    return tuple(results), tuple(names)
+
+
+def file_names(choices: Choices) -> tuple[str, str]:
+    """Of the rules and of the demonstrations, as the command line would name them."""
+    name = chosen_dataset()
+    data = f"data/demonstrations/{name}.parquet"
+    if name == UPLOAD:
+        data = upload_name()
+    rules = "rules.json"
+    if choices.rules == COMPACT:
+        rules = f"data/rules/{compact_file().name}"
+    elif choices.rule_file is not None:
+        rules = choices.rule_file.name
+    return rules, data
+
+
+def commands(
+    choices: Choices, rule_set: RuleSet, demonstrations: Demonstrations, named: Named
+) -> tuple[str, ...]:
+    """How the report is made again; () where a file alone does not hold what it is made of."""
+    raw = raw_demonstrations()
+    if raw is None or raw.digest != demonstrations.digest:
+        return ()  # episodes are held out or left out, or things have other names
+    mined = None
+    if choices.rules not in (COMPACT, OWN_FILE):
+        mined = mining_command(rule_set, named.rules, named.demonstrations, demonstrations)
+    again = command_line(
+        "report",
+        named.rules,
+        {
+            "--demonstrations": named.demonstrations,
+            "--comparison": list(named.results),
+            "--in-full": None if choices.in_full == Wishes.in_full else choices.in_full,
+            "--frames": None if choices.frames == Wishes.frames else choices.frames,
+            "--out": "report.html",
+        },
+    )
+    return (mined, again) if mined else (again,)

@@ -1,0 +1,81 @@
+"""The button that makes a report, and the report as it looks in a browser."""
+
+from __future__ import annotations
+
+import base64
+
+import streamlit as st
+
+from sarl_core.explaining.report.report import Report
+from sarl_core.mining.language import counted
+from sarl_dashboard.components.run_bar import Offer, run_bar, watched
+from sarl_dashboard.jobs.job import Place
+from sarl_dashboard.jobs.report import Order, kept_reports, reporting
+from sarl_dashboard.text import escaped
+
+PLACE = Place[Report]("report")
+PREVIEW = 900  # pixels
+
+
+def report_of(order: Order, name: str) -> None:
+    """The button or the progress, and the report.
+
+    Args:
+        order: What is asked for.
+        name: Of the data, for the file.
+    """
+
+    def outcome(at_work: bool) -> None:
+        report = kept_reports().get(order.key)
+        in_full = min(order.wishes.in_full, len(order.rule_set))
+        run_bar(
+            PLACE,
+            Offer(
+                key=order.key,
+                start=lambda: reporting(order),
+                about=f"{counted(len(order.rule_set), 'rule')}, {in_full:,} of them in full"
+                f"{'; made already' if report is not None else ''}.",
+                complete=report is not None,
+                cancelled="Cancelled; nothing was kept.",
+                label="Make the report",
+                icon=":material/summarize:",
+            ),
+        )
+        if report is not None and not at_work:
+            show(report, name)
+        elif not at_work and not order.comparison:
+            st.markdown(
+                ":material/info: :gray[A report says more with results in it: run agents with the "
+                "rules and without on the page Shield first, and come back.]"
+            )
+
+    watched(PLACE, outcome)
+
+
+def show(report: Report, name: str) -> None:
+    """The report itself."""
+    content = report.html.encode()
+    if report.without:
+        st.info(f"The report has no pictures: {escaped(report.without)}.", icon=":material/info:")
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.download_button(
+            "Download the report",
+            content,
+            f"report-{name}.html",
+            "text/html",
+            key="report_file",
+            on_click="ignore",
+            icon=":material/download:",
+        )
+        st.caption(
+            f"One HTML file of {len(content) / 1e6:.1f} MB with "
+            f"{counted(report.pictures, 'picture')}. It opens without a network, in any browser, "
+            "and prints on A4.",
+            width="content",
+        )
+    # As an address of its own the file has no access to this page, whatever names are in it.
+    st.iframe(
+        f"data:text/html;base64,{base64.b64encode(content).decode('ascii')}",
+        height=PREVIEW,
+        alt="The report as it looks in a browser",
+    )

@@ -1,0 +1,84 @@
+"""What the Report page asks for: the rules, and what the report is to hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_dashboard.components.settings import offered_rule_sets
+from sarl_dashboard.state.rule_choice import EDITED
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+
+RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What the widgets say."""
+
+    rules: str
+    rule_file: UploadedFile | None
+    in_full: int
+    frames: int
+    with_session: bool
+    files: list[UploadedFile]
+
+
+def settings(has_comparison: bool) -> Choices:
+    """The widgets.
+
+    Args:
+        has_comparison: Whether this visitor has run one on the page Shield.
+    """
+    with st.container(border=True):
+        with st.grid(3, min_column_width=150, gap="small"):
+            rules = st.selectbox(
+                "Rules",
+                offered_rule_sets(RULE_SETS),
+                key="report_rules",
+                bind="query-params",
+                help="At the thresholds: those in the sidebar. Filtered: support 0.005, confidence "
+                "0.95. Unfiltered: support 0, confidence 1. Compact: a small set that is shipped "
+                "for this task. Edited: those you changed on the page Edit. Own file: rules you "
+                "saved.",
+            )
+            in_full = st.number_input(
+                "Rules in full",
+                0,
+                300,
+                60,
+                key="in_full",
+                bind="query-params",
+                help="So many rules with evidence, conditions and pictures, those that apply most "
+                "often. The others stand in a table.",
+            )
+            frames = st.number_input(
+                "Pictures a rule",
+                0,
+                6,
+                3,
+                key="frames",
+                bind="query-params",
+                help="States in which the rule applies, from episodes that the shipped expert "
+                "plays, or a novice held to the rules.",
+            )
+        rule_file = None
+        if rules == OWN_FILE:
+            rule_file = st.file_uploader("Rule file (.json)", key="report_rule_file")
+        with_session = False
+        if has_comparison:
+            with_session = st.checkbox(
+                "With the comparison you ran on the page Shield",
+                value=True,
+                key="with_comparison",
+                bind="query-params",
+            )
+        with st.expander("Add results from files"):
+            files = st.file_uploader(
+                "CSV of the page Shield, or JSON of `evaluate --json`",
+                accept_multiple_files=True,
+                key="report_results",
+            )
+    return Choices(rules, rule_file, int(in_full or 0), int(frames or 0), with_session, files)

@@ -1,0 +1,139 @@
+"""The lines of a comparison: every chosen agent with every chosen shield."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_core.agents.agent import Agent
+from sarl_core.errors import SarlError
+from sarl_core.explaining.figures.comparison import ArmStyle, arm_style
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.shielding.shield import Outside, Shield
+from sarl_core.studies.comparison import Arm
+from sarl_dashboard.components.settings import no_boxes_notice
+from sarl_dashboard.jobs.episodes import Row, row_key
+from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, agent_for
+from sarl_dashboard.state.rule_choice import EDITED, rules_for
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
+from sarl_dashboard.text import in_full
+from sarl_dashboard.views.shield.settings import NO_SHIELD, Choices
+
+# Their places give them their colours, the paper's where it has them.
+AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
+RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE, EDITED)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One agent with one shield.
+
+    Attributes:
+        row: What is run.
+        arm: What it is in a comparison.
+        style: How it is drawn.
+        agent: Name on screen.
+        shield: Name on screen.
+    """
+
+    row: Row
+    arm: Arm
+    style: ArmStyle
+    agent: str
+    shield: str
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """An agent: its name, its place among the colours, how to make it, and what tells it."""
+
+    name: str
+    place: int
+    make: Callable[[], Agent]
+    digest: str
+
+
+@dataclass(frozen=True, eq=False)
+class Guard:
+    """A shield: its name, its place among the colours, its rules, and what tells them."""
+
+    name: str
+    place: int | None
+    rules: RuleSet | None
+    digest: str
+
+
+def free_name(name: str, taken: Sequence[str]) -> str:
+    """A name that is not taken: the same, or with a number behind it."""
+    names = (name, *(f"{name} ({number})" for number in range(2, len(taken) + 2)))
+    return next(each for each in names if each not in taken)
+
+
+def pilots(choices: Choices, env_id: str) -> list[Pilot]:
+    """The chosen agents.
+
+    Raises:
+        InputError: If one of them cannot be had.
+    """
+    chosen: list[Pilot] = []
+    for choice in choices.agents:
+        place = AGENT_PLACES.index(choice)
+        if choice != OWN_FILE:
+            make, digest = agent_for(choice, None, env_id, choices.seed)
+            chosen.append(Pilot(choice, place, make, digest))
+        for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
+            make, digest = agent_for(choice, file, env_id, choices.seed)
+            if any(pilot.digest == f"own {digest}" for pilot in chosen):
+                continue  # a file uploaded twice is one
+            name = free_name(
+                file.name.rsplit(".", 1)[0], (*AGENTS, *(pilot.name for pilot in chosen))
+            )
+            chosen.append(Pilot(name, place + number, make, f"own {digest}"))
+    return chosen
+
+
+def guards(choices: Choices) -> list[Guard]:
+    """The chosen shields that can be had; why the others cannot is said."""
+    chosen: list[Guard] = []
+    problems: list[str] = []
+    for choice in choices.shields:
+        if choice == NO_SHIELD:
+            chosen.append(Guard(choice, None, None, ""))
+        elif choice == OWN_FILE and choices.rule_file is None:
+            continue  # an empty place to put a file says enough
+        else:
+            try:
+                rules, digest = rules_for(choice, choices.rule_file)
+            except SarlError as error:
+                problems.append(str(error))
+            else:
+                chosen.append(Guard(choice, RULES_PLACES.index(choice), rules, digest))
+    no_boxes_notice([guard.rules for guard in chosen if guard.rules is not None], choices.outside)
+    for problem in problems:
+        st.error(in_full(problem), icon=":material/error:")
+    return chosen
+
+
+def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
+    """One agent with one shield."""
+    projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
+    outside: Outside = choices.outside if guard.rules is not None else "act"
+    name = f"{pilot.name}, {guard.name}"
+    # Acting everywhere is what other pages ask for, under the same key.
+    way = projection if outside == "act" else f"{projection}, {outside}"
+    key = row_key(env_id, pilot.digest, guard.digest, way, choices.seed)
+
+    def shield() -> Shield | None:
+        if guard.rules is None:
+            return None
+        return Shield(guard.rules, projection=projection, outside=outside)
+
+    return Line(
+        Row(key, name, env_id, choices.seed, pilot.make, shield),
+        Arm(name, pilot.name, guard.rules, projection, outside=outside),
+        arm_style(pilot.place, guard.place),
+        pilot.name,
+        guard.name,
+    )

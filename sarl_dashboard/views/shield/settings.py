@@ -1,0 +1,122 @@
+"""What the Shield page asks for: agents, shields, and the episodes to compare them on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
+
+from sarl_core.shielding.shield import Outside, Projection
+from sarl_dashboard.components.settings import (
+    environment_choice,
+    offered_rule_sets,
+    outside_choice,
+    projection_choice,
+)
+from sarl_dashboard.state.agents import (
+    AGENTS,
+    FRESH_SEED,
+    PROJECTIONS,
+    PolicyFile,
+    policy_uploads,
+)
+from sarl_dashboard.state.environments import continuous
+from sarl_dashboard.state.rule_choice import EDITED
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+
+NO_SHIELD = "no shield"
+MOST_EPISODES = 1_000
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What the widgets say."""
+
+    env: str | None
+    episodes: int
+    seed: int
+    projection: Projection
+    outside: Outside
+    agents: list[str]
+    shields: list[str]
+    policy_files: list[PolicyFile]
+    rule_file: UploadedFile | None
+
+    @property
+    def from_demonstrations(self) -> bool:
+        """Whether some of the rules come from the chosen demonstrations."""
+        return any(name not in (NO_SHIELD, OWN_FILE) for name in self.shields)
+
+
+def settings() -> Choices:
+    """The widgets."""
+    with st.container(border=True):
+        in_a_row = 5 if continuous(st.session_state.get("env")) else 4
+        with st.grid(in_a_row, min_column_width=150, gap="small"):
+            env = environment_choice()
+            episodes = st.number_input(
+                "Episodes",
+                1,
+                MOST_EPISODES,
+                20,
+                key="episodes",
+                bind="query-params",
+                help="So many for every agent with every shield, each on a seed of its own. The "
+                "paper's figures show 100.",
+            )
+            seed = st.number_input(
+                "First seed",
+                0,
+                2**31 - 1 - MOST_EPISODES,
+                FRESH_SEED,
+                key="first_seed",
+                bind="query-params",
+                help="The episodes start from this seed, the next one, and so on, the same for "
+                "all agents. The same seeds give the same result.",
+            )
+            projection = PROJECTIONS[0]
+            if continuous(env):
+                projection = projection_choice()
+            outside = outside_choice()
+        agents = st.pills(
+            "Agents",
+            AGENTS,
+            selection_mode="multi",
+            default=["novice", "expert"],
+            key="agents",
+            bind="query-params",
+            help="Novice: random actions. Expert: the one that is shipped for this environment. "
+            "Untrained: a fresh network, its actions sampled, which is nearly the same as random. "
+            "Own file: policies of yours.",
+        )
+        policy_files: list[PolicyFile] = []
+        if OWN_FILE in agents:
+            policy_files = policy_uploads("Policies", "policy_files", env)
+        offered = offered_rule_sets([NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE])
+        shields = st.pills(
+            "Shields",
+            offered,
+            selection_mode="multi",
+            default=[NO_SHIELD, *PAPERS],
+            key="shields",
+            bind="query-params",
+            help="Filtered: support 0.005, confidence 0.95. Unfiltered: support 0, confidence 1. "
+            "At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
+            "this environment. Edited: what you made of them on the Edit page. Own file: rules you "
+            "saved.",
+        )
+        rule_file = None
+        if OWN_FILE in shields:
+            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+    return Choices(
+        env,
+        int(episodes or 1),
+        int(seed or 0),
+        projection,
+        outside,
+        [name for name in AGENTS if name in agents],
+        [name for name in offered if name in shields],
+        policy_files,
+        rule_file,
+    )
