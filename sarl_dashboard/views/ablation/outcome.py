@@ -9,7 +9,6 @@ from sarl_core.studies.ablation_run import AblationRecord
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.ablation import ablating
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.views.ablation.settings import Choice
 from sarl_dashboard.views.ablation.table import show
 
@@ -36,7 +35,7 @@ def outcome(choice: Choice) -> None:
             ),
         )
         if known is not None:
-            show(known, wanted, at_work=at_work, linked=SHOWN_AS.get(choice.rules))
+            show(known, choice, at_work=at_work)
         elif not at_work:
             st.info(
                 "Choose an agent and the rules, then press Run. Only episodes in which a rule made "

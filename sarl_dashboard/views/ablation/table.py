@@ -24,45 +24,46 @@ from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
-from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.text import escaped
+from sarl_dashboard.views.ablation.settings import Choice
 
 TABLE_ROWS = 14
 ROW_HEIGHT = 33  # pixels
 
 
-def show(found: Ablation, wanted: Wanted, *, at_work: bool, linked: str | None) -> None:
+def show(ablation: Ablation, choice: Choice, *, at_work: bool) -> None:
     """An ablation, as far as it is finished.
 
     Args:
-        found: To show.
-        wanted: What was asked for.
+        ablation: To show.
+        choice: What was asked for.
         at_work: Whether more is on its way.
-        linked: The set under which its rules are found on the Rules page; None if they are not.
     """
-    why = no_failures_text(found.base.env_id)
-    notes_notice(note for note in found.remarks if note not in found.base.notes)
+    why = no_failures_text(ablation.base.env_id)
+    notes_notice(note for note in ablation.remarks if note not in ablation.base.notes)
     with st.grid(4, min_column_width=150):
-        st.metric("Return, all rules", f"{found.base.returns.mean():,.1f}", border=True)
+        st.metric("Return, all rules", f"{ablation.base.returns.mean():,.1f}", border=True)
         st.metric(
             "Failures, all rules",
-            f"{found.base_failures:,} of {len(found.base):,}" if found.failures_known else "–",
+            f"{ablation.base_failures:,} of {len(ablation.base):,}"
+            if ablation.failures_known
+            else "–",
             border=True,
-            help=None if found.failures_known else f"{why[0].upper()}{why[1:]}.",
+            help=None if ablation.failures_known else f"{why[0].upper()}{why[1:]}.",
         )
-        st.metric("Rules taken out", f"{len(found.rules):,}", border=True)
+        st.metric("Rules taken out", f"{len(ablation.rules):,}", border=True)
         st.metric(
             "Episodes run for it",
-            f"{found.played:,}",
+            f"{ablation.played:,}",
             border=True,
-            help=f"Of {len(found.rules) * len(found.base):,}: in the others the rule that is taken "
-            "out changed nothing, so they are the same without it.",
+            help=f"Of {len(ablation.rules) * len(ablation.base):,}: in the others the rule that is "
+            "taken out changed nothing, so they are the same without it.",
         )
     if not at_work:
-        st.markdown("\n".join(f"- {escaped(text)}" for text in ablation_text(found)))
-        if left := left_out_text(found):
+        st.markdown("\n".join(f"- {escaped(text)}" for text in ablation_text(ablation)))
+        if left := left_out_text(ablation):
             st.info(left, icon=":material/filter_list:")
-    if not found.rules:
+    if not ablation.rules:
         if not at_work:
             st.info(
                 "No rule changed an action in these episodes, so none can be told from the others. "
@@ -70,38 +71,38 @@ def show(found: Ablation, wanted: Wanted, *, at_work: bool, linked: str | None) 
                 icon=":material/rule:",
             )
         return
-    figure(found)
-    table(found, wanted, linked)
+    figure(ablation)
+    table(ablation, choice)
     st.caption(METHOD)
 
 
-def figure(found: Ablation) -> None:
+def figure(ablation: Ablation) -> None:
     """The rules with the largest differences."""
-    ranked = sorted(found.effects, key=lambda effect: effect.difference.mean)
+    ranked = sorted(ablation.effects, key=lambda effect: effect.difference.mean)
     if len(ranked) > FIGURE_ROWS:
         largest = sorted(ranked, key=lambda effect: -abs(effect.difference.mean))[:FIGURE_ROWS]
         ranked = [effect for effect in ranked if effect in largest]
         st.caption(f"The {FIGURE_ROWS} rules whose removal moves the return most.")
     chart(
-        ablation_figure(found, ranked),
+        ablation_figure(ablation, ranked),
         "ablation_figure",
         "For each rule, the change of the return without it, with its 95 % interval",
     )
 
 
-def table(found: Ablation, wanted: Wanted, linked: str | None) -> None:
+def table(ablation: Ablation, choice: Choice) -> None:
     """All rules that were taken out; one can be chosen."""
     import pandas as pd
 
-    columns = ablation_columns(found)
+    columns = ablation_columns(ablation)
     columns["Verdict"] = [[verdict] for verdict in columns["Verdict"]]
     columns["Action"] = [[action] for action in columns["Action"]]
-    rows = len(found.rules)
+    rows = len(ablation.rules)
     chosen = st.dataframe(
         pd.DataFrame(columns),
         hide_index=True,
         height="content" if rows <= TABLE_ROWS else (TABLE_ROWS + 1) * ROW_HEIGHT,
-        column_config=column_config(found),
+        column_config=column_config(ablation),
         key="ablation_table",
         on_select="rerun",
         selection_mode="single-row",
@@ -112,42 +113,42 @@ def table(found: Ablation, wanted: Wanted, linked: str | None) -> None:
             "Click a heading to sort, the box at the left of a row to read the rule.",
             width="content",
         )
-        name = wanted.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+        name = choice.wanted.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
         download(
             "Download CSV",
-            lambda: csv(found),
-            f"ablation-{name}-{wanted.seed}.csv",
+            lambda: csv(ablation),
+            f"ablation-{name}-{choice.wanted.seed}.csv",
             key="ablation_csv",
         )
     picked = chosen["selection"]["rows"]
     if picked and picked[0] < rows:
-        rule_set = found.shield.rule_set
-        rule = rule_set.rules[found.rules[picked[0]]]
+        rule_set = ablation.shield.rule_set
+        rule = rule_set.rules[ablation.rules[picked[0]]]
         with st.container(border=True):
             st.markdown(f"**{rule_set.name_of(rule)}.** {escaped(sentence(rule, rule_set))}")
-            if linked is not None:
+            if choice.linked is not None:
                 st.page_link(
                     "rules.py",
                     label="Open this rule",
                     icon=":material/rule:",
-                    query_params={**query(), "set": linked, "rule": rule.id},
+                    query_params={**query(), "set": choice.linked, "rule": rule.id},
                 )
 
 
 def query() -> Mapping[str, str]:
     """What the URL says now."""
-    found: dict[str, str] = st.query_params.to_dict()
-    return found
+    parameters: dict[str, str] = st.query_params.to_dict()
+    return parameters
 
 
-def column_config(found: Ablation) -> dict[str, Any]:
+def column_config(ablation: Ablation) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
-    action, action_width = action_column(found.shield.rule_set.actions, "What the rule says")
+    action, action_width = action_column(ablation.shield.rule_set.actions, "What the rule says")
     failures = (
-        f"Of {len(found.base):,} episodes; with all rules it is {found.base_failures:,}"
-        if found.failures_known
-        else no_failures_text(found.base.env_id)
+        f"Of {len(ablation.base):,} episodes; with all rules it is {ablation.base_failures:,}"
+        if ablation.failures_known
+        else no_failures_text(ablation.base.env_id)
     )
     return {
         "Rule": column.TextColumn(pinned=True, width=76),
@@ -183,10 +184,10 @@ def column_config(found: Ablation) -> dict[str, Any]:
     }
 
 
-def csv(found: Ablation) -> bytes:
+def csv(ablation: Ablation) -> bytes:
     """The table as a file, every number in full."""
-    frame = found.to_frame()
-    frame.insert(0, "seed", int(found.base.seeds[0]))
-    frame.insert(0, "agent", found.base.agent)
-    frame.insert(0, "environment", found.base.env_id)
+    frame = ablation.to_frame()
+    frame.insert(0, "seed", int(ablation.base.seeds[0]))
+    frame.insert(0, "agent", ablation.base.agent)
+    frame.insert(0, "environment", ablation.base.env_id)
     return str(safe_cells(frame).to_csv(index=False)).encode()

@@ -79,8 +79,8 @@ def _compare(first: Side, second: Side) -> Comparison:
     ):
         demonstrations = None
     digests = (first.digest, second.digest, digest_or_empty(demonstrations))
-    found, states = _disagreement(digests, first.rule_set, second.rule_set, demonstrations)
-    return Comparison(digests, names, found, states, demonstrations)
+    disagreements, states = _disagreement(digests, first.rule_set, second.rule_set, demonstrations)
+    return Comparison(digests, names, disagreements, states, demonstrations)
 
 
 @cached(show_spinner="Comparing …")
@@ -139,17 +139,17 @@ def _headed(title: str, *paragraphs: str) -> str:
 
 def _show_rules(compared: Comparison) -> None:
     """Rules added, removed, changed."""
-    found = compared.disagreement
+    disagreements = compared.disagreement
     st.markdown(
-        _headed("Rules", _small(rows_text(found))),
+        _headed("Rules", _small(rows_text(disagreements))),
         help="Rules are the same rule where they ask the same, or where they share more than "
         "half of the states that either of them applies to. A changed one has other conditions, "
         "says something else, was switched on or off, or has another place.",
     )
     counts = (
-        len(found.difference.added),
-        len(found.difference.removed),
-        len(found.difference.changed),
+        len(disagreements.difference.added),
+        len(disagreements.difference.removed),
+        len(disagreements.difference.changed),
     )
     if not any(counts):
         return
@@ -163,9 +163,9 @@ def _show_rules(compared: Comparison) -> None:
         label_visibility="collapsed",
     )
     kinds = KINDS if view in (None, EVERY) else (str(view),)
-    frame = _rules_frame(compared.digests, kinds, found)
+    frame = _rules_frame(compared.digests, kinds, disagreements)
     column = st.column_config
-    action, action_width = action_column(found.first.actions, "What the rule says")
+    action, action_width = action_column(disagreements.first.actions, "What the rule says")
     st.dataframe(
         frame,
         hide_index=True,
@@ -189,24 +189,24 @@ def _show_rules(compared: Comparison) -> None:
 
 def _show_states(compared: Comparison) -> None:
     """The states that are decided differently."""
-    found = compared.disagreement
+    disagreements = compared.disagreement
     random = (
-        f"The states are {counted(found.states, 'random one')} over the range of the rules' "
-        "thresholds, because the chosen demonstrations are of something else. They say where "
-        "the two differ, not how often an agent comes there."
+        f"The states are {counted(disagreements.states, 'random one')} over the range of the "
+        "rules' thresholds, because the chosen demonstrations are of something else. They say "
+        "where the two differ, not how often an agent comes there."
     )
     st.markdown(
         _headed(
             "Decisions",
-            f"**{escaped(together(decided_text(found, states=compared.noun)))}**",
+            f"**{escaped(together(decided_text(disagreements, states=compared.noun)))}**",
             _small(random) if compared.demonstrations is None else "",
         )
     )
-    actions = found.first.actions
+    actions = disagreements.first.actions
     dimension = 0
     if len(actions) > 1:
         labels = [action.name for action in actions]
-        most = labels[int(found.differs.sum(axis=0).argmax())]
+        most = labels[int(disagreements.differs.sum(axis=0).argmax())]
         name = st.segmented_control(
             "Action", labels, default=most, key="decided", bind="query-params", required=True
         )
@@ -217,7 +217,7 @@ def _show_states(compared: Comparison) -> None:
     count = len(examples)
     if not count:
         return
-    several = int(found.differs[:, dimension].sum())
+    several = int(disagreements.differs[:, dimension].sum())
     st.markdown(
         _headed(
             "Example states",

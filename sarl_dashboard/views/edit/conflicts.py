@@ -17,21 +17,21 @@ from sarl_dashboard.text import escaped
 CONFLICTS_SHOWN = 4
 
 
-def conflicts(of: Base, found: Verdicts) -> None:
+def conflicts(of: Base, verdicts: Verdicts) -> None:
     """Placed rules that overrule others, with an example of each."""
     import pandas as pd
 
     st.subheader("Conflicts")
-    if not found.conflicts:
+    if not verdicts.conflicts:
         st.caption("No placed rule takes a state from another rule that says something else.")
         return
-    rule_set, noun = found.rule_set, of.basis.noun
-    lines = [conflict_text(one, rule_set, states=noun) for one in found.conflicts]
+    rule_set, noun = verdicts.rule_set, of.basis.noun
+    lines = [conflict_text(one, rule_set, states=noun) for one in verdicts.conflicts]
     st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:CONFLICTS_SHOWN]))
     if len(lines) > CONFLICTS_SHOWN:
         st.caption(f"The largest {CONFLICTS_SHOWN} of {len(lines):,}; the table has them all.")
     st.dataframe(
-        pd.DataFrame(_conflict_rows(of, found)),
+        pd.DataFrame(_conflict_rows(of, verdicts)),
         hide_index=True,
         height=table_height(len(lines), 6),
         key="conflicts",
@@ -46,23 +46,23 @@ def conflicts(of: Base, found: Verdicts) -> None:
     )
 
 
-def _conflict_rows(of: Base, found: Verdicts) -> dict[str, list[Any]]:
-    rule_set, basis = found.rule_set, of.basis
+def _conflict_rows(of: Base, verdicts: Verdicts) -> dict[str, list[Any]]:
+    rule_set, basis = verdicts.rule_set, of.basis
     rows: dict[str, list[Any]] = {"Rule": [], "Says": [], "Takes from": [], "Which says": []}
-    rows["States"] = [one.states for one in found.conflicts]
-    for one in found.conflicts:
+    rows["States"] = [one.states for one in verdicts.conflicts]
+    for one in verdicts.conflicts:
         for who, says, at in (("Rule", "Says", one.rule), ("Takes from", "Which says", one.other)):
             rule = rule_set.rules[at]
             rows[who].append(rule_set.name_of(rule))
             rows[says].append(action_text(rule.action, rule_set.actions[rule.dimension]))
     if basis.expert is not None:
-        rows["Expert as the rule"] = [one.right for one in found.conflicts]
-        rows["Expert as the other"] = [one.other_right for one in found.conflicts]
-        shown = cast(Any, edits.demonstrations_for(of.rule_set))
-        examples = [one.example for one in found.conflicts]
-        rows["Example episode"] = shown.episodes[examples].tolist()
-        rows["Example step"] = shown.steps[examples].tolist()
-    examples = [one.example for one in found.conflicts]
+        rows["Expert as the rule"] = [one.right for one in verdicts.conflicts]
+        rows["Expert as the other"] = [one.other_right for one in verdicts.conflicts]
+        demonstrations = cast(Any, edits.demonstrations_for(of.rule_set))
+        examples = [one.example for one in verdicts.conflicts]
+        rows["Example episode"] = demonstrations.episodes[examples].tolist()
+        rows["Example step"] = demonstrations.steps[examples].tolist()
+    examples = [one.example for one in verdicts.conflicts]
     for at, feature in enumerate(rule_set.source.features):
         rows[feature.name] = basis.ground.states[examples, at].tolist()
     return rows

@@ -56,8 +56,8 @@ def _drafts() -> dict[str, Draft]:
 
 def draft_of(of: Base) -> Draft:
     """What is being filled in for some rules."""
-    found = _drafts().get(of.key)
-    return found if found is not None else begin(of)
+    draft = _drafts().get(of.key)
+    return draft if draft is not None else begin(of)
 
 
 def _clear(of: Base) -> None:

@@ -39,13 +39,13 @@ class Button:
     disabled: bool = False
 
 
-def chosen_rule(of: Base, rule: Rule, found: Verdicts) -> str | None:
+def chosen_rule(of: Base, rule: Rule, verdicts: Verdicts) -> str | None:
     """The chosen rule and what can be done to it; gives what the form is to do with it."""
-    rule_set, wish = found.rule_set, None
+    rule_set, wish = verdicts.rule_set, None
     with st.container(border=True, key="chosen_rule"):
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
-        decides = f"decides {counted(int(found.decided[at]), of.basis.noun)}"
+        decides = f"decides {counted(int(verdicts.decided[at]), of.basis.noun)}"
         st.caption(f"{rule_set.name_of(rule)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             for button in _buttons(rule, rule_set):

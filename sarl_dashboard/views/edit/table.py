@@ -42,9 +42,9 @@ def in_order(rule_set: RuleSet) -> list[int]:
     return placed + [at for at in largest if at not in first] if placed else largest
 
 
-def table(of: Base, found: Verdicts) -> Rule | None:
+def table(of: Base, verdicts: Verdicts) -> Rule | None:
     """The rules as edited; returns the chosen one."""
-    rule_set, texts = found.rule_set, _texts(of.digest, of.rule_set)
+    rule_set, mined = verdicts.rule_set, _texts(of.digest, of.rule_set)
     with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
         words = st.text_input(
             "Search",
@@ -67,18 +67,18 @@ def table(of: Base, found: Verdicts) -> Rule | None:
     order = in_order(rule_set)
     if view == TOUCHED:
         order = [at for at in order if _touched(rule_set.rules[at])]
-    told: dict[int, tuple[str, str]] = {}
+    texts: dict[int, tuple[str, str]] = {}
     for at in order:
         rule = rule_set.rules[at]
-        known = None if rule.origin == "manual" else texts.get(rule.id)
-        told[at] = known or _text(rule, rule_set)
+        known = None if rule.origin == "manual" else mined.get(rule.id)
+        texts[at] = known or _text(rule, rule_set)
     wanted = (words or "").lower().split()
     if wanted:
         order = [
             at
             for at in order
             if all(
-                w in f"{' '.join(told[at])} {rule_set.name_of(rule_set.rules[at])}".lower()
+                w in f"{' '.join(texts[at])} {rule_set.name_of(rule_set.rules[at])}".lower()
                 for w in wanted
             )
         ]
@@ -101,10 +101,10 @@ def table(of: Base, found: Verdicts) -> Rule | None:
         if rows and rows[0] < len(ids):
             set_url_choice("rule", ids[rows[0]])
 
-    by_hand = tuple(told[at] for at in order if rule_set.rules[at].origin == "manual")
-    written = _written(of.digest, key, by_hand, [told[at] for at in order])
+    by_hand = tuple(texts[at] for at in order if rule_set.rules[at].origin == "manual")
+    written = _written(of.digest, key, by_hand, [texts[at] for at in order])
     st.dataframe(
-        _with_numbers(written, order, found),
+        _with_numbers(written, order, verdicts),
         hide_index=True,
         column_config=_columns(rule_set),
         height=table_height(len(order), TABLE_ROWS),
@@ -145,21 +145,21 @@ def _written(
     )
 
 
-def _with_numbers(written: Any, order: list[int], found: Verdicts) -> Any:
+def _with_numbers(written: Any, order: list[int], verdicts: Verdicts) -> Any:
     """The table with what edits change."""
     import pyarrow as pa
 
-    rules = [found.rule_set.rules[at] for at in order]
-    decided = found.decided[order]
+    rules = [verdicts.rule_set.rules[at] for at in order]
+    decided = verdicts.decided[order]
     kinds = [state_text(rule).split(",")[0] if _touched(rule) else "mined" for rule in rules]
     table = (
         written.add_column(0, "On", pa.array([rule.enabled for rule in rules]))
         .add_column(1, "Kind", pa.array(kinds))
-        .add_column(2, "Rule", pa.array(list(map(found.rule_set.name_of, rules))))
+        .add_column(2, "Rule", pa.array(list(map(verdicts.rule_set.name_of, rules))))
         .append_column("Decides", pa.array(decided))
     )
-    if found.right is not None:
-        right = found.right[order].astype(float)
+    if verdicts.right is not None:
+        right = verdicts.right[order].astype(float)
         right[decided == 0] = float("nan")
         share = pa.array(100 * right / decided.clip(min=1), from_pandas=True)
         table = table.append_column("Expert agrees", share)

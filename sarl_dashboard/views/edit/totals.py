@@ -28,15 +28,15 @@ def bar(of: Base) -> None:
             ("Undo", "undo", edits.undo, history.edits[-1:]),
             ("Redo", "redo", edits.redo, history.undone[-1:]),
         ):
-            told = edit_text(waiting[0], rule_set) if waiting else ""
+            sentence = edit_text(waiting[0], rule_set) if waiting else ""
             st.button(
-                f"{name}: {escaped(_short(told))}" if told else name,
+                f"{name}: {escaped(_short(sentence))}" if sentence else name,
                 on_click=step,
                 args=(of,),
                 disabled=not waiting,
                 icon=f":material/{icon}:",
                 key=name.lower(),
-                help=escaped(told) if told else f"Nothing to {name.lower()}",
+                help=escaped(sentence) if sentence else f"Nothing to {name.lower()}",
             )
         source = rule_set.source.env_id.rsplit("/", 1)[-1] or "unnamed"
         download(
@@ -61,13 +61,13 @@ def _short(text: str, most: int = 44) -> str:
 
 def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
     """What the edits change at once, against the unedited set."""
-    found, noun = change(before, after), of.basis.noun
+    changed, noun = change(before, after), of.basis.noun
     in_force = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
-    shown = (
+    totals = (
         ("Rules in force", f"{in_force[1]:,}", f"{in_force[0]:,}"),
         ("Coverage", *(share_text(one.coverage, decimals=1) for one in (after, before))),
         ("Fidelity", *(share_text(one.fidelity, decimals=1) for one in (after, before))),
-        ("Decided differently", f"{found.different:,}", ""),
+        ("Decided differently", f"{changed.different:,}", ""),
         ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
     )
     meanings = (
@@ -77,16 +77,16 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
         "States of which the edited set says something else than the unedited one",
         "States in which a placed rule overrules another that says something else",
     )
-    told = change_text(found, before, after, states=noun)
+    sentence = change_text(changed, before, after, states=noun)
     cards = [
         Number(label, value, meaning, was if was != value else "")
-        for (label, value, was), meaning in zip(shown, meanings, strict=True)
+        for (label, value, was), meaning in zip(totals, meanings, strict=True)
     ]
     with st.container(key="numbers"):
         st.html(
             number_cards(cards, framed=True)
             + '<div style="height:0.8rem"></div>'
-            + note(f"Against the unedited set: {told[:1].lower() + told[1:]}{where(of)}")
+            + note(f"Against the unedited set: {sentence[:1].lower() + sentence[1:]}{where(of)}")
         )
 
 

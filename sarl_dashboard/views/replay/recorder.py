@@ -6,7 +6,6 @@ The row of a step, its picture, its path and its place in the strip are one sele
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,12 +43,12 @@ class Recorded:
     Attributes:
         replay: On screen.
         episodes: Whose steps; their steps are kept.
-        shown: Which of them is on screen.
+        on_screen: Which of them is on screen.
     """
 
     replay: Replay
     episodes: Episodes
-    shown: int
+    on_screen: int
 
     @property
     def steps(self) -> StepTable:
@@ -64,7 +63,7 @@ class Recorded:
 
     def row(self, step: int) -> int:
         """The row of a step of the episode on screen."""
-        return int(np.searchsorted(self.steps.episode, self.shown)) + step
+        return int(np.searchsorted(self.steps.episode, self.on_screen)) + step
 
 
 def flight_recorder(played: Played, current: int) -> None:
@@ -136,8 +135,7 @@ def source(played: Played) -> Recorded:
             )
             == ALL
         ):
-            shown = replay.key.seed - comparison[0].request.seed
-            return Recorded(replay, several, shown)
+            return Recorded(replay, several, replay.key.seed - comparison[0].request.seed)
     return Recorded(replay, replay.shown, 0)
 
 
@@ -223,7 +221,7 @@ def pick(recorded: Recorded, on_page: NDArray[np.int64]) -> None:
         return
     row = int(on_page[places[0]])
     episode, step = int(recorded.steps.episode[row]), int(recorded.steps.step[row])
-    if episode == recorded.shown:
+    if episode == recorded.on_screen:
         st.session_state["step"] = step
         return
     jump_to(int(recorded.episodes.seeds[episode]), step)
@@ -259,7 +257,7 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
     replay = recorded.replay
-    found: dict[str, Any] = {
+    columns: dict[str, Any] = {
         "Seed": column.NumberColumn(format="%d", pinned=True, width=76),
         "Step": column.NumberColumn(format="%d", pinned=True, width=58),
         "Changed": column.CheckboxColumn(
@@ -291,24 +289,24 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
                 labels = range(dimension.n_labels)
                 names = [action_text(label, dimension) for label in labels]
                 widest = 30 + 7 * max(map(len, names))
-                found[title] = column.MultiselectColumn(
+                columns[title] = column.MultiselectColumn(
                     options=names,
                     color=[label_colour(label) for label in labels],
                     width=min(max(widest, 90), 190),
                     help=meaning,
                 )
             else:
-                found[title] = column.TextColumn(help=meaning)
+                columns[title] = column.TextColumn(help=meaning)
         title = f"{before}rule"
-        found[title[:1].upper() + title[1:]] = column.TextColumn(
+        columns[title[:1].upper() + title[1:]] = column.TextColumn(
             width=76, help="The rule in force; empty where none applies"
         )
     lived = recorded.steps.observation
     for index, feature in enumerate(replay.features):
         title = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         digits = digits_across(lived[:, index])
-        found.setdefault(title, column.NumberColumn(format=f"%.{digits}g"))
-    return found
+        columns.setdefault(title, column.NumberColumn(format=f"%.{digits}g"))
+    return columns
 
 
 def downloads(recorded: Recorded, rows: NDArray[np.int64], text: str) -> None:
@@ -326,15 +324,7 @@ def downloads(recorded: Recorded, rows: NDArray[np.int64], text: str) -> None:
             text,
         )
 
-    short = episodes.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
-    name = f"steps-{short}-{episodes.agent}-{int(episodes.seeds[recorded.shown])}"
-    for label, ending, write in (
-        ("CSV", "csv", steps_to_csv),
-        ("Parquet", "parquet", steps_to_parquet),
-    ):
-        download(
-            label,
-            partial(lambda write: write(record()), write),
-            f"{name}.{ending}",
-            key=f"steps_{ending}",
-        )
+    env = episodes.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+    name = f"steps-{env}-{episodes.agent}-{int(episodes.seeds[recorded.on_screen])}"
+    download("CSV", lambda: steps_to_csv(record()), f"{name}.csv", key="steps_csv")
+    download("Parquet", lambda: steps_to_parquet(record()), f"{name}.parquet", key="steps_parquet")

@@ -31,8 +31,6 @@ from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
 
-PLAIN = {"displayModeBar": False}
-
 
 def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
     """The colours of the strip."""
@@ -101,7 +99,7 @@ def step_by_step(played: Played) -> None:
             key="strip",
             on_select=pick_step,
             selection_mode="points",
-            config=PLAIN,
+            config={"displayModeBar": False},
             alt="What the agent wanted, what was done, and where the two differ, step by step",
         )
         chart(return_figure(lines, timeline), "return", "Return so far, step by step")
