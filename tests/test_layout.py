@@ -166,3 +166,18 @@ def test_no_folder_holds_more_files_than_one_finds_something_in():
     }
     assert len(counts) > 20
     assert {name: count for name, count in counts.items() if count > 22} == {}
+
+
+PAGES = [path for path in sorted((ROOT / "pages").glob("*.py")) if path.name != "_router.py"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_a_page_is_the_order_of_its_screen_and_nothing_else(page):
+    text = page.read_text()
+    defined = [
+        node.lineno
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+    ]
+    assert defined == []
+    assert len(text.splitlines()) <= 150
