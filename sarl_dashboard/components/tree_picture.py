@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,32 +20,45 @@ from sarl_dashboard.session import is_dark
 WHOLE_TREE = "Whole tree"
 
 
-def show_tree(
-    key: object,
-    tree: PolicyTree,
-    thresholds: Thresholds,
-    node: int,
-    *,
-    around: str,
-    widget: str,
-    note: str,
-    leaves: bool,
-) -> None:
-    """The tree with the path to a node lit: what lies around the node, or all of it.
+@dataclass(frozen=True, eq=False)
+class PathInTree:
+    """A path to be lit.
+
+    Attributes:
+        key: Tells the rules from all others.
+        tree: One action dimension's.
+        thresholds: At which it is cut.
+        leaves: Whether every leaf is a rule, whatever the thresholds.
+        node: At the end of the path.
+        note: Said below.
+    """
+
+    key: object
+    tree: PolicyTree
+    thresholds: Thresholds
+    leaves: bool
+    node: int
+    note: str
+
+    @property
+    def cut_key(self) -> str:
+        """Tells the tree and its cut from all others."""
+        tree = self.tree
+        cut_by = (self.thresholds, self.leaves)
+        return repr((self.key, tree.source.digest, tree.divider, tree.index, cut_by))
+
+
+def show_tree(path: PathInTree, *, around: str, widget: str) -> None:
+    """The tree with a path lit: what lies around its end, or all of it.
 
     What lies around is HTML and there at once; the whole is a chart that can be zoomed.
 
     Args:
-        key: Tells the rules from all others.
-        tree: One action dimension's.
-        thresholds: At which it is cut.
-        node: At the end of the path.
+        path: To light.
         around: What the first view is called.
         widget: Name of the choice between them, in the URL.
-        note: Said below.
-        leaves: Whether every leaf is a rule, whatever the thresholds.
     """
-    view, reached, dark = WHOLE_TREE, int(tree.samples[node]) > 0, is_dark()
+    view, reached, dark = WHOLE_TREE, _is_reached(path), is_dark()
     if reached:
         view = st.segmented_control(
             "Tree",
@@ -55,78 +69,53 @@ def show_tree(
             required=True,
             label_visibility="collapsed",
         )
-    told = _told(key, tree, thresholds)
     if view == WHOLE_TREE:
         st.plotly_chart(
-            _picture(told, node, leaves, dark, tree, thresholds),
+            _picture(path.cut_key, path.node, dark, path),
             key="tree_figure",
             config={"displaylogo": False, "scrollZoom": True},
             alt="The decision tree with the path lit",
         )
         st.caption(
-            note
+            path.note
             + ("" if reached else " No state reaches its end, so the box has no width.")
             + " Drag or scroll to zoom, double-click to go back."
         )
     else:
-        st.html(_place(told, node, note, leaves, dark, tree, thresholds))
+        st.html(_place(path.cut_key, path.node, path.note, dark, path))
 
 
-def make_ready(
-    key: object,
-    tree: PolicyTree,
-    thresholds: Thresholds,
-    node: int,
-    *,
-    note: str,
-    leaves: bool,
-) -> None:
-    """Make what `show_tree` shows first, for when it is asked for; its arguments are the same."""
-    if tree.samples[node]:
-        told = _told(key, tree, thresholds)
-        _place(told, node, note, leaves, is_dark(), tree, thresholds)
+def make_ready(path: PathInTree) -> None:
+    """Make what `show_tree` shows first, for when it is asked for."""
+    if _is_reached(path):
+        _place(path.cut_key, path.node, path.note, is_dark(), path)
 
 
-def _told(key: object, tree: PolicyTree, thresholds: Thresholds) -> str:
-    return repr((key, tree.source.digest, tree.divider, tree.index, thresholds))
+def _is_reached(path: PathInTree) -> bool:
+    """Whether a state reaches the end of the path."""
+    return int(path.tree.samples[path.node]) > 0
 
 
 @cached()
-def _picture(
-    told: str,
-    node: int,
-    leaves: bool,
-    dark: bool,
-    _tree: PolicyTree,
-    _thresholds: Thresholds,
-) -> Any:
-    cut = _cut(told, leaves, _tree, _thresholds)
-    return tree_figure(_tree, cut, node, dark=dark)
+def _picture(cut_key: str, node: int, dark: bool, _path: PathInTree) -> Any:
+    return tree_figure(_path.tree, _cut(cut_key, _path), node, dark=dark)
 
 
 @cached()
-def _place(
-    told: str,
-    node: int,
-    note: str,
-    leaves: bool,
-    dark: bool,
-    _tree: PolicyTree,
-    _thresholds: Thresholds,
-) -> str:
-    cut = _cut(told, leaves, _tree, _thresholds)
-    return place_html(_tree, cut, node, note=note, dark=dark)
+def _place(cut_key: str, node: int, note: str, dark: bool, _path: PathInTree) -> str:
+    return place_html(_path.tree, _cut(cut_key, _path), node, note=note, dark=dark)
 
 
 @cached()
-def _cut(told: str, leaves: bool, _tree: PolicyTree, _thresholds: Thresholds) -> NDArray[np.int64]:
+def _cut(cut_key: str, _path: PathInTree) -> NDArray[np.int64]:
     """The nodes that are rules."""
-    if leaves:
-        return np.flatnonzero(_tree.feature == LEAF)
+    tree, thresholds = _path.tree, _path.thresholds
+    if _path.leaves:
+        return np.flatnonzero(tree.feature == LEAF)
     return cut_nodes(
-        _tree,
-        supp_min=_thresholds.support,
-        conf_min=_thresholds.confidence,
-        lift_min=_thresholds.lift,
-        max_depth=_thresholds.max_depth,
+        tree,
+        supp_min=thresholds.support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=thresholds.max_depth,
     )

@@ -71,14 +71,7 @@ def make_ready(rule: Rule, in_force: InForce) -> None:
     """Make what takes longest to make of a rule that may be looked at next."""
     tree = in_force.tree(rule)
     features_of(key_of(rule, in_force), tree, rule, in_force.demonstrations)
-    tree_picture.make_ready(
-        in_force.compact_digest,
-        tree,
-        in_force.thresholds,
-        node_of(rule),
-        note=note_of(tree, in_force),
-        leaves=in_force.compact is not None,
-    )
+    tree_picture.make_ready(path_of(rule, in_force))
 
 
 def key_of(rule: Rule, in_force: InForce) -> tuple[object, ...]:
@@ -101,17 +94,20 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
 
 def place(rule: Rule, in_force: InForce) -> None:
     """The path lit in the tree."""
-    tree = in_force.tree(rule)
     st.html(heading("Its place in the tree"))
-    tree_picture.show_tree(
-        in_force.compact_digest,
-        tree,
-        in_force.thresholds,
-        node_of(rule),
-        around="Around this rule",
-        widget="tree",
-        note=note_of(tree, in_force),
+    tree_picture.show_tree(path_of(rule, in_force), around="Around this rule", widget="tree")
+
+
+def path_of(rule: Rule, in_force: InForce) -> tree_picture.PathInTree:
+    """The path to a rule."""
+    tree = in_force.tree(rule)
+    return tree_picture.PathInTree(
+        key=in_force.compact_digest,
+        tree=tree,
+        thresholds=in_force.thresholds,
         leaves=in_force.compact is not None,
+        node=node_of(rule),
+        note=note_of(tree, in_force),
     )
 
 

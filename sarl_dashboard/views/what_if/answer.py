@@ -25,7 +25,7 @@ from sarl_core.explaining.words.what_if import node_of_way
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.near import DecisionChange, Line, decision_changes
-from sarl_dashboard.components.tree_picture import show_tree
+from sarl_dashboard.components.tree_picture import PathInTree, show_tree
 from sarl_dashboard.views.what_if.proposal import proposal
 from sarl_dashboard.views.what_if.rules import RulesOnTrees
 from sarl_dashboard.views.what_if.situation import Situation
@@ -143,16 +143,15 @@ def way_through(rules: RulesOnTrees, dimension: int, rule: Rule | None, node: in
     """The way of the state through the tree, to a node."""
     placed = f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""
     st.html(heading("Its way through the tree") + placed)
-    show_tree(
-        rules.key,
-        rules.trees[dimension],
-        rules.rule_set.thresholds,
-        node,
-        around="Around it",
-        widget="whole_tree",
+    path = PathInTree(
+        key=rules.key,
+        tree=rules.trees[dimension],
+        thresholds=rules.rule_set.thresholds,
+        leaves=rules.leaves,
+        node=node,
         note="The lit path is the state's: it ends at the rule that applies."
         if rule is not None and rule.origin == "mined"
         else "The lit path is the state's: it ends at a leaf, and no part of it is a mined rule "
         "that applies.",
-        leaves=rules.leaves,
     )
+    show_tree(path, around="Around it", widget="whole_tree")
