@@ -11,11 +11,12 @@ from sarl_core.decimals import digits_across
 from sarl_core.explaining.figures.gaps import gap_figure, gap_histograms
 from sarl_core.improving.gaps import Gaps
 from sarl_core.mining.language import counted, share_text
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.text import escaped
 
-PLAIN = {"displayModeBar": False}
 FEATURES_SHOWN = 12
 GAP_ROWS = 200
 
@@ -49,14 +50,11 @@ def show_gaps(outcome: Outcome, gaps: Gaps, *, at_work: bool) -> None:
     show_where(outcome, gaps)
     st.markdown("**Some of these states**")
     show_states(outcome, gaps)
-    st.download_button(
+    download(
         "Download all as CSV",
         lambda: str(gaps.to_frame().to_csv(index=False)).encode(),
         f"gaps-{outcome.order.env_id.rsplit('/', 1)[-1]}.csv",
-        "text/csv",
         key="gaps_csv",
-        on_click="ignore",
-        icon=":material/download:",
     )
     st.caption(
         "The file has the columns of a demonstration file, except the action. Have somebody who "
@@ -78,11 +76,10 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
             feature = features[one.feature]
             with grid.cell():
                 st.markdown(f"**{escaped(feature.name)}**")
-                st.plotly_chart(
+                chart(
                     gap_figure(one, feature),
-                    config=PLAIN,
-                    key=f"gap_{one.feature}",
-                    alt=f"{feature.name}: demonstrated states and states without a rule",
+                    f"gap_{one.feature}",
+                    f"{feature.name}: demonstrated states and states without a rule",
                 )
     if len(found) > FEATURES_SHOWN:
         st.caption(f"{FEATURES_SHOWN} of {len(found)} features.")

@@ -17,9 +17,8 @@ from sarl_core.explaining.figures.learning import (
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
 from sarl_core.learning.study_files import LearningStudy, policy_path
 from sarl_core.learning.summary import best, summarise_study
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.text import escaped
-
-PLAIN = {"displayModeBar": False}
 
 
 def show_study(study: LearningStudy, name: str) -> None:
@@ -38,11 +37,10 @@ def show_study(study: LearningStudy, name: str) -> None:
     picture, words = st.columns([3, 2], gap="large")
     with picture:
         st.markdown("**Crashes while learning, and what the learner is worth without its shield**")
-        st.plotly_chart(
+        chart(
             outcome_figure(summaries),
-            config=PLAIN,
-            key=f"outcome_{name}",
-            alt="Crashes while learning against the return afterwards without a shield",
+            f"outcome_{name}",
+            "Crashes while learning against the return afterwards without a shield",
         )
         st.caption("Large points are means, small ones single learners. Squares learn by replay.")
     with words:
@@ -55,11 +53,10 @@ def show_study(study: LearningStudy, name: str) -> None:
     with during:
         show_curves(study, name)
     with after:
-        st.plotly_chart(
+        chart(
             afterwards_figure(summaries),
-            config=PLAIN,
-            key=f"after_{name}",
-            alt="Return after learning with the shield on and off",
+            f"after_{name}",
+            "Return after learning with the shield on and off",
         )
         st.caption(
             f"{int(study.settings['trial_episodes'])} episodes of each learner, on seeds that "
@@ -94,11 +91,10 @@ def show_curves(study: LearningStudy, name: str) -> None:
         study: At work or finished.
         name: Of the place on screen.
     """
-    st.plotly_chart(
+    chart(
         curves_figure(study),
-        config=PLAIN,
-        key=f"curves_{name}",
-        alt="Return, crashes so far and share of changed actions while learning",
+        f"curves_{name}",
+        "Return, crashes so far and share of changed actions while learning",
     )
     many = " A band reaches from the lowest learner to the highest." if len(study.seeds) > 1 else ""
     st.caption(
