@@ -124,6 +124,18 @@ def test_no_python_file_has_grown_into_two_ideas():
     assert {name: length for name, length in lengths.items() if length > 600} == {}
 
 
+def test_a_page_is_the_order_of_a_screen_and_nothing_else():
+    pages = sorted((ROOT / "pages").glob("*.py"))
+    assert len(pages) > 10
+    definitions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    for path in pages:
+        text = path.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 150, path.name
+        assert not [
+            node.name for node in ast.walk(ast.parse(text)) if isinstance(node, definitions)
+        ], path.name
+
+
 def test_imports_go_one_way():
     linter = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run(

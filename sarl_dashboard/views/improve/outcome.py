@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
 
 import streamlit as st
 
-from sarl_core.demonstrations.formats import save_demonstrations
 from sarl_core.environments.failures import no_failures_text
 from sarl_core.explaining.figures.aggregation import (
     RoundPoint,
@@ -22,6 +20,8 @@ from sarl_core.improving.aggregation_files import aggregation_card
 from sarl_core.mining.language import at_least_text, counted, share_text
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.rollouts.episodes import Episodes
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.downloads import as_file, download
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.state.data import (
@@ -31,8 +31,6 @@ from sarl_dashboard.state.data import (
     uploaded_demonstrations,
 )
 from sarl_dashboard.views.improve.gaps import show_gaps
-
-PLAIN = {"displayModeBar": False}
 
 
 def show_outcome(outcome: Outcome, *, at_work: bool, changed: bool) -> None:
@@ -188,11 +186,10 @@ def show_rounds(
         chosen = improved.chosen
         if improved.reported is not None:
             reported = improved.reported.statistics.mean
-    st.plotly_chart(
+    chart(
         rounds_figure(points, planned=planned, chosen=chosen, reported=reported),
-        config=PLAIN,
-        key=f"{key}_figure",
-        alt="Return, coverage, disagreement with the expert and number of rules, round by round",
+        f"{key}_figure",
+        "Return, coverage, disagreement with the expert and number of rules, round by round",
     )
     marks = []
     if chosen is not None:
@@ -257,30 +254,27 @@ def take_away(outcome: Outcome, improved: Aggregation) -> None:
             disabled=in_use and chosen_dataset() == UPLOAD,
             help="Every page then works on them, as if you had uploaded them.",
         )
-        for label, file, mime, make in (
-            ("Rules", f"{name}.json", "application/json", lambda: rules_to_json(improved.rule_set)),
-            ("Card", f"{name}.card.json", "application/json", lambda: card_text(outcome, improved)),
-            (
-                "Demonstrations",
-                f"{name}.parquet",
-                "application/vnd.apache.parquet",
-                lambda: as_parquet(improved),
-            ),
-        ):
-            st.download_button(
-                label,
-                make,
-                file,
-                mime,
-                key=f"improve_{label.lower()}",
-                on_click="ignore",
-                icon=":material/download:",
-                help={
-                    "Rules": "The rule file (JSON), for evaluate and as own file on other pages",
-                    "Card": "How the rules came about and what they achieve (JSON)",
-                    "Demonstrations": "All pairs of the chosen round (Parquet)",
-                }[label],
-            )
+        download(
+            "Rules",
+            lambda: rules_to_json(improved.rule_set),
+            f"{name}.json",
+            key="improve_rules",
+            meaning="The rule file (JSON), for evaluate and as own file on other pages",
+        )
+        download(
+            "Card",
+            lambda: card_text(outcome, improved),
+            f"{name}.card.json",
+            key="improve_card",
+            meaning="How the rules came about and what they achieve (JSON)",
+        )
+        download(
+            "Demonstrations",
+            partial(as_file, improved.demonstrations),
+            f"{name}.parquet",
+            key="improve_demonstrations",
+            meaning="All pairs of the chosen round (Parquet)",
+        )
 
 
 def use(improved: Aggregation, name: str) -> None:
@@ -292,11 +286,3 @@ def use(improved: Aggregation, name: str) -> None:
 def card_text(outcome: Outcome, improved: Aggregation) -> str:
     """The card as a file."""
     return json.dumps(aggregation_card(improved, command=outcome.order.command), indent=2) + "\n"
-
-
-def as_parquet(improved: Aggregation) -> bytes:
-    """The demonstrations as a file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "demonstrations.parquet"
-        save_demonstrations(improved.demonstrations, path)
-        return path.read_bytes()

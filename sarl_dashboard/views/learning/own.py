@@ -7,6 +7,7 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.learning.study_files import LearningStudy, policy_path
 from sarl_core.mining.language import counted
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.learning import Order, learning, study_of
@@ -100,23 +101,17 @@ def downloads(order: Order, study: LearningStudy) -> None:
             key="learn_policy",
             width=320,
         )
-        st.download_button(
+        download(
             "Download policy (.npz)",
             lambda: policy_path(order.folder, run.arm, run.seed).read_bytes(),
             f"{order.env_id.rsplit('/', 1)[-1]}-{run.name}.npz",
-            "application/octet-stream",
             key="learn_npz",
-            on_click="ignore",
-            icon=":material/download:",
         )
-        st.download_button(
+        download(
             "Download everything (.zip)",
             lambda: archive(study, order.folder),
             "learned.zip",
-            "application/zip",
             key="learn_zip",
-            on_click="ignore",
-            icon=":material/download:",
         )
     st.caption(
         "A policy is an agent everywhere: on Replay and Shield as “own file”, on the command line "

@@ -8,6 +8,7 @@ import streamlit as st
 
 from sarl_core.explaining.report.report import Report
 from sarl_core.mining.language import counted
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.report import Order, kept_reports, reporting
@@ -58,15 +59,7 @@ def show(report: Report, name: str) -> None:
     if report.without:
         st.info(f"The report has no pictures: {escaped(report.without)}.", icon=":material/info:")
     with st.container(horizontal=True, vertical_alignment="center"):
-        st.download_button(
-            "Download the report",
-            content,
-            f"report-{name}.html",
-            "text/html",
-            key="report_file",
-            on_click="ignore",
-            icon=":material/download:",
-        )
+        download("Download the report", content, f"report-{name}.html", key="report_file")
         st.caption(
             f"One HTML file of {len(content) / 1e6:.1f} MB with "
             f"{counted(report.pictures, 'picture')}. It opens without a network, in any browser, "

@@ -13,6 +13,8 @@ from sarl_core.mining.language import at_least_text, share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
 from sarl_core.studies.comparison import Comparison
+from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.flips import flips_rate, flips_title
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import COMPARISON, known
@@ -20,7 +22,6 @@ from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.shield.lines import Line
 
-PLAIN = {"displayModeBar": False}
 HEIGHT = 400
 ROW = 46  # pixels a row of the first figure
 
@@ -72,20 +73,17 @@ def show(finished: Finished, *, at_work: bool) -> None:
     left, right = st.columns([2, 3], gap="medium")
     with left:
         st.markdown("**Typical return**")
-        st.plotly_chart(
+        chart(
             typical_figure(comparison, styles=styles, height=height),
-            config=PLAIN,
-            key="typical",
-            alt="Interquartile mean of the returns with its 95 % interval, for every agent and "
-            "shield",
+            "typical",
+            "Interquartile mean of the returns with its 95 % interval, for every agent and shield",
         )
     with right:
         st.markdown("**Every episode**")
-        st.plotly_chart(
+        chart(
             returns_figure(comparison, styles=styles, height=height),
-            config=PLAIN,
-            key="returns",
-            alt="Return of every episode, for every agent and shield",
+            "returns",
+            "Return of every episode, for every agent and shield",
         )
     st.caption(
         "The typical return is the mean of the middle half of the episodes, with its 95 % "
@@ -102,14 +100,11 @@ def show(finished: Finished, *, at_work: bool) -> None:
     )
     if not at_work:
         name = env_id.rsplit("/", 1)[-1]
-        st.download_button(
+        download(
             "Download CSV",
             lambda: csv(comparison),
             f"comparison-{name}-{seed}.csv",
-            "text/csv",
             key="comparison_csv",
-            on_click="ignore",
-            icon=":material/download:",
         )
 
 
