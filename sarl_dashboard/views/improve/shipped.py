@@ -14,10 +14,11 @@ from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.improving.aggregation_files import card_path
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import counted, share_text
+from sarl_dashboard.components.chart import chart
 from sarl_dashboard.state.data import SHIPPED_SETS
 from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file
 from sarl_dashboard.text import in_full
-from sarl_dashboard.views.improve.outcome import PLAIN, show_rounds, size_text
+from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
 BUDGETS = "budgets.json"
 
@@ -136,9 +137,8 @@ def show_budgets() -> None:
         for index, (label, points) in enumerate(budgets):
             with grid.cell():
                 st.markdown(f"**{label}**")
-                st.plotly_chart(
+                chart(
                     budget_figure(points),
-                    config=PLAIN,
-                    key=f"budget_{index}",
-                    alt=f"{label}: return against the number of rules",
+                    f"budget_{index}",
+                    f"{label}: return against the number of rules",
                 )
