@@ -27,3 +27,17 @@ def report(progress: Progress | None, done: int, total: int) -> None:
     """
     if progress is not None and progress(done, total) is False:
         raise CancelledError(f"stopped after {done} of {total}; nothing was kept")
+
+
+def part_of(progress: Progress | None, before: int, total: int) -> Progress:
+    """The progress of a part of some work, told as that of the whole.
+
+    Args:
+        progress: Who to tell of the whole, or None.
+        before: Units finished before the part.
+        total: Units in all parts.
+
+    Returns:
+        For the part; it raises what `report` raises.
+    """
+    return lambda done, _: report(progress, before + done, total)

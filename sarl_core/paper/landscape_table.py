@@ -47,8 +47,10 @@ def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
     parts = []
     report(progress, 0, len(wanted))
     for done, replicate in enumerate(wanted, 1):
-        found = threshold_landscape(trees_of(replicate), PAPER_SUPPORTS, PAPER_CONFIDENCES)
-        supports, confidences = np.meshgrid(found.supports, found.confidences, indexing="ij")
+        landscape = threshold_landscape(trees_of(replicate), PAPER_SUPPORTS, PAPER_CONFIDENCES)
+        supports, confidences = np.meshgrid(
+            landscape.supports, landscape.confidences, indexing="ij"
+        )
         discrete = demonstrations_of(replicate).is_discrete
         parts.append(
             pd.DataFrame(
@@ -59,7 +61,7 @@ def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
                     "divider": 0 if discrete else PAPER_DIVIDER,
                     "support": supports.ravel(),
                     "confidence": confidences.ravel(),
-                    **{layer: getattr(found, layer).ravel() for layer in _LAYERS},
+                    **{layer: getattr(landscape, layer).ravel() for layer in _LAYERS},
                 }
             )
         )
@@ -77,11 +79,11 @@ def landscapes_of(frame: pd.DataFrame) -> dict[str, dict[int, Landscape]]:
         By environment and recording, in the table's order; without the parts of single action
         dimensions.
     """
-    found: dict[str, dict[int, Landscape]] = {}
+    landscapes: dict[str, dict[int, Landscape]] = {}
     for _, rows in frame.groupby(["environment", "recording"], sort=False):
         env_id, recording = str(rows["environment"].iloc[0]), int(rows["recording"].iloc[0])
-        found.setdefault(env_id, {})[recording] = _landscape(rows)
-    return found
+        landscapes.setdefault(env_id, {})[recording] = _landscape(rows)
+    return landscapes
 
 
 def _landscape(rows: pd.DataFrame) -> Landscape:
@@ -101,15 +103,7 @@ def _landscape(rows: pd.DataFrame) -> Landscape:
 
 
 def cells_exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """The same numbers at other thresholds, dealt out alike in all landscapes.
-
-    Args:
-        frame: What `measure` gives.
-        rng: Random numbers.
-
-    Returns:
-        A table as `measure` gives it.
-    """
+    """The same numbers at other thresholds, dealt out alike in all landscapes."""
     cells = len(frame.drop_duplicates(["support", "confidence"]))
     order = rng.permutation(cells)
     layers = list(_LAYERS)

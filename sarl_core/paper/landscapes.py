@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
-from sarl_core.paper.landscape_claims import count_claims, length_claims
+from sarl_core.paper.claims import FIGURE_2, FIGURE_3, Rows, decided
 from sarl_core.paper.landscape_table import (
     COLUMNS,
     cells_exchanged,
     landscapes_of,
     measure,
 )
+from sarl_core.paper.metrics.landscapes import Environments, recorded
 from sarl_core.paper.replicates import (
     PAPER_DIVIDER,
     environment_name,
@@ -35,13 +37,13 @@ def _parts(frame: pd.DataFrame) -> tuple[str, ...]:
 def _draw(frame: pd.DataFrame, part: str, dark: bool, layer: Size) -> tuple[Drawing, ...]:
     from sarl_core.explaining.figures.thresholds import LAYERS, heatmap, surface
 
-    found = next(
+    landscape = next(
         next(iter(own.values()))
         for env_id, own in landscapes_of(frame).items()
         if environment_name(env_id) == part
     )
     what = f"{LAYERS[layer].title}, {part}"
-    flat, raised = heatmap(found, layer, dark=dark), surface(found, layer, dark=dark)
+    flat, raised = heatmap(landscape, layer, dark=dark), surface(landscape, layer, dark=dark)
     flat.update_layout(height=380)
     raised.update_layout(height=380, scene_camera_eye={"x": 1.4, "y": -1.5, "z": 0.9})
     return (
@@ -58,23 +60,21 @@ def _settings(effort: Effort) -> dict[str, Any]:
         "environments": list(environments()),
         "seeds": {
             "tree": 0,
-            "recordings": {
-                env_id: recorded_seeds(env_id, effort.recordings) for env_id in environments()
-            },
+            "recordings": recorded_seeds(environments(), effort.recordings),
         },
     }
 
 
 def _numbers(frame: pd.DataFrame, layer: Size) -> dict[str, Any]:
     """The greatest value of a layer, where it stands, and how far recordings lead apart."""
-    found = {}
+    numbers = {}
     for env_id, own in landscapes_of(frame).items():
         one = next(iter(own.values()))
         values = np.asarray(getattr(one, layer), dtype=np.float64)
         row, column = np.unravel_index(int(values.argmax()), values.shape)
         every = np.array([getattr(each, layer) for each in own.values()])
         corner, apart = every[:, 0, -1], np.ptp(every, axis=0)
-        found[env_id] = {
+        numbers[env_id] = {
             "greatest": float(values.max()),
             "at_support": float(one.supports[row]),
             "at_confidence": float(one.confidences[column]),
@@ -86,7 +86,7 @@ def _numbers(frame: pd.DataFrame, layer: Size) -> dict[str, Any]:
             "mean_range_over_recordings": float(apart.mean()),
             "widest_range_over_recordings": float(apart.max()),
         }
-    return found
+    return numbers
 
 
 _ABOUT = (
@@ -96,31 +96,29 @@ _ABOUT = (
     "recordings of several experts."
 )
 
-COUNT = Study(
-    name="2",
-    place="Figure 2",
-    title="Number of rules",
-    about=f"How many rules there are {_ABOUT}",
-    measure=measure,
-    settings=_settings,
-    numbers=lambda frame: _numbers(frame, "rule_count"),
-    claims=count_claims,
-    exchanged=cells_exchanged,
-    parts=_parts,
-    draw=lambda frame, part, dark: _draw(frame, part, dark, "rule_count"),
-    columns=COLUMNS,
-)
-LENGTH = Study(
-    name="3",
-    place="Figure 3",
-    title="Mean length of a rule",
-    about=f"How many conditions a rule has on average {_ABOUT}",
-    measure=measure,
-    settings=_settings,
-    numbers=lambda frame: _numbers(frame, "mean_length"),
-    claims=length_claims,
-    exchanged=cells_exchanged,
-    parts=_parts,
-    draw=lambda frame, part, dark: _draw(frame, part, dark, "mean_length"),
-    columns=COLUMNS,
+
+def _study(name: str, title: str, what: str, layer: Size, rows: Rows[Environments]) -> Study:
+    return Study(
+        name=name,
+        place=f"Figure {name}",
+        title=title,
+        about=f"{what} {_ABOUT}",
+        measure=measure,
+        settings=_settings,
+        numbers=partial(_numbers, layer=layer),
+        claims=lambda frames: decided(rows, recorded(frames[name])),
+        exchanged=cells_exchanged,
+        parts=_parts,
+        draw=partial(_draw, layer=layer),
+        columns=COLUMNS,
+    )
+
+
+COUNT = _study("2", "Number of rules", "How many rules there are", "rule_count", FIGURE_2)
+LENGTH = _study(
+    "3",
+    "Mean length of a rule",
+    "How many conditions a rule has on average",
+    "mean_length",
+    FIGURE_3,
 )

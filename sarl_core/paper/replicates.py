@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -227,17 +228,20 @@ def fingerprints(env_id: str, count: int) -> dict[str, dict[str, str]]:
     }
 
 
-def recorded_seeds(env_id: str, count: int) -> list[dict[str, Any]]:
-    """Where the seeds of the recordings of an environment begin, for the report.
+def recorded_seeds(env_ids: Iterable[str], count: int) -> dict[str, list[dict[str, Any]]]:
+    """Where the seeds of recordings begin, for the report.
 
     Args:
-        env_id: One of `environments`.
-        count: Number of recordings.
+        env_ids: Some of `environments`.
+        count: Number of recordings of each.
 
     Returns:
-        For each its `recording`, `expert` and `first` seed.
+        By environment, for each recording its `recording`, `expert` and `first` seed.
     """
-    return [
-        {"recording": one.recording, "expert": one.name, "first": one.recorded_from}
-        for one in replicates_of(env_id, count)
-    ]
+    return {
+        env_id: [
+            {"recording": one.recording, "expert": one.name, "first": one.recorded_from}
+            for one in replicates_of(env_id, count)
+        ]
+        for env_id in env_ids
+    }

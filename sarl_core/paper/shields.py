@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +27,7 @@ from sarl_core.paper.verdicts import (
     share_over_recordings,
 )
 from sarl_core.paper.words import interval, shares
-from sarl_core.progress import Progress, report
+from sarl_core.progress import Progress, part_of
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import MeanInterval, interquartile_mean
 from sarl_core.studies.comparison import Arm, Comparison, compare_arm
@@ -92,18 +92,14 @@ def measure(
     total = effort.episodes * len(wanted)
     parts: list[pd.DataFrame] = []
     for replicate, divider, arm in wanted:
-
-        def told(done: int, _: int, before: int = len(parts) * effort.episodes) -> None:
-            report(progress, before + done, total)
-
-        found = compare_arm(
+        episodes = compare_arm(
             env_id,
             arm,
             episodes=effort.episodes,
             seed=replicate.first_seed,
             # The result is the same, bit for bit.
             jobs=1 if effort.quick or env_id != _SLOW else os.cpu_count() or 1,
-            progress=told,
+            progress=part_of(progress, len(parts) * effort.episodes, total),
         )
         parts.append(
             pd.DataFrame(
@@ -113,10 +109,10 @@ def measure(
                     "recording": replicate.recording,
                     "divider": divider,
                     "arm": arm.name,
-                    "agent": found.agent,
+                    "agent": episodes.agent,
                     "rule_count": 0 if arm.rules is None else len(arm.rules),
-                    "crashed": found.failed,
-                    **{name: getattr(found, own) for name, own in _FROM_EPISODES.items()},
+                    "crashed": episodes.failed,
+                    **{name: getattr(episodes, own) for name, own in _FROM_EPISODES.items()},
                 }
             )
         )
@@ -145,11 +141,15 @@ class Runs:
         experts: The expert of each recording, R.
         returns: By arm, (R, E).
         failed: Whether an episode ended in failure, likewise.
+        divider: Of the rules; 0 where actions are discrete.
+        beside: What a claim compares them with, by name.
     """
 
     experts: tuple[str, ...]
     returns: Mapping[str, Floats]
     failed: Mapping[str, Truths]
+    divider: int
+    beside: Mapping[str, Runs] = field(default_factory=dict)
 
     @cached_property
     def _typical(self) -> dict[str, Floats]:
@@ -178,10 +178,13 @@ class Runs:
         """The typical return over recordings."""
         return over_recordings(self.typical(arm), self.experts)
 
-    def told(self, arm: str) -> str:
+    def failures(self, arm: str) -> str:
+        """The share of failures, for people."""
+        return shares(share_over_recordings(self.failed[arm], self.experts))
+
+    def in_words(self, arm: str) -> str:
         """Typical return and share of failures, for people; neither stands without the other."""
-        failures = share_over_recordings(self.failed[arm], self.experts)
-        return f"{interval(self.over(arm))}, failing in {shares(failures)}"
+        return f"{interval(self.over(arm))}, failing in {self.failures(arm)}"
 
 
 def runs_of(frame: pd.DataFrame, divider: int) -> Runs:
@@ -209,7 +212,7 @@ def runs_of(frame: pd.DataFrame, divider: int) -> Runs:
         returns[name] = rows["return"].to_numpy(dtype=np.float64).reshape(recordings, -1)
         failed[name] = rows["crashed"].to_numpy(dtype=np.bool_).reshape(recordings, -1)
     experts = chosen.drop_duplicates("recording")["expert"]
-    return Runs(tuple(experts.tolist()), returns, failed)
+    return Runs(tuple(experts.tolist()), returns, failed, divider)
 
 
 def comparison_of(frame: pd.DataFrame, divider: int) -> Comparison:
@@ -235,26 +238,18 @@ def comparison_of(frame: pd.DataFrame, divider: int) -> Comparison:
         }
         agent = "expert" if name == EXPERT else str(rows["agent"].iloc[0])
         episodes.append(Episodes(env_id=env_id, agent=agent, **columns))
-    arms = tuple(Arm(name, str(found.agent)) for name, found in zip(ARMS, episodes, strict=True))
+    arms = tuple(Arm(name, str(played.agent)) for name, played in zip(ARMS, episodes, strict=True))
     return Comparison(env_id, int(episodes[0].seeds[0]), arms, tuple(episodes))
 
 
 def dividers_of(frame: pd.DataFrame) -> tuple[int, ...]:
     """The dividers in a table; (0,) where the actions are discrete."""
-    found = sorted(set(frame["divider"].tolist()) - {_AS_THEY_ARE})
-    return tuple(int(divider) for divider in found) or (_AS_THEY_ARE,)
+    dividers = sorted(set(frame["divider"].tolist()) - {_AS_THEY_ARE})
+    return tuple(int(divider) for divider in dividers) or (_AS_THEY_ARE,)
 
 
 def arms_exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
-    """The same episodes with the arms' names dealt out anew, alike in all recordings.
-
-    Args:
-        frame: What `measure` gives.
-        rng: Random numbers.
-
-    Returns:
-        A table as `measure` gives it.
-    """
+    """The same episodes with the arms' names dealt out anew, alike in all recordings."""
     keys = list(dict.fromkeys(zip(frame["divider"], frame["arm"], strict=True)))
     order = rng.permutation(len(keys))
     names = dict(zip(keys, [keys[number] for number in order], strict=True))
@@ -266,8 +261,8 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
     """What sums up each arm, by divider and name."""
     numbers: dict[str, Any] = {}
     for divider in dividers_of(frame):
-        found, runs = comparison_of(frame, divider), runs_of(frame, divider)
-        for arm, episodes in zip(found.arms, found.episodes, strict=True):
+        comparison, runs = comparison_of(frame, divider), runs_of(frame, divider)
+        for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True):
             rows = frame[
                 (frame["arm"] == arm.name) & frame["divider"].isin((_AS_THEY_ARE, divider))
             ]
@@ -309,7 +304,7 @@ def _settings(effort: Effort, env_id: str, dividers: Sequence[int]) -> dict[str,
         "projection": "centre",
         "seeds": {
             "tree": 0,
-            "recordings": recorded_seeds(env_id, effort.recordings),
+            "recordings": recorded_seeds([env_id], effort.recordings)[env_id],
             "episodes": [
                 [one.first_seed, one.first_seed + effort.episodes - 1]
                 for one in replicates_of(env_id, effort.recordings)
@@ -333,23 +328,23 @@ def _draw(frame: pd.DataFrame, part: str, dark: bool) -> tuple[Drawing, ...]:
     from sarl_core.explaining.figures.recording import recordings_figure
 
     divider = next(value for value in dividers_of(frame) if _part(value) == part)
-    found, runs = comparison_of(frame, divider), runs_of(frame, divider)
+    comparison, runs = comparison_of(frame, divider), runs_of(frame, divider)
     rules = {FILTERED: 0, UNFILTERED: 1}
     agents = {EXPERT: 1}
     styles = [
         # The novice with rules is told by their colour, so every line can be a plain one.
         replace(arm_style(agents.get(arm.name, 0), rules.get(arm.name)), dash="solid")
-        for arm in found.arms
+        for arm in comparison.arms
     ]
-    colours = {arm.name: style.colour for arm, style in zip(found.arms, styles, strict=True)}
-    where = environment_name(found.env_id) + (f", {part}" if divider else "")
+    colours = {arm.name: style.colour for arm, style in zip(comparison.arms, styles, strict=True)}
+    where = environment_name(comparison.env_id) + (f", {part}" if divider else "")
     failures = {name: each.mean(axis=1) for name, each in runs.failed.items()}
     return (
         Drawing(
             f"Return of every episode, one recording after the other, {where}",
-            returns_figure(found, styles=styles, height=380),
+            returns_figure(comparison, styles=styles, height=380),
             share=1.0,
-            alt=f"Returns of {len(found.episodes[0])} episodes of the four arms, {where}",
+            alt=f"Returns of {len(comparison.episodes[0])} episodes of the four arms, {where}",
         ),
         Drawing(
             f"Typical return of each recording, {where}",

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from sarl_core.errors import InputError
+from sarl_core.paper.claims import FIGURE_5, FIGURE_6, FIGURE_7, decided
 from sarl_core.paper.dividing import DIVIDING
 from sarl_core.paper.landscapes import COUNT, LENGTH
 from sarl_core.paper.learning import LEARNING
+from sarl_core.paper.metrics.shields import first_runs, lander_runs, walker_runs
 from sarl_core.paper.settings_table import SETTINGS
-from sarl_core.paper.shield_claims import cart_claims, lander_claims
 from sarl_core.paper.shields import study
 from sarl_core.paper.study import Study
-from sarl_core.paper.walker_claims import walker_claims
 
 _ALL = (
     COUNT,
     LENGTH,
     SETTINGS,
     LEARNING,
-    study("5", "CartPole-v1", cart_claims),
-    study("6", "LunarLander-v3", lander_claims),
+    study("5", "CartPole-v1", lambda frames: decided(FIGURE_5, first_runs(frames["5"]))),
+    study("6", "LunarLander-v3", lambda frames: decided(FIGURE_6, lander_runs(frames))),
     study(
         "7",
         "BipedalWalker-v3",
-        walker_claims,
+        lambda frames: decided(FIGURE_7, walker_runs(frames["7"])),
         dividers=(2, 3, 5),
         more=" The paper divides each action into 2 intervals; 3 and 5 are here too. A shielded "
         "action becomes the centre of its interval.",

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from sarl_core.mining.language import share_text
 from sarl_core.rollouts.statistics import MeanInterval
 
@@ -13,19 +16,25 @@ def number(value: float) -> str:
     return f"{float(value):,.0f}".replace("-", "−") if abs(value) >= 0.5 else "0"
 
 
-def interval(found: MeanInterval) -> str:
+def number_range(values: ArrayLike, decimals: int = 0) -> str:
+    """The least and the most of some numbers, or the one that they all are, for people."""
+    ends = dict.fromkeys(f"{end:,.{decimals}f}" for end in (np.min(values), np.max(values)))
+    return " to ".join(ends)
+
+
+def interval(mean: MeanInterval) -> str:
     """A return with its 95 % interval, where there is one, for people."""
-    if math.isnan(found.low):
-        return number(found.mean)
-    return f"{number(found.mean)} ({number(found.low)} to {number(found.high)})"
+    if math.isnan(mean.low):
+        return number(mean.mean)
+    return f"{number(mean.mean)} ({number(mean.low)} to {number(mean.high)})"
 
 
-def shares(found: MeanInterval) -> str:
+def shares(mean: MeanInterval) -> str:
     """A share with its 95 % interval, where there is one, for people."""
-    if math.isnan(found.low):
-        return share_text(found.mean)
-    low, high = (share_text(min(max(end, 0.0), 1.0)) for end in (found.low, found.high))
-    return f"{share_text(found.mean)} ({low} to {high})"
+    if math.isnan(mean.low):
+        return share_text(mean.mean)
+    low, high = (share_text(min(max(end, 0.0), 1.0)) for end in (mean.low, mean.high))
+    return f"{share_text(mean.mean)} ({low} to {high})"
 
 
 def percent(share: float) -> str:

@@ -10,7 +10,8 @@ import pytest
 from sarl_core import rollout
 from sarl_core.mining.quantisation import quantise
 from sarl_core.paper import dividing
-from sarl_core.paper.dividing import DIVIDING, episodes_of, quantisations_of
+from sarl_core.paper.divider_table import episodes_of, quantisations_of
+from sarl_core.paper.dividing import DIVIDING
 from sarl_core.paper.replicates import demonstrations_of, replicates_of
 from sarl_core.paper.study import Effort
 from sarl_core.paper.tables import read_table, write_table

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from sarl_core.paper.verdicts import (
-    Verdict,
-    above,
-    below,
-    in_most,
-    over_recordings,
-    share_over_recordings,
-    together,
-    within,
-)
+from sarl_core.paper.criteria import Bounds, Finding, InMost, Sample, Together
+from sarl_core.paper.verdicts import Verdict, over_recordings, share_over_recordings
 from sarl_core.paper.words import interval, shares
 
 EXPERTS = ("a", "b", "c", "a", "b", "c")
 SPREAD = np.array([-1.0, 0.0, 1.0, 1.0, 0.0, -1.0])  # the experts' means are the same
+
+
+def verdict(criterion: Bounds, values: np.ndarray, experts: tuple[str, ...] = EXPERTS) -> Verdict:
+    return criterion.finding(Sample(values, experts)).verdict
+
+
+def in_most(
+    holds: Sequence[bool],
+    experts: tuple[str, ...],
+    judged: Sequence[bool] | None = None,
+    *,
+    existence: bool = False,
+) -> Finding:
+    there = None if judged is None else np.array(judged)
+    criterion = InMost(existence=existence, only_judged=judged is not None)
+    return criterion.finding(Sample(np.array(holds, dtype=bool), experts, judged=there))
 
 
 @pytest.mark.parametrize(
@@ -35,18 +45,18 @@ SPREAD = np.array([-1.0, 0.0, 1.0, 1.0, 0.0, -1.0])  # the experts' means are th
 def test_the_whole_interval_has_to_lie_where_a_claim_puts_it(
     values: np.ndarray, expected: Verdict
 ) -> None:
-    assert above(values, EXPERTS, agrees=0.8, partly=0.5).verdict == expected
-    assert below(-values, EXPERTS, agrees=-0.8, partly=-0.5).verdict == expected
-    found = below(-values, EXPERTS, agrees=-0.8, partly=-0.5)
+    assert verdict(Bounds("above", 0.8, 0.5), values) == expected
+    assert verdict(Bounds("below", -0.8, -0.5), -values) == expected
+    found = Bounds("below", -0.8, -0.5).finding(Sample(-values, EXPERTS))
     assert found.interval is not None
     assert found.interval.mean == pytest.approx(-values.mean())
     assert found.interval.low < found.interval.high
 
 
 def test_the_same_value_everywhere_is_not_more_than_itself() -> None:
-    assert above(np.zeros(6), EXPERTS, agrees=0, partly=0).verdict == "does not agree"
-    assert above(np.zeros(6), EXPERTS, agrees=0, partly=-0.1).verdict == "partly"
-    assert above(np.full(6, 0.01), EXPERTS, agrees=0, partly=0).verdict == "agrees"
+    assert verdict(Bounds("above", 0, 0), np.zeros(6)) == "does not agree"
+    assert verdict(Bounds("above", 0, -0.1), np.zeros(6)) == "partly"
+    assert verdict(Bounds("above", 0, 0), np.full(6, 0.01)) == "agrees"
 
 
 @pytest.mark.parametrize(
@@ -65,20 +75,20 @@ def test_the_same_value_everywhere_is_not_more_than_itself() -> None:
 def test_that_two_things_are_the_same_has_to_be_shown(
     values: np.ndarray, expected: Verdict
 ) -> None:
-    assert within(values, EXPERTS, agrees=0.1, partly=0.5).verdict == expected
-    assert within(-values, EXPERTS, agrees=0.1, partly=0.5).verdict == expected
+    assert verdict(Bounds("within", 0.1, 0.5), values) == expected
+    assert verdict(Bounds("within", 0.1, 0.5), -values) == expected
 
 
 def test_few_recordings_or_experts_decide_nothing() -> None:
     for count in (1, 2, 4):
         values = np.full(count, 0.9)
-        assert above(values, EXPERTS[:count], agrees=0.8, partly=0.5).verdict == "cannot be judged"
+        assert verdict(Bounds("above", 0.8, 0.5), values, EXPERTS[:count]) == "cannot be judged"
         assert in_most([True] * count, EXPERTS[:count]).verdict == "cannot be judged"
     alike = ("a", "b") * 3
-    found = above(np.full(6, 0.9), alike, agrees=0.8, partly=0.5)
+    found = Bounds("above", 0.8, 0.5).finding(Sample(np.full(6, 0.9), alike))
     assert found.verdict == "cannot be judged"
-    assert "5 recordings of 3 experts are needed" in found.told
-    assert above(np.full(5, 0.9), EXPERTS[:5], agrees=0.8, partly=0.5).verdict == "agrees"
+    assert "5 recordings of 3 experts are needed" in found.sentence
+    assert verdict(Bounds("above", 0.8, 0.5), np.full(5, 0.9), EXPERTS[:5]) == "agrees"
 
 
 def test_experts_that_differ_make_the_interval_wide() -> None:
@@ -98,7 +108,7 @@ def test_one_expert_alone_has_no_interval() -> None:
     share = share_over_recordings(np.ones((1, 20), dtype=np.bool_), ("a",))
     assert np.isnan(share.low)
     assert shares(share) == "100 %"
-    assert above(np.array([9.0]), ("a",), agrees=0, partly=0).verdict == "cannot be judged"
+    assert verdict(Bounds("above", 0, 0), np.array([9.0]), ("a",)) == "cannot be judged"
 
 
 @pytest.mark.parametrize("between", [0.0, 0.3, 0.7, 1.0])
@@ -142,9 +152,9 @@ def test_no_failure_in_few_episodes_is_no_proof() -> None:
     ],
 )
 def test_recordings_are_counted(holds: tuple[int, ...], expected: Verdict) -> None:
-    found = in_most(np.array(holds, dtype=bool), EXPERTS)
+    found = in_most(holds, EXPERTS)
     assert found.verdict == expected
-    assert f"{sum(holds)} of 6 recordings" in found.told
+    assert f"{sum(holds)} of 6 recordings" in found.sentence
 
 
 def test_every_expert_has_to_bear_it_out() -> None:
@@ -167,18 +177,31 @@ def test_nothing_to_judge_is_not_judged() -> None:
         assert found.verdict == expected
         assert len(found.held) == there
         assert not found.too_few
-    assert in_most(holds, EXPERTS, judged=[False] * 6).told == ""
+    assert in_most(holds, EXPERTS, judged=[False] * 6).sentence == ""
 
 
 def test_several_findings_are_one() -> None:
-    yes = in_most([True] * 6, EXPERTS)
-    no = in_most([False] * 6, EXPERTS)
-    unclear = above(SPREAD, EXPERTS, agrees=0.1, partly=-0.1)
-    assert together([yes, yes], "").verdict == "agrees"
-    assert together([yes, no], "").verdict == "partly"
-    assert together([no, no], "").verdict == "does not agree"
-    assert together([no, unclear], "").verdict == "cannot be judged"
-    assert sum(together([yes, no], "").held) == 0  # of the same recordings: both have to hold
-    other = in_most([True] * 6, tuple("defdef"))
-    apart = together([yes, other], "")
-    assert "12 of 12 recordings, with 6 of 6 experts" in apart.told
+    yes = Sample(np.ones(6, dtype=bool), EXPERTS)
+    no = Sample(np.zeros(6, dtype=bool), EXPERTS)
+    in_all = Together(InMost(), "")
+    assert in_all.finding(yes, yes).verdict == "agrees"
+    assert in_all.finding(yes, no).verdict == "partly"
+    assert in_all.finding(no, no).verdict == "does not agree"
+    positive = Together(Bounds("above", 0.1, -0.1), "")
+    assert positive.finding(Sample(SPREAD - 9, EXPERTS), Sample(SPREAD, EXPERTS)).verdict == (
+        "cannot be judged"
+    )
+    # Of the same recordings: both have to hold.
+    assert sum(in_all.finding(yes, no).held) == 0
+    apart = in_all.finding(yes, Sample(np.ones(6, dtype=bool), tuple("defdef")))
+    assert "12 of 12 recordings, with 6 of 6 experts" in apart.sentence
+
+
+def test_so_many_may_have_to_agree_before_a_claim_does_in_part() -> None:
+    more, less, unclear = (Sample(SPREAD + shift, EXPERTS) for shift in (9, -9, 0))
+    two = Together(Bounds("above", 0, 0), "", in_part_of=2)
+    assert two.finding(more, more, less).verdict == "partly"
+    assert two.finding(more, more, unclear).verdict == "partly"
+    assert two.finding(more, less, unclear).verdict == "does not agree"
+    assert two.finding(more, unclear, unclear).verdict == "cannot be judged"
+    assert two.finding(less, unclear, unclear).verdict == "cannot be judged"

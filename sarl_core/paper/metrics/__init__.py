@@ -1,0 +1,1 @@
+"""What the paper's claims are measured by: from a study's table, numbers and words."""
