@@ -1,10 +1,9 @@
-"""Drawing text and bars straight onto palette indexes, with the font that comes with Pillow."""
+"""Drawing text and bars straight onto palette indexes, with a font that is shipped."""
 
 from __future__ import annotations
 
-import re
+import math
 import unicodedata
-from bisect import bisect_left
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -12,20 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.rendering.film import Colour
+from sarl_core.shipped import DATA
 
 _SHADES = 6  # between paper and ink, along the edges of the letters
 _FINE = 4  # drawn as many times larger, then reduced
 
-# Not in the font. The strokes, as points of a unit square, y downwards.
-_DRAWN: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {
-    "→": (((0.05, 0.5), (0.95, 0.5)), ((0.65, 0.2), (0.95, 0.5), (0.65, 0.8))),
-    "≤": (((0.85, 0.12), (0.15, 0.42), (0.85, 0.72)), ((0.15, 0.95), (0.85, 0.95))),
-    "≥": (((0.15, 0.12), (0.85, 0.42), (0.15, 0.72)), ((0.15, 0.95), (0.85, 0.95))),
-    "−": (((0.0, 0.5), (1.0, 0.5)),),
-    "–": (((0.0, 0.5), (1.0, 0.5)),),
+FONTS = DATA / "fonts"
+_RANGES = (
+    (0x20, 0x7E),  # ASCII
+    (0xA0, 0x17F),  # Latin letters with accents, and signs such as ° ± ² ³ · ×
+    (0x386, 0x3CE),  # Greek
+    (0x400, 0x45F),  # Cyrillic
+    (0x2070, 0x2079),  # raised and lowered digits
+    (0x2080, 0x2089),
+    (0x2190, 0x2195),  # arrows
+)
+_SIGNS = "–—‘’“”„†•…‰′″‹›⁻₋€∂∆∈∑−∕√∞∫≈≠≤≥"
+ALPHABET = frozenset(_SIGNS) | {
+    chr(code)
+    for first, last in _RANGES
+    for code in range(first, last + 1)
+    if unicodedata.name(chr(code), "") and chr(code) not in "\xadⁱ"
 }
-_SPLIT = re.compile(f"([{''.join(_DRAWN)}])")
-_WIDTHS = {"→": 1.0, "≤": 0.6, "≥": 0.6, "−": 0.42, "–": 0.55}
+"""The characters that the font has; `docs/font.py` makes it of them."""
 
 PAPER: Colour = (246, 247, 249)
 _WHITE: Colour = (255, 255, 255)
@@ -84,46 +92,69 @@ PAPER_INDEX, TRACK_INDEX = 0, 1
 
 
 @lru_cache(maxsize=16)
-def _font(size: int) -> Any:
+def _font(size: int, bold: bool) -> Any:
     from PIL import ImageFont
 
-    return ImageFont.load_default(size=size)
+    name = f"DejaVuSansCondensed{'-Bold' if bold else ''}.ttf"
+    # Pillow's own layout, which is the same on every machine.
+    return ImageFont.truetype(FONTS / name, size, layout_engine=ImageFont.Layout.BASIC)
 
 
-@lru_cache(maxsize=4096)
-def text_width(text: str, size: int) -> int:
+class _Advances(dict[str, float]):
+    """How far each character goes; letters stand one by one, so that these may be added up."""
+
+    def __init__(self, size: int, bold: bool) -> None:
+        super().__init__()
+        self._font = _font(size, bold)
+
+    def __missing__(self, character: str) -> float:
+        advance: float = self._font.getlength(_written(character))
+        self[character] = advance
+        return advance
+
+
+@lru_cache(maxsize=16)
+def _advances(size: int, bold: bool) -> _Advances:
+    return _Advances(size, bold)
+
+
+def _ends(text: str, size: int, bold: bool) -> NDArray[np.float64]:
+    """Where each character of a line ends, (n,)."""
+    advances = _advances(size, bold)
+    return np.cumsum([advances[character] for character in text])
+
+
+def text_width(text: str, size: int, *, bold: bool = False) -> int:
     """Width of a line of text.
 
     Args:
         text: One line.
         size: Of the font, in pixels.
+        bold: Whether its strokes are thicker.
 
     Returns:
         Pixels.
     """
-    width = 0.0
-    for run in _runs(text):
-        width += size * _WIDTHS[run] + 2 if run in _DRAWN else _font(size).getlength(run)
-    return int(np.ceil(width)) + 1
+    advances = _advances(size, bold)
+    return math.ceil(sum(advances[character] for character in text)) + 1
 
 
-def fitted(text: str, size: int, width: int) -> str:
+def fitted(text: str, size: int, width: int, *, bold: bool = False) -> str:
     """Shorten a line until it fits.
 
     Args:
         text: One line.
         size: Of the font.
         width: Pixels there are.
+        bold: Whether its strokes are thicker.
 
     Returns:
         The text, or its beginning and "…".
     """
-    if text_width(text, size) <= width:
+    if text_width(text, size, bold=bold) <= width:
         return text
-    # The rules of four joints in one sentence are long: halve, and do not count down.
-    count = bisect_left(
-        range(1, len(text)), True, key=lambda n: text_width(f"{text[:n].rstrip()}…", size) > width
-    )
+    room = width - 1 - _advances(size, bold)["…"]
+    count = int(np.searchsorted(_ends(text, size, bold), room, side="right"))
     return f"{text[:count].rstrip()}…"
 
 
@@ -139,31 +170,28 @@ def wrapped(text: str, size: int, width: int, lines: int) -> list[str]:
     Returns:
         The lines.
     """
-    found: list[str] = []
-    words = text.split()
-    while words:
-        count = 1
-        while count < len(words) and text_width(" ".join(words[: count + 1]), size) <= width:
-            count += 1
-        if len(found) == lines - 1:
-            count = len(words)
-        found.append(fitted(" ".join(words[:count]), size, width))
-        words = words[count:]
-    return found
+    broken: list[str] = []
+    text = " ".join(text.split())
+    while text:
+        end = int(np.searchsorted(_ends(text, size, False), width - 1, side="right"))
+        if end < len(text) and len(broken) < lines - 1:
+            space = text.rfind(" ", 0, end + 1)
+            end = space if space > 0 else text.find(" ")  # else a word alone is too long
+        if end < 0 or len(broken) == lines - 1:
+            end = len(text)
+        broken.append(fitted(text[:end], size, width))
+        text = text[end:].lstrip()
+    return broken
 
 
-def _runs(text: str) -> list[str]:
-    return [run for run in _SPLIT.split(text) if run]
-
-
-def _writable(run: str) -> str:
-    """What the font has; it knows Latin letters without accents."""
-    plain = unicodedata.normalize("NFKD", run)
-    return "".join(
-        c if c in "…·°±" or c.isascii() else "" if unicodedata.combining(c) else "?"
-        for c in plain
-        if c.isprintable()
-    )
+def _written(character: str) -> str:
+    """What the font has: a letter without its accent where it lacks that, else "?"."""
+    if character in ALPHABET:
+        return character
+    if not character.isprintable():
+        return ""
+    plain = unicodedata.normalize("NFKD", character)
+    return "".join(c if c in ALPHABET else "" if unicodedata.combining(c) else "?" for c in plain)
 
 
 @lru_cache(maxsize=1024)
@@ -171,30 +199,9 @@ def _mask(text: str, size: int, bold: bool) -> NDArray[np.uint8]:
     """Coverage of a line of text, (height, width), 0 to 255."""
     from PIL import Image, ImageDraw
 
-    font = _font(size)
-    ascent, descent = font.getmetrics()
-    picture = Image.new("L", (text_width(text, size) + 2, ascent + descent + 2))
-    draw = ImageDraw.Draw(picture)
-    x = 0.0
-    for run in _runs(text):
-        if run not in _DRAWN:
-            draw.text((x, 0), run, fill=255, font=font, stroke_width=0.35 if bold else 0)
-            x += font.getlength(run)
-            continue
-        width, height = size * _WIDTHS[run], size * 0.52
-        glyph = Image.new("L", (int(width + 2) * _FINE, picture.height * _FINE))
-        pen = ImageDraw.Draw(glyph)
-        for stroke in _DRAWN[run]:
-            points = [
-                ((1 + px * width) * _FINE, (ascent - height + py * height) * _FINE)
-                for px, py in stroke
-            ]
-            pen.line(
-                points, fill=255, width=int(size * (0.12 if bold else 0.09) * _FINE), joint="curve"
-            )
-        small = glyph.resize((int(width + 2), picture.height), Image.Resampling.BOX)
-        picture.paste(small, (round(x), 0))
-        x += width + 2
+    font = _font(size, bold)
+    picture = Image.new("L", (text_width(text, size, bold=bold) + 2, sum(font.getmetrics()) + 2))
+    ImageDraw.Draw(picture).text((0, 0), "".join(map(_written, text)), fill=255, font=font)
     return np.asarray(picture)
 
 
@@ -241,16 +248,16 @@ class Canvas:
         Returns:
             Where it ends.
         """
-        self._stain(left, top, _mask(_clean(text), size, bold), ink)
-        return left + text_width(_clean(text), size)
+        self._stain(left, top, _mask(text, size, bold), ink)
+        return left + text_width(text, size, bold=bold)
 
     def text_right(self, right: int, top: int, text: str, size: int, ink: Ink) -> None:
         """Write a line that ends at `right`."""
-        self.text(right - text_width(_clean(text), size), top, text, size, ink)
+        self.text(right - text_width(text, size), top, text, size, ink)
 
     def label(self, left: int, top: int, text: str, size: int, ground: Ink, ink: Ink) -> int:
         """Write on a rounded label, and give where it ends."""
-        width, height = text_width(text, size) + 14, size + 8
+        width, height = text_width(text, size, bold=True) + 14, size + 8
         self._stain(left, top, _rounded(width, height), ground)
         self.text(left + 7, top + 3, text, size, ink, bold=True)
         return left + width
@@ -261,8 +268,3 @@ class Canvas:
         shades = (mask.astype(np.uint16) * _SHADES + 127) // 255
         marked = shades > 0
         target[marked] = (ink.first + shades[marked] - 1).astype(np.uint8)
-
-
-@lru_cache(maxsize=4096)
-def _clean(text: str) -> str:
-    return "".join(run if run in _DRAWN else _writable(run) for run in _runs(text))

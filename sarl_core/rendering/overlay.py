@@ -6,6 +6,7 @@ text that stayed longer would name rules that are no longer in force. Who wants 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,6 +28,8 @@ LEAST_WIDTH = 440  # a narrower scene is enlarged, so that the text has room
 
 _MARGIN = 14
 _BAR = 6
+_SMALL, _LINE, _LINES = 13, 17, 4  # of the reason: size, from line to line, most lines
+_MINUS = re.compile(r"(?<![\w.])-(?=\.?\d|infinite)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,9 @@ class Panel:
     def _write_top(self, canvas: Canvas, number: int) -> None:
         width = canvas.pixels.shape[1]
         right = width - _MARGIN
-        canvas.text(_MARGIN, 8, fitted(self.title, 18, width - 190), 18, INKS.text, bold=True)
+        canvas.text(
+            _MARGIN, 8, fitted(self.title, 18, width - 190, bold=True), 18, INKS.text, bold=True
+        )
         canvas.text(_MARGIN, 32, fitted(self.subtitle, 13, width - 190), 13, INKS.quiet)
         gained = signed(float(self._gained[number]), 1)
         canvas.text_right(right, 10, f"return {gained}", 15, INKS.text)
@@ -110,17 +115,14 @@ class Panel:
             canvas.box(0, top, width, 4, INKS.changed.full)
         if caption.mark:
             left = canvas.label(left, top + 12, caption.mark, 12, ink, on_ink) + 10
+        action = typeset(caption.action)
         canvas.text(
-            left, top + 12, fitted(caption.action, 16, right - left), 16, INKS.text, bold=True
+            left, top + 12, fitted(action, 16, right - left, bold=True), 16, INKS.text, bold=True
         )
-        for line, text in enumerate(wrapped(caption.reason, 14, width - 2 * _MARGIN, 3)):
-            canvas.text(
-                _MARGIN,
-                top + 42 + 20 * line,
-                text,
-                14,
-                INKS.text if caption.has_rule else INKS.quiet,
-            )
+        ink = INKS.text if caption.has_rule else INKS.quiet
+        reason = typeset(caption.reason)
+        for line, text in enumerate(wrapped(reason, _SMALL, width - 2 * _MARGIN, _LINES)):
+            canvas.text(_MARGIN, top + 40 + _LINE * line, text, _SMALL, ink)
 
     def _write_end(self, canvas: Canvas) -> None:
         top, count = canvas.pixels.shape[0] - BOTTOM, len(self.steps)
@@ -139,7 +141,7 @@ class Panel:
             if unchecked:
                 lines.append(f"At {unchecked} steps no rule was asked, for want of valid numbers.")
             for line, text in enumerate(lines):
-                canvas.text(_MARGIN, top + 42 + 20 * line, text, 14, INKS.quiet)
+                canvas.text(_MARGIN, top + 40 + _LINE * line, text, _SMALL, INKS.quiet)
 
     @cached_property
     def _edges(self) -> NDArray[np.int64]:
@@ -266,6 +268,18 @@ def side_by_side_picture(panels: tuple[Panel, ...], number: int) -> NDArray[np.u
     for picture in pictures[1:]:
         parts += [gap, picture]
     return np.concatenate(parts, axis=1)
+
+
+def typeset(text: str) -> str:
+    """A text with true minus signs.
+
+    Args:
+        text: As it stands elsewhere.
+
+    Returns:
+        As "torque −1.2".
+    """
+    return _MINUS.sub("−", text)
 
 
 def signed(value: float, digits: int) -> str:
