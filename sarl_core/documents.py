@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
 
-from sarl_core.errors import InputError, quoted
+import msgspec
+from msgspec import inspect
+
+from sarl_core.errors import quoted
 from sarl_core.limits import require_memory
 
 LARGEST_WHOLE = 2**53  # whole numbers up to here are exact in floating point too
 _LARGEST = sys.float_info.max
+
+Number = Annotated[float, msgspec.Meta(ge=-_LARGEST, le=_LARGEST)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0, le=_LARGEST)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_WHOLE)]
+
+T = TypeVar("T")
+
 # What the signs of a text may come to as objects of Python, in bytes: about half of the worst.
 _COSTS = {"{": 100, "[": 40, ":": 20, ",": 20, '"': 15}
 
@@ -79,109 +91,95 @@ def _finite(text: str) -> float:
     return number
 
 
-class DocumentReader:
-    """One object of a document: hands out what was asked for and refuses the rest.
+class MisfitError(ValueError):
+    """A part of a document is not what it should be.
 
     Args:
-        value: What was parsed.
-        name: Of the file, for errors.
-        place: Of the object in it, "" for the whole.
+        what: Is wrong, as "'samples' is missing".
+        place: Of the part, from the outside inwards, as "rules 4", "held_out".
     """
 
-    def __init__(self, value: Any, name: str, place: str) -> None:
-        if not isinstance(value, Mapping):
-            raise InputError(f"{name}: {place or 'it'} is not an object; write the file again")
-        self._value = dict(value)
-        self._name, self._place = name, place
+    def __init__(self, what: str, *place: str) -> None:
+        super().__init__(" in ".join(filter(None, (what, " ".join(place)))))
+        self.what, self.place = what, place
 
-    def fail(self, what: str) -> InputError:
-        """An error about this object."""
-        where = f" in {self._place}" if self._place else ""
-        return InputError(f"{self._name}: {what}{where}; mend it or mine the rules again")
 
-    def take(self, key: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
-        """Hand out a value, and refuse another kind; booleans are no numbers."""
-        value = self._value.pop(key, default)
-        if value is ...:
-            raise self.fail(f"{key!r} is missing")
-        kinds = kind if isinstance(kind, tuple) else (kind,)
-        boolean = isinstance(value, bool) and bool not in kinds
-        if value is not default and (boolean or not isinstance(value, kinds)):
-            raise self.fail(f"{key!r} is {quoted(value)}, of the wrong kind")
-        return value
+def conformed(value: Any, kind: type[T]) -> T:
+    """What was parsed, as a type that says what may stand there.
 
-    def has(self, key: str) -> bool:
-        """Whether there is a value that was not handed out yet."""
-        return key in self._value
+    Args:
+        value: Of dicts, lists, texts, numbers, true, false and null.
+        kind: As msgspec takes it; booleans are no numbers.
 
-    def number(
-        self, key: str, default: Any = ..., *, low: float = -_LARGEST, high: float = _LARGEST
-    ) -> float:
-        """A number within bounds."""
-        value = self.take(key, (int, float), default)
-        # Compared before it is converted: an integer may be too large for a float.
-        if not low <= value <= high:
-            raise self.fail(f"{key!r} is {quoted(value)}, not a number from {low:g} to {high:g}")
-        return float(value)
+    Returns:
+        One of that type.
 
-    def count(
-        self, key: str, default: Any = ..., *, low: int = 0, high: int = LARGEST_WHOLE
-    ) -> int:
-        """A whole number within bounds."""
-        value: int = self.take(key, int, default)
-        if not low <= value <= high:
-            raise self.fail(f"{key!r} is {quoted(value)}, not a whole number from {low} to {high}")
-        return value
+    Raises:
+        MisfitError: If anything in it is something else, is missing, or is not known.
+    """
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise _in_words(value, kind, str(error)) from error
+    except UnicodeError as error:  # a name of which UTF-8 cannot write every sign
+        raise MisfitError("something in it is not known to this version") from error
 
-    def limit(self, key: str) -> int | None:
-        """A whole number, or None where it is missing or null."""
-        if self._value.get(key) is not None:
-            return self.count(key)
-        self._value.pop(key, None)
-        return None
 
-    def share(self, key: str) -> float | None:
-        """A number from 0 to 1, or null."""
-        if self._value.get(key, ...) is not None:
-            return self.number(key, low=0, high=1)
-        self.take(key, type(None))
-        return None
+def _in_words(value: Any, kind: Any, text: str) -> MisfitError:
+    """What msgspec says, as "Expected `int` >= 0 - at `$.rules[3].samples`", in our words."""
+    path = text.rpartition(" - at `$")[2] if " - at `$" in text else ""
+    types, place, is_key = _either(inspect.type_info(kind)), list[str](), False
+    for name, index in re.findall(r"\.(\w+)|\[(\d{1,9})\]", path):
+        is_key = bool(name)
+        step = name if is_key else int(index)
+        if is_key:
+            place.append(name)
+        else:
+            place[-1:] = [f"{''.join(place[-1:])} {int(index) + 1}"]
+        try:
+            value = value[step]
+        except (LookupError, TypeError):
+            value = ...
+        types = [inner for one in types for inner in _within(one, step)]
+    named = re.match(r"Object (missing|contains).*? field `(.*?)(?:`$|` - at `)", text, re.DOTALL)
+    if named:
+        what = "missing" if named[1] == "missing" else "not known to this version"
+        return MisfitError(f"{quoted(named[2])} is {what}", *place)
+    if not is_key and text.startswith("Expected `object`"):
+        return MisfitError(f"{' '.join(place) or 'it'} is not an object")
+    key = place.pop() if place else "it"
+    if value is ...:
+        return MisfitError(f"{key!r} holds something of the wrong kind", *place)
+    choices = [repr(choice) for one in types for choice in getattr(one, "values", ())]
+    if choices and isinstance(value, str):
+        noun = {"op": "operator"}.get(key, key)
+        return MisfitError(f"the {noun} {quoted(value)} is neither {' nor '.join(choices)}", *place)
+    wrong = "of the wrong kind"
+    for one in types:
+        if isinstance(value, bool) or getattr(one, "ge", None) is None:
+            continue
+        if isinstance(one, inspect.IntType) and isinstance(value, int):
+            wrong = f"not a whole number from {one.ge} to {one.le}"
+        elif isinstance(one, inspect.FloatType) and isinstance(value, int | float):
+            wrong = f"not a number from {one.ge:g} to {one.le:g}"
+    return MisfitError(f"{repr(key) if is_key else key} is {quoted(value)}, {wrong}", *place)
 
-    def parts(self, key: str) -> list[DocumentReader]:
-        """The objects of a list."""
-        place = f"{self._place} {key}".strip()
-        return [
-            DocumentReader(value, self._name, f"{place} {number}")
-            for number, value in enumerate(self.take(key, list), start=1)
+
+def _either(kind: inspect.Type) -> list[Any]:
+    """The types of which one may stand in a place."""
+    return list(kind.types) if isinstance(kind, inspect.UnionType) else [kind]
+
+
+def _within(kind: inspect.Type, step: str | int) -> list[Any]:
+    """The types of what stands there under a key or in a place."""
+    if isinstance(kind, inspect.StructType):
+        found: list[inspect.Type] = [
+            field.type for field in kind.fields if field.encode_name == step
         ]
-
-    def part(self, key: str) -> DocumentReader:
-        """An object."""
-        return DocumentReader(self.take(key, dict), self._name, f"{self._place} {key}".strip())
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        """A list of texts."""
-        values = self.take(key, list)
-        if not all(isinstance(value, str) for value in values):
-            raise self.fail(f"{key!r} holds something that is no text")
-        return tuple(values)
-
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """A list of so many numbers."""
-        values = self.take(key, list)
-        if not all(map(is_number, values)) or len(values) != count:
-            raise self.fail(f"{key!r} must be {count} numbers")
-        return tuple(map(float, values))
-
-    def finish(self) -> None:
-        """Refuse what nobody asked for, by name."""
-        if self._value:
-            raise self.fail(f"{quoted(next(iter(self._value)))} is not known to this version")
-
-
-def is_number(value: object, largest: float = _LARGEST) -> bool:
-    """Whether a value from a file is a number, and not too large."""
-    # Compared before it is converted: an integer may be too large for a float.
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return -largest <= value <= largest
+        if kind.tag_field == step:
+            found.append(inspect.LiteralType((kind.tag,)))
+    elif isinstance(kind, inspect.TupleType):
+        found = [kind.item_types[int(step)]]
+    else:
+        found = [kind.item_type] if isinstance(kind, inspect.CollectionType) else []
+    return [one for inner in found for one in _either(inner)]

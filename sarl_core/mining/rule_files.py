@@ -5,19 +5,30 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
+from msgspec import Meta, Struct
+from msgspec.structs import asdict, astuple
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
-from sarl_core.documents import LARGEST_WHOLE, DocumentReader, is_number, parse_json
+from sarl_core.documents import (
+    LARGEST_WHOLE,
+    Count,
+    MisfitError,
+    NotNegative,
+    Number,
+    Share,
+    conformed,
+    parse_json,
+)
 from sarl_core.errors import InputError, quoted
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
-from sarl_core.mining.rules import Condition, Rule, Thresholds
+from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox, HeldOut
 
@@ -84,7 +95,12 @@ def read_rules(text: str | bytes, name: str) -> RuleFile:
             f"{name} has version {quoted(version)} of the rule format, and this program reads "
             f"versions {VERSIONS[0]} to {VERSIONS[-1]}; use a program of its version"
         )
-    return _rule_file(DocumentReader(document, name, ""))
+    kind: Any = _Document[_HeldOutPairs] if version == 1 else _Document[_HeldOut]
+    try:
+        found: RuleFile = conformed(document, kind).read()
+    except MisfitError as error:
+        raise InputError(f"{name}: {error}; mend it or mine the rules again") from error
+    return found
 
 
 def file_parts(rule_set: RuleSet) -> Iterator[str]:
@@ -213,185 +229,219 @@ def _rule(rule: Rule) -> dict[str, Any]:
     return entry
 
 
-def _rule_file(document: DocumentReader) -> RuleFile:
-    document.take("format", str)
-    version: int = document.take("version", int)
-    features = tuple(_read_feature(part) for part in document.parts("features"))
-    actions = tuple(_read_action(part) for part in document.parts("actions"))
-    if not features or not actions:
-        raise document.fail("there are no features or no actions")
-    thresholds = document.part("thresholds")
-    demonstrations = document.part("demonstrations")
-    steps = demonstrations.count("steps", low=1)
-    found = RuleFile(
-        rules=tuple(
-            _read_rule(part, len(features), actions, steps, version)
-            for part in document.parts("rules")
-        ),
-        actions=actions,
-        source=Source(
-            env_id=document.take("env_id", str),
-            features=features,
-            digest=demonstrations.take("digest", str),
-            steps=steps,
-            episodes=demonstrations.count("episodes", low=1),
-        ),
-        thresholds=Thresholds(
-            support=thresholds.number("support", low=0, high=1),
-            confidence=thresholds.number("confidence", low=0, high=1),
-            lift=thresholds.number("lift", 0.0, low=0),
-            max_depth=thresholds.limit("max_depth"),
-        ),
-        divider=document.count("divider", low=2, high=MAX_DIVIDER),
-        cut=_read_cut(document),
-    )
-    for part in (thresholds, demonstrations, document):
-        part.finish()
-    ids = [rule.id for rule in found.rules]
-    if len(set(ids)) < len(ids):
-        doubled = next(one for one, count in Counter(ids).items() if count > 1)
-        raise document.fail(f"the rule id {quoted(doubled)} stands twice")
-    return found
+# What a file may say. Nothing else: whatever stands there beside is refused by its name.
+_FromOne = Annotated[int, Meta(ge=1, le=LARGEST_WHOLE)]
+_Action = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 
 
-def _read_cut(document: DocumentReader) -> Literal["thresholds", "leaves"]:
-    cut: Literal["thresholds", "leaves"] = document.take("cut", str, "thresholds")
-    if cut not in ("thresholds", "leaves"):
-        raise document.fail(f"the cut {quoted(cut)} is neither 'thresholds' nor 'leaves'")
-    return cut
+class _Part(Struct, forbid_unknown_fields=True):
+    pass
 
 
-def _read_feature(part: DocumentReader) -> Feature:
-    name, unit = part.take("name", str), part.take("unit", str, "")
-    splits = _read_splits(part) if part.has("splits") else None
-    part.finish()
-    return Feature(name, unit, splits)
+class _Feature(_Part):
+    name: str
+    unit: str = ""
+    splits: list[Any] | None = None
+    binary: bool = False
+
+    def read(self) -> Feature:
+        if self.splits is None:
+            return Feature(self.name, self.unit)
+        if not all(isinstance(row, list) and len(row) == 3 for row in self.splits):
+            raise MisfitError("'splits' must be a threshold and the two values around it each")
+        try:
+            splits = conformed(self.splits, list[tuple[Number, float | None, float | None]])
+        except MisfitError as error:
+            raise MisfitError("'splits' holds something that is no number") from error
+        rows = [
+            (one, -math.inf if below is None else below, math.inf if above is None else above)
+            for one, below, above in splits
+        ]
+        thresholds, below, above = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+        apart = np.isfinite(thresholds) & (below <= thresholds) & (thresholds < above)
+        if not apart.all() or not (np.diff(thresholds) > 0).all():
+            raise MisfitError("'splits' are not in ascending order, each between its two values")
+        return Feature(self.name, self.unit, Splits(thresholds, below, above, self.binary))
 
 
-def _read_splits(part: DocumentReader) -> Splits:
-    rows = part.take("splits", list)
-    found = np.empty((len(rows), 3))
-    for place, row in enumerate(rows):
-        if not isinstance(row, list) or len(row) != 3:
-            raise part.fail("'splits' must be a threshold and the two values around it each")
-        ends = (-math.inf, math.inf)
-        sides = (end if one is None else one for one, end in zip(row[1:], ends, strict=True))
-        filled = [row[0], *sides]
-        if not all(is_number(one) or one in ends for one in filled):
-            raise part.fail("'splits' holds something that is no number")
-        found[place] = filled
-    thresholds, below, above = found.T
-    apart = np.isfinite(thresholds) & (below <= thresholds) & (thresholds < above)
-    if not apart.all() or not (np.diff(thresholds) > 0).all():
-        raise part.fail("'splits' are not in ascending order, each between its two values")
-    return Splits(thresholds, below, above, part.take("binary", bool, False))
+class _Discrete(_Part, tag_field="kind", tag="discrete"):
+    name: str
+    labels: tuple[str, ...]
+    first: Annotated[int, Meta(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)] = 0
+
+    def read(self) -> LabelledDimension:
+        if not self.labels:
+            raise MisfitError("'labels' is empty")
+        return LabelledDimension(self.name, self.labels, first=self.first)
 
 
-def _read_action(part: DocumentReader) -> LabelledDimension:
-    name, kind = part.take("name", str), part.take("kind", str)
-    if kind == "discrete":
-        action = LabelledDimension(
-            name, part.texts("labels"), first=part.count("first", 0, low=-LARGEST_WHOLE)
-        )
-        if not action.label_names:
-            raise part.fail("'labels' is empty")
-    elif kind == "interval":
-        edges = part.take("edges", list)
-        numeric = all(is_number(edge, LARGEST) for edge in edges)
-        single = numeric and len(edges) == 2 and edges[0] == edges[1]
-        if not single and (not numeric or len(edges) < 3 or sorted(set(edges)) != edges):
-            raise part.fail(
+class _Interval(_Part, tag_field="kind", tag="interval"):
+    name: str
+    edges: list[_Action]
+    bounds_from: str = "action space"
+
+    def read(self) -> LabelledDimension:
+        edges = self.edges
+        single = len(edges) == 2 and edges[0] == edges[1]
+        if not single and (len(edges) < 3 or sorted(set(edges)) != edges):
+            raise MisfitError(
                 "'edges' must be three or more numbers in ascending order, or one number twice"
             )
-        action = LabelledDimension.of_edges(
-            name, edges, bounds_from=part.take("bounds_from", str, "action space")
+        return LabelledDimension.of_edges(self.name, edges, bounds_from=self.bounds_from)
+
+
+class _Thresholds(_Part):
+    support: Share
+    confidence: Share
+    lift: NotNegative = 0.0
+    max_depth: Count | None = None
+
+
+class _Demonstrations(_Part):
+    digest: str
+    steps: _FromOne
+    episodes: _FromOne
+
+
+class _Condition(_Part, gc=False):
+    feature: int
+    op: Operator
+    threshold: Number
+
+
+class _Box(_Part):
+    least: tuple[Number, ...]
+    low: tuple[Number, ...]
+    high: tuple[Number, ...]
+    most: tuple[Number, ...]
+
+    def read(self, n_features: int) -> DataBox:
+        box = DataBox(*astuple(self))
+        for name, values in box._asdict().items():
+            if len(values) != n_features:
+                raise MisfitError(f"{name!r} must be {n_features} numbers", "box")
+        for least, low, high, most in zip(*box, strict=True):
+            if not least <= low <= high <= most:
+                raise MisfitError("the values are not in the order least, low, high, most", "box")
+        return box
+
+
+class _HeldOutPairs(_Part):
+    """Of version 1, which did not say in how many episodes they lie."""
+
+    samples: Count
+    correct: Count
+
+    def read(self) -> HeldOut:
+        return self._checked(HeldOut(self.samples, self.correct, 0, None, None, None))
+
+    def _checked(self, found: HeldOut) -> HeldOut:
+        for name in ("correct", "episodes"):
+            if (value := getattr(found, name)) > found.samples:
+                most = f"not a whole number from 0 to {found.samples}"
+                raise MisfitError(f"{name!r} is {value}, {most}", "held_out")
+        return found
+
+
+class _HeldOut(_HeldOutPairs):
+    episodes: Count
+    share: Share | None
+    low: Share | None
+    high: Share | None
+
+    def read(self) -> HeldOut:
+        if (self.share is None) != (self.episodes == 0):
+            raise MisfitError("'share' does not match its episodes", "held_out")
+        low, high = self.low, self.high
+        if (low is None) != (high is None) or (low is not None and high is not None and low > high):
+            raise MisfitError("'low' and 'high' are no interval", "held_out")
+        return self._checked(HeldOut(*astuple(self)))
+
+
+_Held = TypeVar("_Held", bound=_HeldOutPairs)
+_P = TypeVar("_P")
+_T = TypeVar("_T")
+
+
+class _Rule(_Part, Generic[_Held]):
+    id: str
+    dimension: int
+    conditions: list[_Condition]
+    action: int
+    support: Share
+    confidence: Share
+    lift: NotNegative
+    samples: Count
+    length: int | None = None
+    enabled: bool = True
+    origin: Literal["mined", "manual"] = "mined"
+    demonstrated_value: _Action | None = None
+    pinned: bool = False
+    box: _Box | None = None
+    held_out: _Held | None = None
+
+    def read(self, actions: Sequence[LabelledDimension], n_features: int, steps: int) -> Rule:
+        for number, condition in enumerate(self.conditions, start=1):
+            if not 0 <= condition.feature < n_features:
+                what = f"there is no feature {quoted(condition.feature)}"
+                raise MisfitError(what, f"conditions {number}")
+        if not 0 <= self.dimension < len(actions):
+            raise MisfitError(f"there is no action dimension {quoted(self.dimension)}")
+        n_labels = actions[self.dimension].n_labels
+        if not 0 <= self.action < n_labels:
+            raise MisfitError(f"the action {quoted(self.action)} is none of the {n_labels} labels")
+        if self.length not in (None, len(self.conditions)):
+            raise MisfitError(f"'length' does not match its {len(self.conditions)} conditions")
+        if self.samples > steps:
+            raise MisfitError(f"'samples' is {self.samples}, not a whole number from 0 to {steps}")
+        said = asdict(self)
+        del said["length"]
+        said["conditions"] = tuple(Condition(*astuple(one)) for one in self.conditions)
+        said["box"] = self.box and self.box.read(n_features)
+        said["held_out"] = self.held_out and self.held_out.read()
+        return Rule(**said)
+
+
+def _each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T, ...]:
+    """What is made of the parts of a list; an error says of which."""
+    found = []
+    for number, part in enumerate(parts, start=1):
+        try:
+            found.append(read(part))
+        except MisfitError as error:
+            raise MisfitError(error.what, f"{place} {number}", *error.place) from error
+    return tuple(found)
+
+
+class _Document(_Part, Generic[_Held]):
+    format: str
+    version: int
+    env_id: str
+    features: list[_Feature]
+    actions: list[_Discrete | _Interval]
+    thresholds: _Thresholds
+    divider: Annotated[int, Meta(ge=2, le=MAX_DIVIDER)]
+    demonstrations: _Demonstrations
+    rules: list[_Rule[_Held]]
+    cut: Literal["thresholds", "leaves"] = "thresholds"
+
+    def read(self) -> RuleFile:
+        features = _each(self.features, "features", _Feature.read)
+        actions = _each(self.actions, "actions", lambda action: action.read())
+        if not features or not actions:
+            raise MisfitError("there are no features or no actions")
+        mined = self.demonstrations
+        rules = _each(
+            self.rules, "rules", lambda rule: rule.read(actions, len(features), mined.steps)
         )
-    else:
-        raise part.fail(f"the kind {quoted(kind)} is neither 'discrete' nor 'interval'")
-    part.finish()
-    return action
-
-
-def _read_rule(
-    part: DocumentReader,
-    n_features: int,
-    actions: tuple[LabelledDimension, ...],
-    steps: int,
-    version: int,
-) -> Rule:
-    conditions = []
-    for entry in part.parts("conditions"):
-        feature, op = entry.take("feature", int), entry.take("op", str)
-        if not 0 <= feature < n_features:
-            raise entry.fail(f"there is no feature {quoted(feature)}")
-        if op not in ("<=", ">"):
-            raise entry.fail(f"the operator {quoted(op)} is neither '<=' nor '>'")
-        conditions.append(Condition(feature, op, entry.number("threshold")))
-        entry.finish()
-    dimension, action = part.take("dimension", int), part.take("action", int)
-    if not 0 <= dimension < len(actions):
-        raise part.fail(f"there is no action dimension {quoted(dimension)}")
-    if not 0 <= action < actions[dimension].n_labels:
-        raise part.fail(
-            f"the action {quoted(action)} is none of the {actions[dimension].n_labels} labels"
+        doubled = [one for one, count in Counter(rule.id for rule in rules).items() if count > 1]
+        if doubled:
+            raise MisfitError(f"the rule id {quoted(doubled[0])} stands twice")
+        return RuleFile(
+            rules,
+            actions,
+            Source(self.env_id, features, mined.digest, mined.steps, mined.episodes),
+            Thresholds(**asdict(self.thresholds)),
+            self.divider,
+            self.cut,
         )
-    origin = part.take("origin", str, "mined")
-    if origin not in ("mined", "manual"):
-        raise part.fail(f"the origin {quoted(origin)} is neither 'mined' nor 'manual'")
-    if part.take("length", int, len(conditions)) != len(conditions):
-        raise part.fail(f"'length' does not match its {len(conditions)} conditions")
-    value = (
-        part.number("demonstrated_value", low=-LARGEST, high=LARGEST)
-        if part.has("demonstrated_value")
-        else None
-    )
-    rule = Rule(
-        id=part.take("id", str),
-        dimension=dimension,
-        conditions=tuple(conditions),
-        action=action,
-        support=part.number("support", low=0, high=1),
-        confidence=part.number("confidence", low=0, high=1),
-        lift=part.number("lift", low=0),
-        samples=part.count("samples", high=steps),
-        enabled=part.take("enabled", bool, True),
-        origin=origin,
-        demonstrated_value=value,
-        pinned=part.take("pinned", bool, False),
-        box=_read_box(part.part("box"), n_features) if part.has("box") else None,
-        held_out=_read_held_out(part.part("held_out"), version) if part.has("held_out") else None,
-    )
-    part.finish()
-    return rule
-
-
-def _read_box(part: DocumentReader, n_features: int) -> DataBox:
-    box = DataBox(*(part.numbers(name, n_features) for name in DataBox._fields))
-    part.finish()
-    for least, low, high, most in zip(*box, strict=True):
-        if not least <= low <= high <= most:
-            raise part.fail("the values are not in the order least, low, high, most")
-    return box
-
-
-def _read_held_out(part: DocumentReader, version: int) -> HeldOut:
-    samples = part.count("samples")
-    correct = part.count("correct", high=samples)
-    if version == 1:  # in how many episodes, it did not say
-        part.finish()
-        return HeldOut(samples, correct, 0, None, None, None)
-    found = HeldOut(
-        samples,
-        correct,
-        part.count("episodes", high=samples),
-        part.share("share"),
-        part.share("low"),
-        part.share("high"),
-    )
-    part.finish()
-    if (found.share is None) != (found.episodes == 0):
-        raise part.fail("'share' does not match its episodes")
-    low, high = found.low, found.high
-    if (low is None) != (high is None) or (low is not None and high is not None and low > high):
-        raise part.fail("'low' and 'high' are no interval")
-    return found

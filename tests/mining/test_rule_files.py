@@ -250,6 +250,27 @@ BAD = {
     "no features": (lambda d: d.update(features=[]), "features"),
     "an impossible threshold": (lambda d: d["thresholds"].update(support=3.0), "'support' is 3"),
     "a rule that is a number": (lambda d: d["rules"].append(5), "not an object"),
+    "both ends of a range": (
+        lambda d: d["rules"][1].update(support=2),
+        "'support' is 2, not a number from 0 to 1 in rules 2;",
+    ),
+    "what there is to choose from": (
+        lambda d: d["rules"][0]["conditions"][1].update(op="=="),
+        "the operator '==' is neither '<=' nor '>' in rules 1 conditions 2;",
+    ),
+    "kinds of actions": (
+        lambda d: d["actions"][0].update(kind="fuzzy"),
+        "the kind 'fuzzy' is neither 'discrete' nor 'interval' in actions 1;",
+    ),
+    "a key that speaks of another place": (
+        lambda d: d.update({"x - at `$.rules[0].support": 1}),
+        "'x - at `$.rules[0].support' is not known to this version",
+    ),
+    "a key of half a pair": (lambda d: d.update({"\ud800": 1}), "is not known to this version"),
+    "a label that is a number": (
+        lambda d: d["actions"][0].update(labels=["a", 2]),
+        "labels 2 is 2, of the wrong kind in actions 1;",
+    ),
 }
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
+
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.documents import parse_json
+from sarl_core.documents import MisfitError, Number, conformed, parse_json
 from sarl_core.environments.feature_order import Order
 from sarl_core.errors import InputError, quoted
 
@@ -73,6 +75,27 @@ class Metadata:
         )
 
 
+class _Named(Struct):
+    name: str
+    unit: str | None = None
+
+
+class _Said(Struct):
+    """The form of `Metadata` in a file, which may say more."""
+
+    env_id: str = ""
+    agent: str = ""
+    seed: int | None = None
+    features: tuple[_Named, ...] = ()
+    action_names: tuple[str, ...] = ()
+    label_names: tuple[tuple[str, ...], ...] = ()
+    label_first: tuple[int, ...] = ()
+    action_low: tuple[Number, ...] = ()
+    action_high: tuple[Number, ...] = ()
+    bounds_from: Literal["action space", "demonstrated values"] | None = None
+    notes: tuple[str, ...] = ()
+
+
 def encode_metadata(demonstrations: Demonstrations) -> str:
     """The JSON that `decode_metadata` reads."""
     return json.dumps({"version": VERSION} | demonstrations.metadata(), ensure_ascii=False)
@@ -103,22 +126,16 @@ def decode_metadata(text: str | bytes) -> Metadata:
     version = raw.get("version", VERSION)
     if version != VERSION:
         raise _malformed(f"has version {quoted(version)}, and this program reads version {VERSION}")
-    metadata = Metadata(
-        env_id=_text(raw, "env_id"),
-        agent=_text(raw, "agent"),
-        seed=_seed(raw),
-        features=tuple(_feature(entry) for entry in _list(raw, "features")),
-        action_names=_strings(_list(raw, "action_names"), "action_names"),
-        label_names=tuple(_strings(entry, "label_names") for entry in _list(raw, "label_names")),
-        label_first=tuple(_label(entry) for entry in _list(raw, "label_first")),
-        action_low=tuple(_number(entry, "action_low") for entry in _list(raw, "action_low")),
-        action_high=tuple(_number(entry, "action_high") for entry in _list(raw, "action_high")),
-        bounds_from=_bounds_from(raw),
-        notes=_strings(_list(raw, "notes"), "notes"),
-    )
-    if len(metadata.action_low) != len(metadata.action_high):
+    try:
+        said = conformed({key: one for key, one in raw.items() if one is not None}, _Said)
+    except MisfitError as error:
+        raise _malformed(f"is not as it should be: {error}") from error
+    if any(abs(first) > 2**31 for first in said.label_first):
+        raise _malformed("has a number too large for a label under 'label_first'")
+    if len(said.action_low) != len(said.action_high):
         raise _malformed("has more bounds 'action_low' than 'action_high', or fewer")
-    return metadata
+    features = tuple(Feature(one.name, one.unit or "") for one in said.features)
+    return Metadata(**{**asdict(said), "features": features})
 
 
 def _malformed(what: str) -> InputError:
@@ -131,68 +148,3 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         doubled = next(key for key, count in Counter(keys).items() if count > 1)
         raise _malformed(f"gives {quoted(doubled)} twice")
     return dict(pairs)
-
-
-def _list(raw: dict[str, Any], key: str) -> list[Any]:
-    value = raw.get(key)
-    if value is None:
-        return []
-    if not isinstance(value, list):
-        raise _malformed(f"has no list under {key!r}")
-    return value
-
-
-def _text(raw: dict[str, Any], key: str) -> str:
-    value = raw.get(key)
-    if value is None:
-        return ""
-    if not isinstance(value, str):
-        raise _malformed(f"has no text under {key!r}")
-    return value
-
-
-def _strings(value: Any, key: str) -> tuple[str, ...]:
-    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-        raise _malformed(f"has something other than names under {key!r}")
-    return tuple(value)
-
-
-def _integer(value: Any, key: str) -> int:
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise _malformed(f"has something other than a whole number under {key!r}")
-    return value
-
-
-def _label(value: Any) -> int:
-    label = _integer(value, "label_first")
-    if abs(label) > 2**31:
-        raise _malformed("has a number too large for a label under 'label_first'")
-    return label
-
-
-def _number(value: Any, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise _malformed(f"has something other than a number under {key!r}")
-    if not math.isfinite(number := float(value) if abs(value) < 1e308 else math.inf):
-        raise _malformed(f"has an infinite number under {key!r}")
-    return number
-
-
-def _seed(raw: dict[str, Any]) -> int | None:
-    value = raw.get("seed")
-    return None if value is None else _integer(value, "seed")
-
-
-def _feature(entry: Any) -> Feature:
-    if not isinstance(entry, dict):
-        raise _malformed("has something other than objects under 'features'")
-    if not isinstance(entry.get("name"), str):
-        raise _malformed("has a feature without a 'name'")
-    return Feature(entry["name"], _text(entry, "unit"))
-
-
-def _bounds_from(raw: dict[str, Any]) -> Literal["action space", "demonstrated values"] | None:
-    value = raw.get("bounds_from")
-    if value not in (None, "action space", "demonstrated values"):
-        raise _malformed("has an unknown origin of bounds under 'bounds_from'")
-    return cast(Literal["action space", "demonstrated values"] | None, value)
