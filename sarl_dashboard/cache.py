@@ -17,14 +17,14 @@ from typing import Any, ParamSpec, TypeVar, cast
 import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
-from sarl_dashboard.byte_cache import Kept
+from sarl_dashboard.memory_cache import BoundedCache
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 _MOST_MEGABYTES = 512  # over all pages and visitors; SARL_CACHE_MB says otherwise
 
-RESULTS: Kept[object] = Kept(
+RESULTS: BoundedCache[object] = BoundedCache(
     None, int(float(os.environ.get("SARL_CACHE_MB") or _MOST_MEGABYTES) * 2**20)
 )
 _making: defaultdict[object, Lock] = defaultdict(Lock)

@@ -14,9 +14,9 @@ from sarl_core.rollouts.tasks import run_tasks
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import Ablation
 from sarl_core.studies.ablation_run import AblationRecord
-from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.memory_cache import BoundedCache
 
 MOST_RECORDS = 24
 
@@ -51,9 +51,9 @@ class Wanted:
 
 
 @st.cache_resource
-def records() -> Kept[AblationRecord]:
+def records() -> BoundedCache[AblationRecord]:
     """What has been run of each ablation so far, by its key."""
-    return Kept(MOST_RECORDS)
+    return BoundedCache(MOST_RECORDS)
 
 
 def ablating(wanted: Wanted) -> Job[AblationRecord]:
@@ -67,7 +67,10 @@ def ablating(wanted: Wanted) -> Job[AblationRecord]:
 
 
 def _ablate(
-    job: Job[AblationRecord], wanted: Wanted, kept: Kept[AblationRecord], executor: Processes
+    job: Job[AblationRecord],
+    wanted: Wanted,
+    kept: BoundedCache[AblationRecord],
+    executor: Processes,
 ) -> None:
     record = kept.get(wanted.key)
     if record is None:

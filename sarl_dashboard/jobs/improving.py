@@ -18,9 +18,9 @@ from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import Processes
-from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.memory_cache import BoundedCache
 
 KEPT = 6  # a finished run holds up to some ten megabytes of demonstrations
 _SOON = 0.03  # share of the work from which on the rest can be guessed
@@ -72,9 +72,9 @@ class Outcome:
 
 
 @st.cache_resource
-def kept_outcomes() -> Kept[Outcome]:
+def kept_outcomes() -> BoundedCache[Outcome]:
     """Outcomes of finished runs by their order's key."""
-    return Kept(KEPT)
+    return BoundedCache(KEPT)
 
 
 @st.cache_resource

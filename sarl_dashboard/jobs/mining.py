@@ -9,9 +9,9 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.progress import Progress
-from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.job import Job, Result
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.memory_cache import BoundedCache
 
 KEPT = 24
 
@@ -19,9 +19,9 @@ Work = Callable[[Executor, Progress], Result]
 
 
 @st.cache_resource
-def mining_results() -> Kept[Any]:
+def mining_results() -> BoundedCache[Any]:
     """What such work gave, for all visitors."""
-    return Kept(KEPT)
+    return BoundedCache(KEPT)
 
 
 def mining(key: object, work: Work[Result], keep: Callable[[Result], None]) -> Job[Result]:

@@ -31,7 +31,7 @@ from sarl_core.rendering.replay import render_episode, side_by_side
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Outside, Projection, Shield
-from sarl_dashboard.byte_cache import Kept
+from sarl_dashboard.memory_cache import BoundedCache
 from sarl_dashboard.text import in_full
 
 EPISODES = (20, 50, 100, 200)
@@ -101,21 +101,21 @@ class Replay:
 
 
 @st.cache_resource
-def kept_replays() -> Kept[Replay]:
+def kept_replays() -> BoundedCache[Replay]:
     """Replays by their request."""
-    return Kept(KEPT_REPLAYS)
+    return BoundedCache(KEPT_REPLAYS)
 
 
 @st.cache_resource
-def kept_comparisons() -> Kept[tuple[tuple[str, Episodes], ...]]:
+def kept_comparisons() -> BoundedCache[tuple[tuple[str, Episodes], ...]]:
     """Comparisons by their request and number of episodes."""
-    return Kept(KEPT_COMPARISONS)
+    return BoundedCache(KEPT_COMPARISONS)
 
 
 @st.cache_resource
-def kept_forks() -> Kept[Fork]:
+def kept_forks() -> BoundedCache[Fork]:
     """Forks by the request, the step, and what the shield does after it."""
-    return Kept(KEPT_FORKS)
+    return BoundedCache(KEPT_FORKS)
 
 
 @dataclass(frozen=True, eq=False)

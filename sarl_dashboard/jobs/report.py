@@ -14,9 +14,9 @@ from sarl_core.explaining.report.report import Report, Wishes, make_report
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
-from sarl_dashboard.byte_cache import Kept
 from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.memory_cache import BoundedCache
 from sarl_dashboard.text import digest_of
 
 KEPT = 8  # a report has about a megabyte
@@ -64,9 +64,9 @@ def order_key(
 
 
 @st.cache_resource
-def kept_reports() -> Kept[Report]:
+def kept_reports() -> BoundedCache[Report]:
     """Finished reports by their order's key."""
-    return Kept(KEPT)
+    return BoundedCache(KEPT)
 
 
 def reporting(order: Order) -> Job[Report]:
@@ -79,7 +79,7 @@ def reporting(order: Order) -> Job[Report]:
     return Job(order.key, lambda job: _make(job, order, kept), 100)
 
 
-def _make(job: Job[Report], order: Order, kept: Kept[Report]) -> None:
+def _make(job: Job[Report], order: Order, kept: BoundedCache[Report]) -> None:
     job.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
 
     def progress(done: int, total: int) -> bool:

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_dashboard.byte_cache import Kept, size_of
 from sarl_dashboard.cache import cached
+from sarl_dashboard.memory_cache import BoundedCache, size_of
 from tests.app.screens import open_page
 from tests.app.test_demonstrations_page import upload
 from tests.bad_inputs import ROWS, csv_bytes
@@ -52,7 +52,7 @@ def test_what_is_in_a_thing_twice_is_counted_once() -> None:
 
 
 def test_what_was_not_used_for_longest_goes_first() -> None:
-    kept = Kept(None, 3 * MEGABYTE)
+    kept = BoundedCache(None, 3 * MEGABYTE)
     for name in "abc":
         kept.put(name, megabytes(0.9))
     kept.get("a")

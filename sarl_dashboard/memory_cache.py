@@ -1,4 +1,4 @@
-"""Results that are kept for whoever asks again, bounded in number and in bytes."""
+"""A cache of results, bounded in number and in bytes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Entry(NamedTuple):
     owner: str
 
 
-class Kept(Generic[Value]):
+class BoundedCache(Generic[Value]):
     """The latest results, shared between sessions; what was not used for longest goes first.
 
     The latest of all stays, however large it is.
