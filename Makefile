@@ -12,7 +12,7 @@ FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
 	  $$name -c 'import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	    2>/dev/null && echo $$name && break; done
 
-.PHONY: app test lint format bench fuzz clean
+.PHONY: app test lint format docs bench fuzz clean
 .DELETE_ON_ERROR:
 
 app: $(VENV)/runtime.stamp  ## start the dashboard
@@ -31,6 +31,11 @@ lint: $(VENV)/development.stamp  ## style, types, and who may import whom
 format: $(VENV)/development.stamp  ## bring every file into shape
 	$(PYTHON) -m ruff check --fix-only .
 	$(PYTHON) -m ruff format .
+
+docs: $(VENV)/development.stamp $(BROWSER) $(COMPILER)  ## the guide, in out/docs; its links and its examples are tried
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
+	$(PYTHON) -m pytest tests/test_docs.py tests/test_examples.py
+	@echo "The guide is in out/docs/index.html."
 
 bench: $(VENV)/development.stamp $(BROWSER)  ## measure, and compare with what is to be reached
 	$(PYTHON) -m benchmarks

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from sarl_core import RuleSet
 from sarl_core.cli.app import app
 
-ROOT = Path(__file__).resolve().parents[1]
+from .examples import ROOT, run
+
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -34,23 +32,6 @@ def checkout(tmp_path):
             ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")
         )
     return tmp_path
-
-
-def run(command: list[str], folder: Path) -> str:
-    # `python` in the example is the interpreter that runs the tests.
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        command,
-        cwd=folder,
-        env={**os.environ, "PATH": path},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    return done.stdout
 
 
 def test_the_python_example(checkout):

@@ -1,21 +1,18 @@
-"""Makes the reports in this folder and what they compare: `python docs/reports.py`."""
+"""Makes the reports in docs/reports and what they compare: `python -m docs.scripts.reports`."""
 
 from __future__ import annotations
 
 import os
 import shlex
-import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+from sarl_core import RuleSet
+from sarl_core.cli.app import main
+from sarl_core.files import whole_file
+from sarl_core.rollouts.seeds import FRESH
+from sarl_core.studies.comparison import Arm, compare
 
-from sarl_core import RuleSet  # noqa: E402  # found by the line above
-from sarl_core.cli.app import main  # noqa: E402
-from sarl_core.files import whole_file  # noqa: E402
-from sarl_core.rollouts.seeds import FRESH  # noqa: E402
-from sarl_core.studies.comparison import Arm, compare  # noqa: E402
-
+ROOT = Path(__file__).resolve().parents[2]
 EPISODES = 100
 
 
@@ -33,8 +30,8 @@ def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
         for agent in ("novice", "expert")
         for name, rule_set in shields
     ]
-    found = compare(env_id, arms, episodes=EPISODES, seed=FRESH, jobs=os.cpu_count() or 1)
-    frame = found.to_frame()
+    results = compare(env_id, arms, episodes=EPISODES, seed=FRESH, jobs=os.cpu_count() or 1)
+    frame = results.to_frame()
     frame.insert(0, "projection", [arm.projection if arm.rules else "" for arm in arms])
     frame.insert(0, "seed", FRESH)
     frame.insert(0, "environment", env_id)
@@ -44,7 +41,7 @@ def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
 
 def report(task: str, rules: str, env_id: str, called: str) -> None:
     """One report and its comparison."""
-    csv, out = (f"docs/report_{task}.{suffix}" for suffix in ("csv", "html"))
+    csv, out = (f"docs/reports/{task}.{suffix}" for suffix in ("csv", "html"))
     comparison(env_id, Path(rules), called, Path(csv))
     data = f"data/demonstrations/{task}.parquet"
     sarl(f"report {rules} --demonstrations {data} --comparison {csv} --out {out}")

@@ -1,8 +1,8 @@
 """How much return a number of rules brings: the curve beside the shipped compact rule sets.
 
-Run from the top folder: ``python docs/budgets.py``. Every point is an aggregation of its own, and
-its return is that of the episodes it reports, which nothing was chosen by. Points that are there
-already are not run again; delete data/rules/budgets.json to begin anew.
+Run from the top folder: ``python -m docs.scripts.budgets``. Every point is an aggregation of its
+own, and its return is that of the episodes it reports, which nothing was chosen by. Points that
+are there already are not run again; delete data/rules/budgets.json to begin anew.
 """
 
 from __future__ import annotations
@@ -13,15 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(FOLDER))
+from sarl_core.demonstrations.formats import load_demonstrations
+from sarl_core.files import whole_file
+from sarl_core.improving.aggregation import aggregate
+from sarl_core.improving.aggregation_files import aggregation_card
+from sarl_core.improving.plan import Plan
 
-from sarl_core.demonstrations.formats import load_demonstrations  # noqa: E402
-from sarl_core.files import whole_file  # noqa: E402
-from sarl_core.improving.aggregation import aggregate  # noqa: E402
-from sarl_core.improving.aggregation_files import aggregation_card  # noqa: E402
-from sarl_core.improving.plan import Plan  # noqa: E402
-
+FOLDER = Path(__file__).resolve().parents[2]
 OUT = FOLDER / "data" / "rules" / "budgets.json"
 PLANS = {
     "cartpole": (Plan(2, rounds=8, episodes=20, validation=128), (2, 3, 4, 8, 16)),
@@ -37,15 +35,15 @@ def main(jobs: int) -> None:
     """Run what is missing, and write the file after every point."""
     known: dict[str, Any] = json.loads(OUT.read_text()) if OUT.is_file() else {"environments": {}}
     for name, (plan, budgets) in PLANS.items():
-        shown = load_demonstrations(FOLDER / "data" / "demonstrations" / f"{name}.parquet")
-        points = known["environments"].setdefault(shown.env_id, [])
+        demonstrations = load_demonstrations(FOLDER / "data" / "demonstrations" / f"{name}.parquet")
+        points = known["environments"].setdefault(demonstrations.env_id, [])
         for budget in budgets:
             if any(point["budget"] == budget for point in points):
                 continue
-            found = aggregate(shown, replace(plan, max_rules=budget), jobs=jobs)
-            if not found.is_finished:
+            aggregation = aggregate(demonstrations, replace(plan, max_rules=budget), jobs=jobs)
+            if not aggregation.is_finished:
                 sys.exit(f"stopped; the points before are in {OUT}")
-            card = aggregation_card(found, command="python docs/budgets.py")
+            card = aggregation_card(aggregation, command="python -m docs.scripts.budgets")
             points.append(
                 {
                     "budget": budget,
@@ -57,7 +55,7 @@ def main(jobs: int) -> None:
             points.sort(key=lambda point: int(point["budget"]))
             with whole_file(OUT) as unfinished:
                 unfinished.write_text(json.dumps(known, indent=1) + "\n")
-            print(name, points, flush=True)  # noqa: T201
+            print(name, points, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Makes the pictures of the README from the product itself: `python docs/pictures.py`.
+"""Makes the pictures of the guide from the product itself: `python -m docs.scripts.pictures`.
 
 The GIF comes from the command line; the screenshots from a dashboard started for them.
 """
@@ -16,8 +16,8 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
-DOCS = Path(__file__).parent
-ROOT = DOCS.parent
+ROOT = Path(__file__).resolve().parents[2]
+PICTURES = ROOT / "docs" / "pictures"
 WIDTH, HEIGHT = 1440, 900
 SETTLED = 3000  # milliseconds for the charts to come to rest
 
@@ -27,6 +27,8 @@ SCREENS = {
     "thresholds_dark.png": ("thresholds", "dark", "judged by rules mined without it"),
     "rules.png": ("rules", "light", "judged by rules mined without it"),
     "demonstrations.png": ("", "light", "Return of each episode"),
+    "evidence.png": ("evidence?holdout=0.4", "light", "judged by rules mined without it"),
+    "what_if.png": ("what_if?data=cartpole&confidence=0.9", "light", "The least change that"),
 }
 
 
@@ -55,7 +57,7 @@ def render(env_id: str, rules: str, out: Path, *options: str) -> None:
 
 def replay() -> None:
     """The GIF: a novice in Lunar Lander, side by side."""
-    render("LunarLander-v3", "lunar_lander", DOCS / "replay.gif", "--side-by-side")
+    render("LunarLander-v3", "lunar_lander", PICTURES / "replay.gif", "--side-by-side")
 
 
 def walker() -> None:
@@ -71,7 +73,7 @@ def walker() -> None:
     palette = pictures[50].quantize(128)
     first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
     first.save(
-        DOCS / "walker.gif", save_all=True, append_images=others, duration=60, loop=0, optimize=True
+        PICTURES / "walker.gif", save_all=True, append_images=others, duration=60, loop=0, optimize=True
     )
 
 
@@ -100,7 +102,7 @@ def screenshots() -> None:
                 page.goto(f"http://127.0.0.1:{port}/{path}")
                 page.get_by_text(words).first.wait_for(timeout=300_000)
                 page.wait_for_timeout(SETTLED)
-                page.screenshot(path=DOCS / name)
+                page.screenshot(path=PICTURES / name)
                 context.close()
             browser.close()
     finally:

@@ -1,0 +1,40 @@
+"""Writes the page of commands from the command line itself; mkdocs calls it for every page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from sarl_core.cli.app import app
+
+PLACE = "<!-- commands -->"
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Put the commands where a page asks for them."""
+    return markdown.replace(PLACE, commands_page()) if PLACE in markdown else markdown
+
+
+def commands_page() -> str:
+    """Each command with what it takes, as Markdown."""
+    group: Any = typer.main.get_command(app)
+    return "\n\n".join(_section(name, command) for name, command in group.commands.items())
+
+
+def _section(name: str, command: Any) -> str:
+    what = command.help.replace("python -m sarl_core", "sarl")
+    head = "| takes | | |\n| --- | --- | --- |"
+    return f"## {name}\n\n{what}\n\n{head}\n" + "\n".join(map(_row, command.params))
+
+
+def _row(parameter: Any) -> str:
+    names = ", ".join(parameter.opts)
+    if parameter.metavar:
+        names = f"{names} {parameter.metavar}" if names.startswith("-") else parameter.metavar
+    default = parameter.show_default if isinstance(parameter.show_default, str) else None
+    if default is None and parameter.show_default and isinstance(parameter.default, (int, float)):
+        default = None if isinstance(parameter.default, bool) else str(parameter.default)
+    notes = "needed" if parameter.required else f"default: {default}" if default else ""
+    cells = (f"`{names}`", parameter.help or "", notes)
+    return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"

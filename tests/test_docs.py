@@ -1,0 +1,105 @@
+"""The guide: its examples run as they stand there, page by page, and its pages are all there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import sarl_core
+
+from .examples import ROOT, run
+
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+FENCE = re.compile(r'^```(python|sh|c)(?: title="([\w.]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+
+
+class Block(NamedTuple):
+    """A block of code of a page.
+
+    Attributes:
+        language: python, sh or c.
+        file: The file that it is, "" where it is to be run.
+        code: What it says.
+    """
+
+    language: str
+    file: str
+    code: str
+
+
+def blocks(page: Path) -> list[Block]:
+    return [Block(*found) for found in FENCE.findall(page.read_text(encoding="utf-8"))]
+
+
+WITH_EXAMPLES = [page for page in PAGES if blocks(page)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder as that of a reader: shipped data beside, and the command on the path."""
+    shutil.copytree(ROOT / "data", tmp_path / "data")
+    command = tmp_path / "bin" / "sarl"
+    command.parent.mkdir()
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sarl_core "$@"\n')
+    command.chmod(command.stat().st_mode | stat.S_IXUSR)
+    return tmp_path
+
+
+@pytest.mark.parametrize("page", WITH_EXAMPLES, ids=lambda page: page.stem)
+def test_the_examples_of_a_page_run_in_their_order(page, folder):
+    for block in blocks(page):
+        if block.file:
+            (folder / block.file).write_text(block.code, encoding="utf-8")
+        elif block.language == "python":
+            run([sys.executable, "-c", block.code], folder, library=ROOT)
+        else:
+            assert block.language == "sh"
+            run(["bash", "-euc", block.code], folder, library=ROOT)
+
+
+def test_every_guide_and_how_to_that_names_commands_has_examples_that_run():
+    told = [
+        page
+        for page in PAGES
+        if page.parent.name == "how_to" or page.name in ("headless.md", "explaining.md")
+    ]
+    assert len(told) == 7
+    assert set(told) <= set(WITH_EXAMPLES)
+
+
+def test_every_public_name_stands_in_the_reference():
+    reference = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^::: sarl_core\.(?:\w+\.)*(\w+)$", reference, flags=re.MULTILINE))
+    assert named == set(sarl_core.__all__)
+
+
+def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    commands = (tmp_path / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert "--lower-bound" in commands
+    assert 'id="train-expert"' in commands
+    reference = (tmp_path / "reference" / "python.html").read_text(encoding="utf-8")
+    assert "supp_min" in reference
+
+
+def test_pictures_that_are_shipped_are_shown():
+    told = "\n".join(page.read_text(encoding="utf-8") for page in [*PAGES, ROOT / "README.md"])
+    for picture in (DOCS / "pictures").iterdir():
+        assert picture.name in told, picture.name
