@@ -73,7 +73,12 @@ def walker() -> None:
     palette = pictures[50].quantize(128)
     first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
     first.save(
-        PICTURES / "walker.gif", save_all=True, append_images=others, duration=60, loop=0, optimize=True
+        PICTURES / "walker.gif",
+        save_all=True,
+        append_images=others,
+        duration=60,
+        loop=0,
+        optimize=True,
     )
 
 
