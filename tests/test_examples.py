@@ -11,7 +11,7 @@ from .examples import ROOT, run
 
 PRINTED = {
     "mine_and_shield": r"shielded\s+mean return +([\d.]+)",
-    "choose_thresholds": r"are right in (\d+) %",
+    "choose_thresholds": r"are right in (\d+)%",
     "scikit_learn": r"right on ([\d.]+) ?%",
     "train_under_shield": r"mean return (\d+)",
 }
