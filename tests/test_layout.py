@@ -13,7 +13,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("sarl_core", "sarl_dashboard")
-FOLDERS = (*PACKAGES, "pages", "tests", "benchmarks")
+PRODUCT = (*PACKAGES, "pages")
+FOLDERS = (*PRODUCT, "tests", "benchmarks", "docs", "examples")
 OURS = {*FOLDERS, "app"}
 # Used by name and not by import.
 TOOLS = {
@@ -81,9 +82,7 @@ def test_every_pin_is_what_the_tests_ran_with():
 
 def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
     files = [
-        path
-        for path in python_files()
-        if path.relative_to(ROOT).parts[0] not in ("tests", "benchmarks")
+        path for path in python_files() if path.relative_to(ROOT).parts[0] in (*PRODUCT, "app.py")
     ]
     assert packages_of(imported(files)) - OPTIONAL | {"kaleido", "imageio-ffmpeg"} == set(
         pins("requirements.txt")

@@ -139,12 +139,12 @@ _CATALOGUE: dict[str, EnvironmentNames] = {
 }
 
 
-def make_environment(env_id: str, **parameters: Any) -> Any:
+def make_environment(env_id: str, *, render_mode: str | None = None) -> Any:
     """Make an environment as ``gymnasium.make`` does, with an error of one sentence.
 
     Args:
         env_id: What ``gymnasium.make`` takes, ``module:Id`` included.
-        **parameters: Handed on, as ``render_mode``.
+        render_mode: As the environment calls it; None for no pictures.
 
     Returns:
         A ``gymnasium.Env``.
@@ -154,6 +154,8 @@ def make_environment(env_id: str, **parameters: Any) -> Any:
     """
     import gymnasium
 
+    # An environment that draws nothing need not take the parameter.
+    parameters = {} if render_mode is None else {"render_mode": render_mode}
     try:
         with warnings.catch_warnings():
             # Of versions out of date, say; if it cannot be made, the error says so in one line.

@@ -33,7 +33,7 @@ ALPHABET = frozenset(_SIGNS) | {
     for code in range(first, last + 1)
     if unicodedata.name(chr(code), "") and chr(code) not in "\xadⁱ"
 }
-"""The characters that the font has; `docs/font.py` makes it of them."""
+"""The characters that the font has; `docs/scripts/font.py` makes it of them."""
 
 PAPER: Colour = (246, 247, 249)
 _WHITE: Colour = (255, 255, 255)

@@ -10,6 +10,7 @@ from gymnasium import spaces
 
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.errors import InputError
+from sarl_core.rollouts.episodes import rollout
 
 VECTOR = spaces.Box(-1, 1, (3,), np.float32)
 
@@ -22,6 +23,23 @@ class Thing(gymnasium.Env[Any, Any]):
             raise RuntimeError("no licence\nsecond line")
         self.observation_space = observation_space
         self.action_space = action_space or spaces.Discrete(2)
+
+
+class Plain(gymnasium.Env[Any, Any]):
+    """What nobody told that there are pictures."""
+
+    observation_space = VECTOR
+    action_space = spaces.Discrete(2)
+
+    def __init__(self) -> None:
+        pass
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        super().reset(seed=seed)
+        return np.zeros(3, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        return np.zeros(3, np.float32), 0.0, False, False, {}
 
 
 Register = Callable[..., str]
@@ -143,6 +161,14 @@ def test_environment_that_does_not_exist(env_id: str) -> None:
         make_environment(env_id)
     assert "\n" not in str(error.value)
     assert repr(env_id) in str(error.value)
+
+
+def test_an_environment_that_draws_nothing_need_not_take_a_render_mode() -> None:
+    gymnasium.register("test/Plain-v0", entry_point=Plain, max_episode_steps=5)
+    try:
+        assert rollout("test/Plain-v0", "novice", episodes=2, seed=0).lengths.tolist() == [5, 5]
+    finally:
+        gymnasium.registry.pop("test/Plain-v0")
 
 
 @pytest.mark.parametrize(

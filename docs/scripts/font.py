@@ -1,4 +1,4 @@
-"""Makes the font that pictures are lettered with: `python docs/font.py [FOLDER]`.
+"""Makes the font that pictures are lettered with: `python -m docs.scripts.font [FOLDER]`.
 
 FOLDER holds DejaVu Sans Condensed, as Debian's fonts-dejavu-extra brings it. What the product can
 write stands in `sarl_core.rendering.canvas.ALPHABET`; the font has these characters and no others.
@@ -21,7 +21,7 @@ CARD = {
     "what": "DejaVu Sans Condensed, regular and bold, with the characters that pictures may hold",
     "from": "DejaVu fonts 2.37 (https://dejavu-fonts.github.io), as in Debian's fonts-dejavu-extra",
     "licence": "LICENCE.txt",
-    "command": "python docs/font.py",
+    "command": "python -m docs.scripts.font",
 }
 
 
