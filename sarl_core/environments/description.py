@@ -155,7 +155,7 @@ def make_environment(env_id: str, *, render_mode: str | None = None) -> Any:
     import gymnasium
 
     # An environment that draws nothing need not take the parameter.
-    parameters = {} if render_mode is None else {"render_mode": render_mode}
+    parameters: dict[str, Any] = {} if render_mode is None else {"render_mode": render_mode}
     try:
         with warnings.catch_warnings():
             # Of versions out of date, say; if it cannot be made, the error says so in one line.
