@@ -19,6 +19,7 @@ _AROUND = {
     digits: tuple(Context(prec=digits, rounding=way) for way in (ROUND_FLOOR, ROUND_CEILING))
     for digits in range(1, MOST_DIGITS + 1)
 }
+_FEWEST = 4
 
 
 @lru_cache(maxsize=65536)
@@ -44,19 +45,18 @@ def short_decimal(exact: float, least: float, most: float, *, fewest: int = 1) -
     return None
 
 
-def decimal_within(value: float, error: float, *, fewest: int = 3) -> float:
+def decimal_within(value: float, error: float) -> float:
     """A decimal number near a value.
 
     Args:
         value: Any finite number.
         error: How far it may be away; 0 for not at all.
-        fewest: Number of significant digits to begin with.
 
     Returns:
         Of the numbers with as few digits, the nearest.
     """
     most = float(np.nextafter(value + error, math.inf))
-    found = short_decimal(value, value - error, most, fewest=fewest)
+    found = short_decimal(value, value - error, most, fewest=3)
     return value if found is None else found
 
 
@@ -87,20 +87,19 @@ def decimal_on_scale(value: float, low: float, high: float) -> float:
     return decimal_within(value, _UNSEEN * width if width > 0 else _UNSEEN * abs(value))
 
 
-def digits_telling(step: float, largest: float, *, fewest: int = 4) -> int:
+def digits_telling(step: float, largest: float) -> int:
     """How many significant digits numbers need for a step between them to be seen.
 
     Args:
         step: Above 0.
         largest: Of the numbers, by size.
-        fewest: No fewer than these.
 
     Returns:
         At most `MOST_DIGITS`.
     """
     if not 0.0 < step < largest < math.inf:
-        return fewest
-    return min(max(math.floor(math.log10(largest)) - math.floor(math.log10(step)) + 1, fewest), 17)
+        return _FEWEST
+    return min(max(math.floor(math.log10(largest)) - math.floor(math.log10(step)) + 1, _FEWEST), 17)
 
 
 def digits_across(values: NDArray[Any]) -> int:

@@ -21,6 +21,7 @@ from sarl_core.cli.options import (
     ProjectionName,
     Seed,
     Stochastic,
+    out_option,
 )
 from sarl_core.files import whole_file
 
@@ -65,10 +66,7 @@ def ablate(
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="FILE.csv", show_default=False, help="Write the table to this file."
-        ),
+        Path | None, out_option("Write the table to this file.", metavar="FILE.csv")
     ] = None,
     as_json: Json = False,
 ) -> None:

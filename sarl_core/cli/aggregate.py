@@ -19,6 +19,7 @@ from sarl_core.cli.options import (
     Normalise,
     ProjectionName,
     Seed,
+    out_option,
 )
 from sarl_core.errors import InputError
 
@@ -38,12 +39,9 @@ def aggregate(
     file: File,
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            show_default=False,
-            help="The rule file (.json) to write, its card beside it; with --expert none, the "
-            "states that need a demonstration (.csv).",
+        out_option(
+            "The rule file (.json) to write, its card beside it; with --expert none, the "
+            "states that need a demonstration (.csv)."
         ),
     ],
     max_rules: Annotated[

@@ -21,6 +21,7 @@ from sarl_core.cli.options import (
     Rules,
     Seed,
     Stochastic,
+    out_option,
 )
 from sarl_core.errors import InputError
 
@@ -78,15 +79,7 @@ def evaluate(
 def render(
     env: Env,
     agent: AgentName,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            show_default=False,
-            help="A .gif or .mp4 file.",
-        ),
-    ],
+    out: Annotated[Path, out_option("A .gif or .mp4 file.")],
     normalise: Normalise = None,
     rules: Rules = None,
     seed: Seed = 0,
@@ -140,12 +133,7 @@ def train_expert(
     env: Env,
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
-            metavar="FILE.npz",
-            show_default=False,
-            help="The policy to write; its card stands beside it as .json.",
-        ),
+        out_option("The policy to write; its card stands beside it as .json.", metavar="FILE.npz"),
     ],
     seed: Seed = 0,
     steps: Annotated[

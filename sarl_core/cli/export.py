@@ -9,7 +9,7 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import EnvOfFile, Json, OnInvalidName, ProjectionName
+from sarl_core.cli.options import EnvOfFile, Json, OnInvalidName, ProjectionName, out_option
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,12 +26,9 @@ def export(
     ],
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            show_default=False,
-            help="A .json (rule file), .csv, .md, .py, .c or .onnx file; test vectors are written "
-            "beside it.",
+        out_option(
+            "A .json (rule file), .csv, .md, .py, .c or .onnx file; test vectors are written "
+            "beside it."
         ),
     ],
     merged: Annotated[

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.options import Env, Json, MaxSteps, ProjectionName, Rules, Seed
+from sarl_core.cli.options import Env, Json, MaxSteps, ProjectionName, Rules, Seed, out_option
 
 if TYPE_CHECKING:
     from sarl_core.learning.study_files import LearningStudy
@@ -27,12 +27,10 @@ def learn(
     ],
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            show_default=False,
-            help="The folder for curves, results and policies; made if it is not there. A study "
+        out_option(
+            "The folder for curves, results and policies; made if it is not there. A study "
             "that was stopped in it goes on.",
+            metavar="DIR",
         ),
     ],
     rules: Rules = None,

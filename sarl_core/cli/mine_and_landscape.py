@@ -14,21 +14,14 @@ from sarl_core.cli.options import (
     EnvOfFile,
     File,
     Json,
+    out_option,
 )
 from sarl_core.errors import InputError
 
 
 def mine(
     file: File,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="RULES.json",
-            show_default=False,
-            help="The rule file to write.",
-        ),
-    ],
+    out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
     support: Annotated[
         float | None,
         typer.Option(
@@ -175,15 +168,7 @@ def mine(
 
 def landscape(
     file: File,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            show_default=False,
-            help="A .json, .csv, .html or .png file.",
-        ),
-    ],
+    out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],
     env: EnvOfFile = None,
     divider: Divider = 2,
     supports: Annotated[

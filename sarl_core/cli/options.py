@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -106,3 +106,16 @@ Divider = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
+
+
+def out_option(text: str, *, metavar: str = "FILE") -> Any:
+    """The option that says where a command writes.
+
+    Args:
+        text: What it writes, for its help.
+        metavar: What stands for the place.
+
+    Returns:
+        For `Annotated`.
+    """
+    return typer.Option("--out", metavar=metavar, show_default=False, help=text)

@@ -18,6 +18,7 @@ from sarl_core.cli.options import (
     Normalise,
     Seed,
     Stochastic,
+    out_option,
 )
 
 if TYPE_CHECKING:
@@ -27,15 +28,7 @@ if TYPE_CHECKING:
 def record(
     env: Env,
     agent: AgentName,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            show_default=False,
-            help="A .parquet, .csv or .npz file.",
-        ),
-    ],
+    out: Annotated[Path, out_option("A .parquet, .csv or .npz file.")],
     normalise: Normalise = None,
     steps: Annotated[int, typer.Option("--steps", min=1, help="How many to record.")] = 15_000,
     seed: Seed = 0,

@@ -10,7 +10,7 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
-from sarl_core.cli.options import Json, MaxSteps, Normalise
+from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option
 
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
@@ -32,10 +32,7 @@ def report(
             help="The demonstrations they are about.",
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="FILE.html", show_default=False, help="The file to write."),
-    ],
+    out: Annotated[Path, out_option("The file to write.", metavar="FILE.html")],
     comparison: Annotated[
         list[Path] | None,
         typer.Option(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.options import Json
+from sarl_core.cli.options import Json, out_option
 
 if TYPE_CHECKING:
     from sarl_core.paper.report import Entry, Report
@@ -21,11 +21,9 @@ if TYPE_CHECKING:
 def reproduce(
     out: Annotated[
         Path,
-        typer.Option(
-            "--out",
+        out_option(
+            "The folder for the figures, tables and report.json; made if it is not there.",
             metavar="DIR",
-            show_default=False,
-            help="The folder for the figures, tables and report.json; made if it is not there.",
         ),
     ],
     figure: Annotated[

@@ -17,6 +17,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.written import limit_texts
 
 _TAIL = 0.002  # of the states at either end, kept from flattening the rest of a histogram
+_BINS = 44
 
 
 class PathStep(NamedTuple):
@@ -101,7 +102,7 @@ def path_steps(tree: PolicyTree, node: int) -> tuple[PathStep, ...]:
 
 
 def feature_evidence(
-    demonstrations: Demonstrations, tree: PolicyTree, rule: Rule, *, bins: int = 44
+    demonstrations: Demonstrations, tree: PolicyTree, rule: Rule
 ) -> tuple[FeatureEvidence, ...]:
     """How the states of a rule differ from all states, in each feature it asks about.
 
@@ -109,7 +110,6 @@ def feature_evidence(
         demonstrations: What the tree was grown from.
         tree: Of the rule's action dimension.
         rule: A mined one.
-        bins: Of the histograms.
 
     Returns:
         One entry a feature, in the order of the rule's conditions.
@@ -118,7 +118,7 @@ def feature_evidence(
     found = []
     for bounds in rule.bounds:
         values = demonstrations.observations[:, bounds.feature]
-        edges = _edges(values, values[rows], bounds, bins)
+        edges = _edges(values, values[rows], bounds, _BINS)
         found.append(
             FeatureEvidence(
                 bounds.feature,

@@ -10,7 +10,7 @@ import copy
 import platform
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,6 +54,22 @@ class Recipe:
 
 
 # Values after the algorithms' own papers and defaults, moved by hand until the returns were there.
+_LANDER = Recipe(
+    algorithm="PPO",
+    steps=2_000_000,
+    n_envs=16,
+    normalise=False,
+    validation_every=100_000,
+    gamma=0.999,
+    parameters={
+        "n_steps": 1024,
+        "batch_size": 256,
+        "n_epochs": 6,
+        "gae_lambda": 0.98,
+        "learning_rate": "linear:0.0006",
+        "clip_range": 0.2,
+    },
+)
 RECIPES: dict[str, Recipe] = {
     "CartPole-v1": Recipe(
         algorithm="PPO",
@@ -71,38 +87,8 @@ RECIPES: dict[str, Recipe] = {
             "clip_range": 0.2,
         },
     ),
-    "LunarLander-v3": Recipe(
-        algorithm="PPO",
-        steps=2_000_000,
-        n_envs=16,
-        normalise=False,
-        validation_every=100_000,
-        gamma=0.999,
-        parameters={
-            "n_steps": 1024,
-            "batch_size": 256,
-            "n_epochs": 6,
-            "gae_lambda": 0.98,
-            "learning_rate": "linear:0.0006",
-            "clip_range": 0.2,
-        },
-    ),
-    "LunarLanderContinuous-v3": Recipe(
-        algorithm="PPO",
-        steps=1_500_000,
-        n_envs=16,
-        normalise=False,
-        validation_every=100_000,
-        gamma=0.999,
-        parameters={
-            "n_steps": 1024,
-            "batch_size": 256,
-            "n_epochs": 6,
-            "gae_lambda": 0.98,
-            "learning_rate": "linear:0.0006",
-            "clip_range": 0.2,
-        },
-    ),
+    "LunarLander-v3": _LANDER,
+    "LunarLanderContinuous-v3": replace(_LANDER, steps=1_500_000),
     "BipedalWalker-v3": Recipe(
         algorithm="PPO",
         steps=3_000_000,

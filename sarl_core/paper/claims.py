@@ -8,7 +8,7 @@ from functools import partial
 from typing import Generic, TypeVar
 
 from sarl_core.mining.language import share_text
-from sarl_core.paper.criteria import Bounds, Criterion, InMost, Measurement, Together
+from sarl_core.paper.criteria import MeanBounds, Criterion, InMost, Measurement, Together
 from sarl_core.paper.metrics import dividing, landscapes, learning, named_settings, shields
 from sarl_core.paper.replicates import PAPER_DIVIDER
 from sarl_core.paper.shields import FILTERED, UNFILTERED, Runs
@@ -79,9 +79,11 @@ _IN_MOST = Together(
     "expert at least once, everywhere; does not agree if nowhere in more than 1 of 6; else partly.",
 )
 _EVERYWHERE = "{each} So in every environment; partly, if in some."
-_POSITIVE = Bounds("above", 0, 0)
-_MANY = Bounds("above", 0.1, 0.05)  # shares of episodes that are some, and that are too few to be
-_NEARLY_ALL = Bounds("above", shields.NEARLY_ALL, 0.8)
+_POSITIVE = MeanBounds("above", 0, 0)
+_MANY = MeanBounds(
+    "above", 0.1, 0.05
+)  # shares of episodes that are some, and that are too few to be
+_NEARLY_ALL = MeanBounds("above", shields.NEARLY_ALL, 0.8)
 _CUT_EARLIER = (
     "where less is asked, a path is cut earlier, and paths that part below the cut share a rule"
 )
@@ -163,7 +165,7 @@ FIGURE_3: Rows[landscapes.Environments] = (
         where="text on Figure 3",
         measured="The rank correlation over the cells.",
         metric=landscapes.number_and_length,
-        criterion=Together(Bounds("above", 0.8, 0.5, landscapes.signed), _EVERYWHERE),
+        criterion=Together(MeanBounds("above", 0.8, 0.5, landscapes.signed), _EVERYWHERE),
     ),
 )
 
@@ -174,7 +176,7 @@ TABLE_1: Rows[named_settings.Environments] = (
         where="Lessons Learned, Table 1",
         measured="The share of the unfiltered rules that remains.",
         metric=named_settings.compact,
-        criterion=Together(Bounds("below", 0.1, 0.5), _EVERYWHERE),
+        criterion=Together(MeanBounds("below", 0.1, 0.5), _EVERYWHERE),
         constructed="a rule with support 0.005 applies to 75 of 15,000 steps, so there can be no "
         "more than 200 a dimension, whatever was demonstrated",
     ),
@@ -184,7 +186,7 @@ TABLE_1: Rows[named_settings.Environments] = (
         where="text on Figure 4",
         measured="The share of the demonstrated states with a rule.",
         metric=named_settings.covered,
-        criterion=Together(Bounds("above", 0.995, 0.95, share_text), _EVERYWHERE),
+        criterion=Together(MeanBounds("above", 0.995, 0.95, share_text), _EVERYWHERE),
         constructed=_ONE_ACTION,
     ),
 )
@@ -210,7 +212,7 @@ FIGURE_4: Rows[learning.Learners] = (
         where="Figure 4",
         measured="The mean of the last tenth of the tests, as its distance from 0.95.",
         metric=learning.converges,
-        criterion=Bounds("within", 0.02, 0.05),
+        criterion=MeanBounds("within", 0.02, 0.05),
     ),
     ClaimRow(
         id="unfiltered-do-not-converge",
@@ -218,7 +220,7 @@ FIGURE_4: Rows[learning.Learners] = (
         where="Figure 4",
         measured="How far the mean of the last tenth of the tests lies below 0.95.",
         metric=learning.does_not_converge,
-        criterion=Bounds("above", 0.05, 0.02),
+        criterion=MeanBounds("above", 0.05, 0.02),
     ),
     ClaimRow(
         id="every-state-met",
@@ -226,7 +228,7 @@ FIGURE_4: Rows[learning.Learners] = (
         where="text on Figure 4",
         measured="The least share over the tests of each learner.",
         metric=learning.every_state,
-        criterion=Bounds("above", 0.999, 0.99, share_text),
+        criterion=MeanBounds("above", 0.999, 0.99, share_text),
         constructed=_ONE_ACTION,
     ),
     ClaimRow(
@@ -237,7 +239,7 @@ FIGURE_4: Rows[learning.Learners] = (
         measured="How much more often the unfiltered rule that applied was broken over the last "
         "tenth of the tests; agrees only if filtered rules are broken too.",
         metric=learning.smaller_effect,
-        criterion=Bounds("above", 0.05, 0),
+        criterion=MeanBounds("above", 0.05, 0),
     ),
 )
 
@@ -300,7 +302,7 @@ FIGURE_5: Rows[Runs] = (
         where="text on Figure 5",
         measured=f"How far the two are apart, {_WAY}.",
         metric=shields.filtered_and_unfiltered,
-        criterion=Bounds("within", _SIMILAR, _OTHER),
+        criterion=MeanBounds("within", _SIMILAR, _OTHER),
     ),
 )
 
@@ -328,7 +330,7 @@ FIGURE_6: Rows[Runs] = (
         measured=f"How far the two are apart, {_WAY}; not judged unless unfiltered rules are shown "
         "to bring anything at all.",
         metric=shields.following,
-        criterion=Bounds("within", 0.2, _OTHER),
+        criterion=MeanBounds("within", 0.2, _OTHER),
     ),
     ClaimRow(
         id="filtered-reach-the-expert",
@@ -353,7 +355,7 @@ FIGURE_6: Rows[Runs] = (
         where="text on Figure 6",
         measured=f"How much more the unfiltered rules bring than the filtered ones, {_WAY}.",
         metric=shields.more_rules,
-        criterion=Bounds("above", 0, -shields.AS_GOOD),
+        criterion=MeanBounds("above", 0, -shields.AS_GOOD),
     ),
     ClaimRow(
         id="by-the-shield-alone",
@@ -362,7 +364,7 @@ FIGURE_6: Rows[Runs] = (
         measured=f"The typical return with unfiltered rules, {_WAY}; agrees only if it is also "
         f"shown that no more than {percent(shields.MORE_FAILURES)} more of the episodes fail.",
         metric=shields.by_the_shield_alone,
-        criterion=Bounds("above", 1 - shields.AS_GOOD, 0.8),
+        criterion=MeanBounds("above", 1 - shields.AS_GOOD, 0.8),
     ),
 )
 
@@ -381,7 +383,7 @@ FIGURE_7: Rows[Runs] = (
         where="Figure 7",
         measured=f"How far it is behind the expert, {_WAY}.",
         metric=shields.behind_the_expert,
-        criterion=Bounds("above", 0.2, 0),
+        criterion=MeanBounds("above", 0.2, 0),
     ),
     *(
         ClaimRow(
@@ -390,7 +392,7 @@ FIGURE_7: Rows[Runs] = (
             where="Figure 7",
             measured=f"What the rules bring, {_WAY}.",
             metric=partial(shields.what_rules_bring, arm=arm),
-            criterion=Bounds("below", _SIMILAR, _OTHER),
+            criterion=MeanBounds("below", _SIMILAR, _OTHER),
         )
         for arm in (UNFILTERED, FILTERED)
     ),
@@ -401,7 +403,7 @@ FIGURE_7: Rows[Runs] = (
         measured="The share of the episodes with rules that get half of the way from the lone "
         "novice's typical return to the expert's.",
         metric=shields.half_of_the_way,
-        criterion=Bounds("below", _MANY.partly, _MANY.agrees),
+        criterion=MeanBounds("below", _MANY.partly, _MANY.agrees),
     ),
     ClaimRow(
         id="finer-division-with-rules",
@@ -422,7 +424,7 @@ DIVIDER: Rows[dividing.Environments] = (
         "intervals.",
         metric=dividing.finer,
         criterion=Together(
-            Bounds("above", 0, 0, number),
+            MeanBounds("above", 0, 0, number),
             "{each} So in every environment with continuous actions; partly, if in some.",
         ),
     ),
@@ -434,6 +436,6 @@ DIVIDER: Rows[dividing.Environments] = (
         measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
         "its typical return with the better of the two, the centre and its own typical value.",
         metric=dividing.kept_by_two_intervals,
-        criterion=Bounds("above", 0.5, 0.25),
+        criterion=MeanBounds("above", 0.5, 0.25),
     ),
 )

@@ -122,7 +122,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Bounds:
+class MeanBounds:
     """The interval of the mean over recordings lies on the right side of bounds.
 
     Attributes:
@@ -238,7 +238,7 @@ class Together:
         in_part_of: How many have to agree before it agrees in part.
     """
 
-    each: Bounds | InMost
+    each: MeanBounds | InMost
     words: str
     in_part_of: int = 0
 
@@ -273,4 +273,4 @@ class Together:
         return Finding(verdict, held, experts, too_few=any(one.too_few for one in findings))
 
 
-Criterion = Bounds | InMost | Together
+Criterion = MeanBounds | InMost | Together

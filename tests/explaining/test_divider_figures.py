@@ -8,7 +8,6 @@ from sarl_core.explaining.figures.divider import (
     error_figure,
     occupancy_figure,
     snapped_figure,
-    study_figure,
 )
 from sarl_core.mining.quantisation import Quantisation, quantise
 from sarl_core.rollouts.recording import record
@@ -71,7 +70,8 @@ def test_errors_fall_with_the_divider(two: tuple[tuple[Quantisation, ...], ...])
 
 
 def test_every_cell_holds_the_typical_return_and_its_interval(study: DividerStudy) -> None:
-    cells, _ = study_figure(study).data
+    episodes_of = {(each.divider, each.snapping): each.episodes for each in study.snapped}
+    cells, _ = snapped_figure(study.dividers, episodes_of).data
     assert list(cells.y) == ["centre", "clip", "expert"]
     assert list(cells.x) == ["2 intervals", "5 intervals"]
     for row, snapping in enumerate(("centre", "clip", "expert")):

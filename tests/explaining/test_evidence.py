@@ -28,7 +28,6 @@ from sarl_core.explaining.words.evidence import (
     range_text,
     remedy_text,
     shortfall_text,
-    stability_text,
     told_by_episodes,
     verdict_counts,
 )
@@ -146,7 +145,6 @@ def test_a_band_and_a_return_are_said():
     assert band_text(Band(0, "<=", 2.0, float("nan"), float("nan"), 0), Feature("speed")) == (
         "speed ≤ 2 (not asked again)"
     )
-    assert stability_text(RuleStability("0.1", 0.9, 0.8, ()), 30) == "came back in 27 of 30 rounds"
 
 
 def test_rules_below_a_lower_bound_are_told_by_their_reason():

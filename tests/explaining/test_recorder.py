@@ -11,11 +11,10 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from sarl_core import InputError, RuleSet, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.environments.description import describe_environment
 from sarl_core.explaining.exports.steps import (
     StepRecord,
-    save_steps,
     steps_to_csv,
     steps_to_parquet,
 )
@@ -147,15 +146,7 @@ def test_no_id_is_taken_for_a_formula(record: StepRecord) -> None:
     assert ",=" not in text
 
 
-def test_a_file_appears_whole_or_not_at_all(record: StepRecord, tmp_path: Path) -> None:
-    for name in ("steps.csv", "steps.parquet"):
-        save_steps(record, tmp_path / name)
-        assert (tmp_path / name).stat().st_size > 1000
-    with pytest.raises(InputError, match=r"neither a \.csv nor a \.parquet"):
-        save_steps(record, tmp_path / "steps.txt")
-    with pytest.raises(InputError, match="does not exist"):
-        save_steps(record, tmp_path / "none" / "steps.csv")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["steps.csv", "steps.parquet"]
+def test_without_rules_there_is_no_column_of_them(record: StepRecord) -> None:
     bare = replace(record, rule_set=None)
     assert "rule_id" not in bare.to_frame().columns
 

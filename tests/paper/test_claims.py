@@ -9,7 +9,7 @@ import pytest
 
 from sarl_core.paper import claims
 from sarl_core.paper.claims import ClaimRow, decided
-from sarl_core.paper.criteria import Bounds, Measurement, Sample
+from sarl_core.paper.criteria import MeanBounds, Measurement, Sample
 from sarl_core.paper.verdicts import Verdict
 
 EXPERTS = ("a", "b", "c") * 2
@@ -19,7 +19,7 @@ ROW: ClaimRow[float] = ClaimRow(
     where="Figure 9",
     measured="How many.",
     metric=lambda value: Measurement((Sample(np.full(6, value), EXPERTS),), "So many.", {"n": 6}),
-    criterion=Bounds("above", 0.5, 0.25),
+    criterion=MeanBounds("above", 0.5, 0.25),
 )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sarl_core.paper.criteria import Bounds, Finding, InMost, Sample, Together
+from sarl_core.paper.criteria import MeanBounds, Finding, InMost, Sample, Together
 from sarl_core.paper.verdicts import Verdict, over_recordings, share_over_recordings
 from sarl_core.paper.words import interval, shares
 
@@ -15,7 +15,9 @@ EXPERTS = ("a", "b", "c", "a", "b", "c")
 SPREAD = np.array([-1.0, 0.0, 1.0, 1.0, 0.0, -1.0])  # the experts' means are the same
 
 
-def verdict(criterion: Bounds, values: np.ndarray, experts: tuple[str, ...] = EXPERTS) -> Verdict:
+def verdict(
+    criterion: MeanBounds, values: np.ndarray, experts: tuple[str, ...] = EXPERTS
+) -> Verdict:
     return criterion.finding(Sample(values, experts)).verdict
 
 
@@ -45,18 +47,18 @@ def in_most(
 def test_the_whole_interval_has_to_lie_where_a_claim_puts_it(
     values: np.ndarray, expected: Verdict
 ) -> None:
-    assert verdict(Bounds("above", 0.8, 0.5), values) == expected
-    assert verdict(Bounds("below", -0.8, -0.5), -values) == expected
-    found = Bounds("below", -0.8, -0.5).finding(Sample(-values, EXPERTS))
+    assert verdict(MeanBounds("above", 0.8, 0.5), values) == expected
+    assert verdict(MeanBounds("below", -0.8, -0.5), -values) == expected
+    found = MeanBounds("below", -0.8, -0.5).finding(Sample(-values, EXPERTS))
     assert found.interval is not None
     assert found.interval.mean == pytest.approx(-values.mean())
     assert found.interval.low < found.interval.high
 
 
 def test_the_same_value_everywhere_is_not_more_than_itself() -> None:
-    assert verdict(Bounds("above", 0, 0), np.zeros(6)) == "does not agree"
-    assert verdict(Bounds("above", 0, -0.1), np.zeros(6)) == "partly"
-    assert verdict(Bounds("above", 0, 0), np.full(6, 0.01)) == "agrees"
+    assert verdict(MeanBounds("above", 0, 0), np.zeros(6)) == "does not agree"
+    assert verdict(MeanBounds("above", 0, -0.1), np.zeros(6)) == "partly"
+    assert verdict(MeanBounds("above", 0, 0), np.full(6, 0.01)) == "agrees"
 
 
 @pytest.mark.parametrize(
@@ -75,20 +77,20 @@ def test_the_same_value_everywhere_is_not_more_than_itself() -> None:
 def test_that_two_things_are_the_same_has_to_be_shown(
     values: np.ndarray, expected: Verdict
 ) -> None:
-    assert verdict(Bounds("within", 0.1, 0.5), values) == expected
-    assert verdict(Bounds("within", 0.1, 0.5), -values) == expected
+    assert verdict(MeanBounds("within", 0.1, 0.5), values) == expected
+    assert verdict(MeanBounds("within", 0.1, 0.5), -values) == expected
 
 
 def test_few_recordings_or_experts_decide_nothing() -> None:
     for count in (1, 2, 4):
         values = np.full(count, 0.9)
-        assert verdict(Bounds("above", 0.8, 0.5), values, EXPERTS[:count]) == "cannot be judged"
+        assert verdict(MeanBounds("above", 0.8, 0.5), values, EXPERTS[:count]) == "cannot be judged"
         assert in_most([True] * count, EXPERTS[:count]).verdict == "cannot be judged"
     alike = ("a", "b") * 3
-    found = Bounds("above", 0.8, 0.5).finding(Sample(np.full(6, 0.9), alike))
+    found = MeanBounds("above", 0.8, 0.5).finding(Sample(np.full(6, 0.9), alike))
     assert found.verdict == "cannot be judged"
     assert "5 recordings of 3 experts are needed" in found.sentence
-    assert verdict(Bounds("above", 0.8, 0.5), np.full(5, 0.9), EXPERTS[:5]) == "agrees"
+    assert verdict(MeanBounds("above", 0.8, 0.5), np.full(5, 0.9), EXPERTS[:5]) == "agrees"
 
 
 def test_experts_that_differ_make_the_interval_wide() -> None:
@@ -108,7 +110,7 @@ def test_one_expert_alone_has_no_interval() -> None:
     share = share_over_recordings(np.ones((1, 20), dtype=np.bool_), ("a",))
     assert np.isnan(share.low)
     assert shares(share) == "100 %"
-    assert verdict(Bounds("above", 0, 0), np.array([9.0]), ("a",)) == "cannot be judged"
+    assert verdict(MeanBounds("above", 0, 0), np.array([9.0]), ("a",)) == "cannot be judged"
 
 
 @pytest.mark.parametrize("between", [0.0, 0.3, 0.7, 1.0])
@@ -187,7 +189,7 @@ def test_several_findings_are_one() -> None:
     assert in_all.finding(yes, yes).verdict == "agrees"
     assert in_all.finding(yes, no).verdict == "partly"
     assert in_all.finding(no, no).verdict == "does not agree"
-    positive = Together(Bounds("above", 0.1, -0.1), "")
+    positive = Together(MeanBounds("above", 0.1, -0.1), "")
     assert positive.finding(Sample(SPREAD - 9, EXPERTS), Sample(SPREAD, EXPERTS)).verdict == (
         "cannot be judged"
     )
@@ -199,7 +201,7 @@ def test_several_findings_are_one() -> None:
 
 def test_so_many_may_have_to_agree_before_a_claim_does_in_part() -> None:
     more, less, unclear = (Sample(SPREAD + shift, EXPERTS) for shift in (9, -9, 0))
-    two = Together(Bounds("above", 0, 0), "", in_part_of=2)
+    two = Together(MeanBounds("above", 0, 0), "", in_part_of=2)
     assert two.finding(more, more, less).verdict == "partly"
     assert two.finding(more, more, unclear).verdict == "partly"
     assert two.finding(more, less, unclear).verdict == "does not agree"

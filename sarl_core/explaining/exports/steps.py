@@ -6,14 +6,11 @@ import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.formats.metadata import KEY
-from sarl_core.errors import InputError
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
-from sarl_core.files import whole_file
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.steps import StepTable
 
@@ -110,23 +107,3 @@ def steps_to_parquet(record: StepRecord) -> bytes:
         compression="zstd",
     )
     return out.getvalue()
-
-
-def save_steps(record: StepRecord, path: str | Path) -> None:
-    """Write steps as ``.csv`` or ``.parquet``, by the name's ending.
-
-    Args:
-        record: The steps.
-        path: The file; it appears whole or not at all.
-
-    Raises:
-        InputError: If the ending is another, or the folder does not exist.
-        WorkError: If it cannot be written.
-    """
-    target = Path(path)
-    writers = {".csv": steps_to_csv, ".parquet": steps_to_parquet}
-    write = writers.get(target.suffix.lower())
-    if write is None:
-        raise InputError(f"{target} is neither a .csv nor a .parquet; give it one of these endings")
-    with whole_file(target) as unfinished:
-        unfinished.write_bytes(write(record))

@@ -159,7 +159,6 @@ def rounds_figure(
     planned: int | None = None,
     chosen: int | None = None,
     reported: float | None = None,
-    height: int = _ROUNDS_HEIGHT,
 ) -> go.Figure:
     """Return, coverage, disagreement and number of rules over the rounds.
 
@@ -168,7 +167,6 @@ def rounds_figure(
         planned: Number of rounds there will be; those that are finished where not given.
         chosen: Number of the round whose rules were taken.
         reported: Mean return of these on fresh episodes.
-        height: In pixels.
 
     Returns:
         Four panels over each other, which share the axis of rounds; the return with one standard
@@ -223,7 +221,7 @@ def rounds_figure(
         )
     last = max(planned or 0, *numbers)
     _mark_chosen(figure, points, chosen, reported, last)
-    _finish_rounds(figure, points, last, height)
+    _finish_rounds(figure, points, last)
     return figure
 
 
@@ -278,8 +276,8 @@ def _mark_chosen(
         )
 
 
-def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int, height: int) -> None:
-    figure.update_layout(**_layout(height), showlegend=False)
+def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int) -> None:
+    figure.update_layout(**_layout(_ROUNDS_HEIGHT), showlegend=False)
     figure.update_layout(margin={"l": 8, "r": 16, "t": 26, "b": 8})
     figure.update_xaxes(
         range=[0.5, max(last, 2) + 0.5],
@@ -313,15 +311,11 @@ def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int, h
         )
 
 
-def budget_figure(
-    points: Sequence[BudgetPoint], *, goal: float | None = None, height: int = _BUDGET_HEIGHT
-) -> go.Figure:
+def budget_figure(points: Sequence[BudgetPoint]) -> go.Figure:
     """Return against the number of rules.
 
     Args:
         points: By number of rules, at least one.
-        goal: A return to mark, as the expert's.
-        height: In pixels.
 
     Returns:
         Rules to the right, by powers of two; the typical return with its 95 % interval, and the
@@ -360,10 +354,8 @@ def budget_figure(
         marker={"color": _GREEN, "size": 8, "symbol": "circle-open", "line": {"width": 2}},
         hovertemplate="at most %{x} rules: mean <b>%{y:,.1f}</b><extra></extra>",
     )
-    if goal is not None:
-        figure.add_hline(y=goal, line={"color": MARKER_COLOUR, "width": 1, "dash": "dot"})
     figure.update_layout(
-        **_layout(height),
+        **_layout(_BUDGET_HEIGHT),
         showlegend=True,
         legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
     )

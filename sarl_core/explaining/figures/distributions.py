@@ -14,6 +14,7 @@ from sarl_core.mining.labels import LabelledDimension
 
 _FEW_VALUES = 12
 _SAMPLE = 20_000
+_BINS = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,21 +134,18 @@ def histogram_by_label(
     return Histogram(edges, _count(index, labels, n_labels, bins))
 
 
-def interval_histogram(
-    values: NDArray[Any], dimension: LabelledDimension, *, bins: int = 48
-) -> Histogram:
+def interval_histogram(values: NDArray[Any], dimension: LabelledDimension) -> Histogram:
     """Count the actions of a continuous dimension so that no bin crosses an interval's edge.
 
     Args:
         values: Actions of this dimension, (N,).
         dimension: With k intervals.
-        bins: Number of bins, roughly.
 
     Returns:
         Counts; actions outside the edges are in the outermost bins.
     """
     k = dimension.n_labels
-    each = max(1, bins // k)
+    each = max(1, _BINS // k)
     bounds = dimension.edges
     if bounds[0] == bounds[-1]:  # a single value, with some room beside it
         bounds = (bounds[0] - 0.5, bounds[0] + 0.5)

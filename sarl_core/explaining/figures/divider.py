@@ -17,7 +17,6 @@ from sarl_core.mining.language import number_text, share_text
 from sarl_core.mining.quantisation import SNAPPINGS, Quantisation, Snapping
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import MeanInterval
-from sarl_core.studies.divider import DividerStudy
 
 _ROW_HEIGHT = 38
 _DARK_INK, _LIGHT_INK = "#0e161b", "#ffffff"
@@ -220,21 +219,6 @@ def _typical_text(one: TypicalReturn) -> str:
     if math.isnan(one.failure_rate):
         return text
     return f"{text}<br>{share_text(one.failure_rate)} fail"
-
-
-def study_figure(study: DividerStudy, *, dark: bool = False) -> go.Figure:
-    """`snapped_figure` of a whole study.
-
-    Args:
-        study: As `study_divider` gives it.
-        dark: Whether it stands on dark ground.
-
-    Returns:
-        The heatmap.
-    """
-    found = {(each.divider, each.snapping): each.episodes for each in study.snapped}
-    rows = [snapping for snapping in SNAPPINGS if any(key[1] == snapping for key in found)]
-    return snapped_figure(study.dividers, found, projections=rows, dark=dark)
 
 
 def _cells(

@@ -76,13 +76,12 @@ def _shares(values: NDArray[np.float32], low: float, high: float, bins: int) -> 
     return np.bincount(index, minlength=bins) / len(values)
 
 
-def gap_figure(histogram: GapHistogram, feature: Feature, *, height: int = _HEIGHT) -> go.Figure:
+def gap_figure(histogram: GapHistogram, feature: Feature) -> go.Figure:
     """One feature over the demonstrated states and over those that need a demonstration.
 
     Args:
         histogram: Of the feature.
         feature: Name and unit.
-        height: In pixels.
 
     Returns:
         Two histograms over each other, each of its own states.
@@ -109,7 +108,7 @@ def gap_figure(histogram: GapHistogram, feature: Feature, *, height: int = _HEIG
             hovertemplate=f"%{{customdata}}<br>%{{hovertext}} of the {name}<extra></extra>",
         )
     figure.update_layout(
-        height=height,
+        height=_HEIGHT,
         margin={"l": 44, "r": 10, "t": 6, "b": 40},
         barmode="overlay",
         bargap=0,

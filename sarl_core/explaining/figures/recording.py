@@ -27,7 +27,6 @@ def recordings_figure(
     colours: Mapping[str, str],
     title: str,
     share: bool = False,
-    height: int = 330,
 ) -> go.Figure:
     """A row for each way to act: a dot a recording, and above it their mean with its interval.
 
@@ -38,7 +37,6 @@ def recordings_figure(
         colours: By way to act.
         title: Of the axis.
         share: Whether the numbers are shares.
-        height: In pixels.
 
     Returns:
         Rows from top to bottom, numbers to the right.
@@ -92,7 +90,7 @@ def recordings_figure(
     rows = len(values)
     axis = {"range": [-0.04, 1.06], **share_ticks(0, 1)} if share else {"nticks": 6}
     figure.update_layout(
-        height=height,
+        height=330,
         margin={"l": 8, "r": 24, "t": 8, "b": 8},
         hovermode="closest",
         dragmode=False,

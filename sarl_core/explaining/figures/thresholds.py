@@ -249,13 +249,12 @@ def surface(
     return figure
 
 
-def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = False) -> go.Figure:
+def landscape_figure(landscape: Landscape, *, title: str = "") -> go.Figure:
     """The four layers of a landscape on one sheet, for a file.
 
     Args:
         landscape: Over a grid.
         title: Above them.
-        dark: Whether it stands on dark ground.
 
     Returns:
         Two rows of two heatmaps, with an opaque ground.
@@ -271,7 +270,7 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
     )
     for number, layer in enumerate(LAYERS):
         row, column = divmod(number, 2)
-        part = heatmap(landscape, layer, dark=dark)
+        part = heatmap(landscape, layer)
         cells, points = part.data
         cells.colorbar.update(
             x=0.435 + 0.57 * column, y=0.79 - 0.575 * row, len=0.425, xanchor="left"
@@ -280,7 +279,7 @@ def landscape_figure(landscape: Landscape, *, title: str = "", dark: bool = Fals
         figure.add_trace(points, row=row + 1, col=column + 1)
         figure.update_xaxes(part.layout.xaxis, row=row + 1, col=column + 1)
         figure.update_yaxes(part.layout.yaxis, row=row + 1, col=column + 1)
-    ground, ink = ("#12181d", "#e4eaee") if dark else ("#ffffff", "#1d2730")
+    ground, ink = "#ffffff", "#1d2730"
     figure.update_layout(
         title={"text": plain(title), "x": 0.02, "font": {"size": 17}} if title else None,
         width=1080,

@@ -30,7 +30,6 @@ def tree_figure(
     node: int,
     *,
     dark: bool = False,
-    height: int = 420,
 ) -> go.Figure:
     """The tree from above: a box a node, as wide as its share of the states.
 
@@ -42,7 +41,6 @@ def tree_figure(
         cut: Nodes that are rules, (k,).
         node: The rule whose path is lit.
         dark: Whether it stands on dark ground.
-        height: In pixels.
 
     Returns:
         Zoom by dragging, back by a double click.
@@ -68,7 +66,7 @@ def tree_figure(
     _add_path(figure, tree, path, dark=dark)
     bottom = int(tree.depth.max()) + 1
     figure.update_layout(
-        height=height,
+        height=420,
         shapes=[_boxes(tree, nodes, *look) for nodes, *look in kinds if len(nodes)],
         margin={"l": 50, "r": 10, "t": 8, "b": 44},
         showlegend=False,

@@ -21,7 +21,7 @@ from sarl_core.mining.validation.holding_out import (
     most_shown,
     verdict,
 )
-from sarl_core.mining.validation.stability import Band, RuleStability
+from sarl_core.mining.validation.stability import Band
 from sarl_core.mining.written import limit_text
 
 VERDICTS: dict[Verdict, str] = {
@@ -124,13 +124,12 @@ def interval_text(held_out: HeldOut | None) -> str:
     return "too few episodes" if found is None else range_text(found)
 
 
-def told_by_episodes(held_out: HeldOut, *, what: str, its: str = "its states") -> str:
+def told_by_episodes(held_out: HeldOut, *, what: str) -> str:
     """What other episodes say, for whoever has never heard of an interval.
 
     Args:
         held_out: What was counted.
         what: Was observed of each episode, as "it was right".
-        its: Of what.
 
     Returns:
         As "In 14 episodes that it was not mined from, it was right in 91 % of its states on
@@ -146,7 +145,7 @@ def told_by_episodes(held_out: HeldOut, *, what: str, its: str = "its states") -
         return "There was no state for it in the episodes that it was not mined from."
     text = (
         f"In {counted(held_out.episodes, 'episode')} that it was not mined from, {what} in "
-        f"{share_text(held_out.share)} of {its} on average"
+        f"{share_text(held_out.share)} of its states on average"
     )
     if held_out.interval is None:
         return f"{text}; {'that is' if held_out.episodes > 1 else 'one is'} too few to say more."
@@ -317,19 +316,6 @@ def band_text(band: Band, feature: Feature) -> str:
     low = number_text(band.low, apart_from=band.high)
     high = number_text(band.high, apart_from=band.low)
     return f"{own} ({low})" if band.low == band.high else f"{own} ({low} to {high})"
-
-
-def stability_text(one: RuleStability, rounds: int) -> str:
-    """How often a rule came back.
-
-    Args:
-        one: What was found of it.
-        rounds: How often episodes were drawn.
-
-    Returns:
-        As "came back in 27 of 30 rounds".
-    """
-    return f"came back in {round(one.returns * rounds)} of {counted(rounds, 'round')}"
 
 
 _STYLE = """<style>

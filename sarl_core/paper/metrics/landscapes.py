@@ -27,7 +27,7 @@ NEAR = 0.9  # of the greatest value
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class EnvironmentLandscapes:
     """The landscapes of an environment, one a recording, the shipped one's first.
 
     Attributes:
@@ -51,14 +51,14 @@ class Recorded:
         )
 
 
-Environments = Mapping[str, Recorded]
+Environments = Mapping[str, EnvironmentLandscapes]
 
 
 def recorded(frame: pd.DataFrame) -> Environments:
     """The landscapes in the table of a figure."""
     experts = experts_in(frame)
     return {
-        env_id: Recorded(tuple(own.values()), experts[env_id])
+        env_id: EnvironmentLandscapes(tuple(own.values()), experts[env_id])
         for env_id, own in landscapes_of(frame).items()
     }
 
