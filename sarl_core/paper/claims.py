@@ -8,7 +8,7 @@ from functools import partial
 from typing import Generic, TypeVar
 
 from sarl_core.mining.language import share_text
-from sarl_core.paper.criteria import MeanBounds, Criterion, InMost, Measurement, Together
+from sarl_core.paper.criteria import Criterion, InMost, MeanBounds, Measurement, Together
 from sarl_core.paper.metrics import dividing, landscapes, learning, named_settings, shields
 from sarl_core.paper.replicates import PAPER_DIVIDER
 from sarl_core.paper.shields import FILTERED, UNFILTERED, Runs

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from sarl_core.paper.criteria import MeanBounds, Finding, InMost, Sample, Together
+from sarl_core.paper.criteria import Finding, InMost, MeanBounds, Sample, Together
 from sarl_core.paper.verdicts import Verdict, over_recordings, share_over_recordings
 from sarl_core.paper.words import interval, shares
 
