@@ -207,8 +207,8 @@ def shipped_experts(folder: Path = EXPERT_FOLDER) -> dict[str, Path]:
     Returns:
         The `.npz` file of each environment id, in the ids' order.
     """
-    found = {MlpPolicy.load(path).env_id: path for path in folder.glob("*.npz")}
-    return dict(sorted(found.items()))
+    experts = {MlpPolicy.load(path).env_id: path for path in folder.glob("*.npz")}
+    return dict(sorted(experts.items()))
 
 
 def _novice(env_id: str, first: NDArray[np.int64]) -> UniformAgent:
@@ -252,13 +252,13 @@ def _untrained(env_id: str, seed: int) -> MlpPolicy:
 
 def _expert(env_id: str) -> MlpPolicy:
     experts = shipped_experts()
-    found = experts.get(env_id.rsplit(":", 1)[-1])
-    if found is None:
+    policy = experts.get(env_id.rsplit(":", 1)[-1])
+    if policy is None:
         raise InputError(
             f"there is no shipped expert for {env_id!r}, only for {', '.join(experts) or 'none'}; "
             "train one with `train-expert` and give its path"
         )
-    return MlpPolicy.load(found)
+    return MlpPolicy.load(policy)
 
 
 def _policy_from(

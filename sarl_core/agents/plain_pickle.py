@@ -95,7 +95,7 @@ def read_pickle(data: bytes, known: Collection[str]) -> Any:
     raise InputError("it is no whole pickle; save the statistics again")
 
 
-def shown(text: str) -> str:
+def named(text: str) -> str:
     """A name from a file, fit for a message: in quotes, and not too long.
 
     Args:
@@ -141,8 +141,8 @@ class _Machine:
         return popped
 
     def _since_mark(self) -> list[Any]:
-        found, self.stack = self.stack, self.marks.pop()
-        return found
+        items, self.stack = self.stack, self.marks.pop()
+        return items
 
     def _proto(self, argument: int) -> None: ...
 
@@ -156,12 +156,12 @@ class _Machine:
         self.stack.pop()
 
     def _tuple(self, _: None) -> None:
-        found = tuple(self._since_mark())
-        self.stack.append(found)
+        items = tuple(self._since_mark())
+        self.stack.append(items)
 
     def _list(self, _: None) -> None:
-        found = self._since_mark()
-        self.stack.append(found)
+        items = self._since_mark()
+        self.stack.append(items)
 
     def _append(self, _: None) -> None:
         value = self.stack.pop()
@@ -215,7 +215,7 @@ class _Machine:
         text = f"{module}.{name}"
         if text not in self.known:
             raise InputError(
-                f"it names {shown(text)}, which statistics of observations have no need of, and "
+                f"it names {named(text)}, which statistics of observations have no need of, and "
                 "is not opened; give the .pkl that VecNormalize.save() wrote"
             )
         self.stack.append(Name(text))

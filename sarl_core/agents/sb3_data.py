@@ -23,7 +23,7 @@ _CLASS_OF_METHOD = re.compile(r"<function (\w+)\.")
 
 
 @dataclass(frozen=True)
-class Told:
+class TrainingRecord:
     """What a model tells.
 
     Attributes:
@@ -46,7 +46,7 @@ class Told:
     original: NDArray[np.float64] | None
 
 
-def read_data(text: bytes) -> Told:
+def read_data(text: bytes) -> TrainingRecord:
     """Read the entry.
 
     Stable-Baselines3 writes each object twice: pickled, and as text for people, as in
@@ -70,7 +70,7 @@ def read_data(text: bytes) -> Told:
     arguments = data.get("policy_kwargs")
     if not isinstance(arguments, dict):
         arguments = {}
-    return Told(
+    return TrainingRecord(
         policy_class=_class_name(data.get("policy_class")),
         arguments={k: v for k, v in arguments.items() if k not in (":type:", ":serialized:")},
         observations=read_box(_pickled(data.get("observation_space"))),
@@ -88,8 +88,8 @@ def _class_name(written: object) -> str | None:
     if not isinstance(written, dict) or not isinstance(written.get("__module__"), str):
         return str(written.get(":type:", "")) if isinstance(written, dict) else str(written)
     methods = (written.get("__init__"), *written.values())
-    found = (_CLASS_OF_METHOD.match(text) for text in methods if isinstance(text, str))
-    name = next((match[1] for match in found if match), "")
+    matches = (_CLASS_OF_METHOD.match(text) for text in methods if isinstance(text, str))
+    name = next((match[1] for match in matches if match), "")
     return f"{written['__module__']}.{name}".removesuffix(".")
 
 
@@ -123,11 +123,11 @@ def check_actions(trained: Bounds | None, given: Bounds, env_id: str) -> None:
         )
 
 
-def odd_observations(told: Told, space: Any, env_id: str) -> str:
+def odd_observations(training: TrainingRecord, space: Any, env_id: str) -> str:
     """Say in what the observations of a training look unlike the environment's.
 
     Args:
-        told: What the model tells.
+        training: What the model tells.
         space: The environment's observations.
         env_id: Its id.
 
@@ -143,19 +143,19 @@ def odd_observations(told: Told, space: Any, env_id: str) -> str:
         "--env with that wrapper"
     )
     given = (space.low, space.high)
-    if told.observations is not None and told.observations[0].shape == space.shape:
-        i = _first_difference(told.observations, given)
+    if training.observations is not None and training.observations[0].shape == space.shape:
+        i = _first_difference(training.observations, given)
         if i is not None:
             return (
-                f"its observations lay between {_range(told.observations, i)} in training "
+                f"its observations lay between {_range(training.observations, i)} in training "
                 f"(feature {i}), and those of {env_id} lie between {_range(given, i)}{advice}"
             )
     # What a VecNormalize made of them is another matter.
-    place = None if told.originals else outside(told.last, space)
-    if place is not None and told.last is not None:
+    place = None if training.originals else outside(training.last, space)
+    if place is not None and training.last is not None:
         i = place[1]
         return (
-            f"the last observation of its training had {told.last[place]:g} for feature {i}, "
+            f"the last observation of its training had {training.last[place]:g} for feature {i}, "
             f"which in {env_id} lies between {_range(given, i)}{advice}"
         )
     return ""
@@ -176,8 +176,8 @@ def outside(rows: NDArray[np.float64] | None, space: Any) -> tuple[int, int] | N
     if rows is None or not isinstance(space, Box) or rows.shape[1:] != space.shape:
         return None
     slack = 1e-4 * (1.0 + np.abs(rows))
-    found = np.argwhere((rows < space.low - slack) | (rows > space.high + slack))
-    return (int(found[0][0]), int(found[0][1])) if len(found) else None
+    places = np.argwhere((rows < space.low - slack) | (rows > space.high + slack))
+    return (int(places[0][0]), int(places[0][1])) if len(places) else None
 
 
 def _first_difference(one: Bounds, other: Bounds) -> int | None:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.mlp_policy import Normalisation
-from sarl_core.agents.sb3_data import Told, outside
+from sarl_core.agents.sb3_data import TrainingRecord, outside
 from sarl_core.agents.sb3_settings import WITH_BUFFER
 from sarl_core.agents.sb3_statistics import load_statistics
 from sarl_core.errors import InputError
@@ -29,13 +29,13 @@ _BY_CHANCE = 0.02
 
 
 def find_statistics(
-    path: Path, told: Told, given: str | Path | None, env: Any
+    path: Path, training: TrainingRecord, given: str | Path | None, env: Any
 ) -> tuple[Normalisation | None, str]:
     """Find the statistics of a model's observations.
 
     Args:
         path: The model.
-        told: What it tells.
+        training: What it tells.
         given: The file with its statistics, ``none`` where it had none, or None to look for it.
         env: The environment; some steps are made in it where that helps to tell.
 
@@ -47,13 +47,15 @@ def find_statistics(
     """
     if given is not None and str(given) == AS_THEY_ARE:
         return None, ""
-    normalised = _is_normalised(told, env.observation_space)
+    normalised = _is_normalised(training, env.observation_space)
     if given is not None:
-        found = load_statistics(Path(given))
-        if found is None:
+        statistics = load_statistics(Path(given))
+        if statistics is None:
             return None, f"{given} says that the observations of {path} were not normalised"
-        unasked = normalised is False or (normalised is None and not _explains(found, told))
-        return found, (
+        unasked = normalised is False or (
+            normalised is None and not _explains(statistics, training)
+        )
+        return statistics, (
             f"{path} does not look as if it was trained under this VecNormalize; observations "
             f"are normalised by {given} all the same"
             if unasked
@@ -62,7 +64,7 @@ def find_statistics(
     if normalised is False:
         return None, ""
     if normalised is None:
-        return _explaining(path, told, env)
+        return _explaining(path, training, env)
     file = _beside(path)
     if file is None:
         raise InputError(
@@ -70,37 +72,44 @@ def find_statistics(
             "without them it would act at random. Give the .pkl that VecNormalize.save() wrote "
             f"(--normalise FILE), or --normalise {AS_THEY_ARE} if only rewards were normalised"
         )
-    found = load_statistics(file)
-    if found is None:
+    statistics = load_statistics(file)
+    if statistics is None:
         return None, f"{file} says that the observations of {path} were not normalised"
-    return found, f"observations are normalised by {file}, which lies beside {path.name}"
+    return statistics, f"observations are normalised by {file}, which lies beside {path.name}"
 
 
-def _is_normalised(told: Told, space: Any) -> bool | None:
+def _is_normalised(training: TrainingRecord, space: Any) -> bool | None:
     """Whether a model was trained under a VecNormalize; None where it does not tell."""
-    if not told.originals:
+    if not training.originals:
         return False
-    if told.policy_class is not None and told.policy_class not in WITH_BUFFER:
+    if training.policy_class is not None and training.policy_class not in WITH_BUFFER:
         return True  # these keep originals only then
-    if told.last is None or told.original is None or told.last.shape != told.original.shape:
+    if (
+        training.last is None
+        or training.original is None
+        or training.last.shape != training.original.shape
+    ):
         return None
-    if np.array_equal(told.last, told.original):
+    if np.array_equal(training.last, training.original):
         return False
-    beyond = [outside(rows, space) for rows in (told.last, told.original)]
+    beyond = [outside(rows, space) for rows in (training.last, training.original)]
     if beyond[0] is not None and beyond[1] is None:
         return True
     return None
 
 
-def _explaining(path: Path, told: Told, env: Any) -> tuple[Normalisation | None, str]:
+def _explaining(path: Path, training: TrainingRecord, env: Any) -> tuple[Normalisation | None, str]:
     """The statistics beside a model that make of its last observations what it says it saw."""
     for file in (*_own_names(path), *_shared_names(path)):
         if not file.is_file():
             continue
-        found = load_statistics(file)
-        if found is not None and _explains(found, told):
-            return found, f"observations are normalised by {file}, which lies beside {path.name}"
-    likely = _is_a_step(told, env)
+        statistics = load_statistics(file)
+        if statistics is not None and _explains(statistics, training):
+            return (
+                statistics,
+                f"observations are normalised by {file}, which lies beside {path.name}",
+            )
+    likely = _is_a_step(training, env)
     if likely:
         return None, ""
     advice = (
@@ -112,9 +121,9 @@ def _explaining(path: Path, told: Told, env: Any) -> tuple[Normalisation | None,
     return None, f"{path}: what it saw last in its training is no step of this one; {advice}"
 
 
-def _explains(statistics: Normalisation, told: Told) -> bool:
+def _explains(statistics: Normalisation, training: TrainingRecord) -> bool:
     """Whether statistics make what a model saw last of what it was before; nearly will do."""
-    last, original = told.last, told.original
+    last, original = training.last, training.original
     if last is None or original is None or last.shape != original.shape:
         return False
     if last.ndim != 2 or last.shape[1] != len(statistics.mean):
@@ -123,13 +132,13 @@ def _explains(statistics: Normalisation, told: Told) -> bool:
     return bool((np.abs(made - last) <= 0.1 + 0.05 * np.abs(last)).all())
 
 
-def _is_a_step(told: Told, env: Any) -> bool | None:
+def _is_a_step(training: TrainingRecord, env: Any) -> bool | None:
     """Whether a model's last observation but one and its last are a step of an environment.
 
     A step is not much longer than the longest of some random ones, in each feature, or leads to
     where episodes start. None where normalised values would often pass for one.
     """
-    last, before = told.last, told.original
+    last, before = training.last, training.original
     if last is None or before is None or last.shape != before.shape or last.ndim != 2:
         return None
     if last.shape[1:] != env.observation_space.shape:
@@ -185,16 +194,16 @@ def _beside(path: Path) -> Path | None:
     Raises:
         InputError: If there is a doubt.
     """
-    found = [file for file in _own_names(path) if file.is_file()]
-    own = bool(found)
-    found = found or [file for file in _shared_names(path) if file.is_file()]
-    if not found:
+    files = [file for file in _own_names(path) if file.is_file()]
+    own = bool(files)
+    files = files or [file for file in _shared_names(path) if file.is_file()]
+    if not files:
         return None
     others = sorted(file.name for file in path.parent.glob("*.zip") if file.name != path.name)
-    if len(found) > 1 or (others and not own):
-        doubt = found[1].name if len(found) > 1 else others[0]
+    if len(files) > 1 or (others and not own):
+        doubt = files[1].name if len(files) > 1 else others[0]
         raise InputError(
-            f"{path} was trained under a VecNormalize; beside it lie {found[0].name} and {doubt}, "
+            f"{path} was trained under a VecNormalize; beside it lie {files[0].name} and {doubt}, "
             "so it is not clear which statistics are its own; say so with --normalise FILE"
         )
-    return found[0]
+    return files[0]

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sarl_core.agents.activations import TORCH_CLASSES, Activation
-from sarl_core.agents.plain_pickle import shown
+from sarl_core.agents.plain_pickle import named
 from sarl_core.errors import InputError
 
 _LINEAR_ARS = "sb3_contrib.ars.policies.ARSLinearPolicy"
@@ -50,7 +50,7 @@ _INSTEAD = "record demonstrations with it where it was trained, and give those"
 
 
 @dataclass(frozen=True)
-class Settings:
+class PolicySettings:
     """What the weights alone do not say.
 
     Attributes:
@@ -68,7 +68,7 @@ class Settings:
     batch_norm_eps: float = 1e-3
 
 
-def read_settings(policy_class: str | None, arguments: Mapping[str, object]) -> Settings:
+def read_settings(policy_class: str | None, arguments: Mapping[str, object]) -> PolicySettings:
     """Understand what a model says of itself.
 
     Args:
@@ -84,7 +84,7 @@ def read_settings(policy_class: str | None, arguments: Mapping[str, object]) -> 
     """
     if policy_class is not None and policy_class not in POLICY_CLASSES:
         raise InputError(
-            f"its policy is of the class {shown(policy_class)}, which is not known here (only "
+            f"its policy is of the class {named(policy_class)}, which is not known here (only "
             f"MlpPolicy of {KNOWN_ALGORITHMS} is); {_INSTEAD}"
         )
     given = dict(arguments)
@@ -94,20 +94,20 @@ def read_settings(policy_class: str | None, arguments: Mapping[str, object]) -> 
     extractor = given.pop("features_extractor_class", None)
     if extractor is not None and _class_of(extractor) != _FLAT:
         raise InputError(
-            f"it extracts features by {shown(_class_of(extractor))}, which is not known here "
+            f"it extracts features by {named(_class_of(extractor))}, which is not known here "
             f"(only FlattenExtractor is); {_INSTEAD}"
         )
-    settings = Settings(
+    settings = PolicySettings(
         activation=_activation(given.pop("activation_fn", None)),
         squash_output=_truth(given, "squash_output", squash),
-        clip_mean=_number(given, "clip_mean", Settings.clip_mean),
-        n_quantiles=int(_number(given, "n_quantiles", Settings.n_quantiles, least=1)),
-        batch_norm_eps=_number(given, "batch_norm_eps", Settings.batch_norm_eps),
+        clip_mean=_number(given, "clip_mean", PolicySettings.clip_mean),
+        n_quantiles=int(_number(given, "n_quantiles", PolicySettings.n_quantiles, least=1)),
+        batch_norm_eps=_number(given, "batch_norm_eps", PolicySettings.batch_norm_eps),
     )
     unknown = sorted(set(given) - _WITHOUT_EFFECT)
     if unknown:
         raise InputError(
-            f"its policy was made with {shown(unknown[0])}, which is not known here; {_INSTEAD}"
+            f"its policy was made with {named(unknown[0])}, which is not known here; {_INSTEAD}"
         )
     return settings
 
@@ -123,7 +123,7 @@ def _activation(written: object) -> Activation | None:
     match = _ACTIVATION.fullmatch(_class_of(written))
     if match is None or match[1] not in TORCH_CLASSES:
         raise InputError(
-            f"it uses the activation {shown(_class_of(written))}, which is not known here (only "
+            f"it uses the activation {named(_class_of(written))}, which is not known here (only "
             f"{', '.join(TORCH_CLASSES)} are, as torch makes them); {_INSTEAD}"
         )
     return TORCH_CLASSES[match[1]]

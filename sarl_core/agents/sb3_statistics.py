@@ -124,16 +124,12 @@ def read_array(data: bytes) -> NDArray[np.float64] | None:
         return None
 
 
-def _normalisation(found: Any) -> Normalisation | None:
-    if (
-        not isinstance(found, Made)
-        or found.maker != _STATISTICS
-        or not isinstance(found.state, dict)
-    ):
+def _normalisation(made: Any) -> Normalisation | None:
+    if not isinstance(made, Made) or made.maker != _STATISTICS or not isinstance(made.state, dict):
         raise InputError(
             "it holds no statistics of observations; give the .pkl that VecNormalize.save() wrote"
         )
-    fields = found.state
+    fields = made.state
     if fields.get("norm_obs", True) is False:
         return None
     running = fields.get("obs_rms")

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.activations import Activation
 from sarl_core.agents.mlp_policy import Head, MlpPolicy, Normalisation
-from sarl_core.agents.plain_pickle import shown
-from sarl_core.agents.sb3_settings import KNOWN_ALGORITHMS, Settings
+from sarl_core.agents.plain_pickle import named
+from sarl_core.agents.sb3_settings import KNOWN_ALGORITHMS, PolicySettings
 from sarl_core.errors import InputError
 
 Weights = Mapping[str, NDArray[np.float32]]
@@ -50,7 +50,7 @@ def policy_from_state(
     label_counts: tuple[int, ...] = (),
     action_low: NDArray[np.float32] | None = None,
     action_high: NDArray[np.float32] | None = None,
-    settings: Settings | None = None,
+    settings: PolicySettings | None = None,
     normalisation: Normalisation | None = None,
     env_id: str = "",
 ) -> MlpPolicy:
@@ -73,7 +73,7 @@ def policy_from_state(
     Raises:
         InputError: If the names are of another kind of policy, or do not fit the actions.
     """
-    settings = settings or Settings()
+    settings = settings or PolicySettings()
     network = _network(state, settings, discrete=discrete)
     if discrete and not label_counts:
         label_counts = (len(network.layers[-1][1]),)
@@ -95,31 +95,31 @@ def policy_from_state(
     )
 
 
-def _network(state: Weights, settings: Settings, *, discrete: bool) -> _Network:
+def _network(state: Weights, settings: PolicySettings, *, discrete: bool) -> _Network:
     stranger = next((name for name in state if not _KNOWN.fullmatch(name)), None)
     read = next((reader for name, reader in _READERS if _has(state, name)), None)
     if stranger is not None or read is None:
-        because = "" if stranger is None else f" (they hold {shown(stranger)})"
+        because = "" if stranger is None else f" (they hold {named(stranger)})"
         raise InputError(
             f"the weights are not those of an MlpPolicy of {KNOWN_ALGORITHMS}{because}; "
             "give such a .zip, or an .npz policy"
         )
-    found = read(state, settings, discrete)
-    has_labels = found.head in ("greedy", "categorical") and "log_std" not in state
+    network = read(state, settings, discrete)
+    has_labels = network.head in ("greedy", "categorical") and "log_std" not in state
     if discrete != has_labels:
         raise InputError(
             "the weights are of a policy for "
             f"{'continuous' if discrete else 'discrete'} actions and the environment takes "
             f"{'discrete' if discrete else 'continuous'} ones; choose a policy trained on it"
         )
-    return found
+    return network
 
 
 def _has(state: Weights, name: str) -> bool:
     return any(known.startswith(name) for known in state)
 
 
-def _actor_critic(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _actor_critic(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """PPO, A2C, TRPO; the first layers may be shared with the critic, in older files."""
     names = [
         *_sequence(state, "mlp_extractor.shared_net"),
@@ -135,12 +135,12 @@ def _actor_critic(state: Weights, settings: Settings, discrete: bool) -> _Networ
     return _Network(layers, "gaussian", "tanh")
 
 
-def _values(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _values(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """DQN."""
     return _Network(_layers(state, _VALUES), "greedy", "relu")
 
 
-def _quantiles(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _quantiles(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """QR-DQN: the value of an action is the mean of its quantiles, which is one more layer."""
     *hidden, (weight, bias) = _layers(state, _QUANTILES)
     n = settings.n_quantiles
@@ -155,7 +155,7 @@ def _quantiles(state: Weights, settings: Settings, discrete: bool) -> _Network:
     return _Network([*hidden, last], "greedy", "relu")
 
 
-def _squashed(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _squashed(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """SAC, TQC, CrossQ."""
     hidden: Layers = []
     pending: _Affine | None = None  # the batch normalisation that came last
@@ -179,12 +179,12 @@ def _squashed(state: Weights, settings: Settings, discrete: bool) -> _Network:
     return _Network([*hidden, last], "squashed_gaussian", "relu")
 
 
-def _deterministic(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _deterministic(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """TD3, DDPG."""
     return _Network(_layers(state, "actor.mu"), "squashed", "relu")
 
 
-def _searched(state: Weights, settings: Settings, discrete: bool) -> _Network:
+def _searched(state: Weights, settings: PolicySettings, discrete: bool) -> _Network:
     """ARS, of which the weights do not say whether actions are labels or go through a tanh."""
     layers = _layers(state, "action_net", bias_needed=False)
     if discrete:
@@ -197,7 +197,7 @@ def _searched(state: Weights, settings: Settings, discrete: bool) -> _Network:
 
 
 _VALUES, _QUANTILES = "q_net.q_net", "quantile_net.quantile_net"
-_Reader = Callable[[Weights, Settings, bool], _Network]
+_Reader = Callable[[Weights, PolicySettings, bool], _Network]
 _READERS: tuple[tuple[str, _Reader], ...] = (
     # The first name that there is decides.
     (f"{_VALUES}.", _values),
@@ -274,16 +274,16 @@ def _layers(state: Weights, prefix: str, *, bias_needed: bool = True) -> Layers:
 def _layer(state: Weights, name: str, *, bias_needed: bool = True) -> Layer:
     weight = _array(state, f"{name}.weight")
     if weight.ndim != 2:
-        raise InputError(f"{shown(name)} is no layer of an MlpPolicy; give such a policy")
+        raise InputError(f"{named(name)} is no layer of an MlpPolicy; give such a policy")
     if not bias_needed and f"{name}.bias" not in state:
         return weight.T, np.zeros(len(weight), dtype=np.float32)
     bias = _array(state, f"{name}.bias")
     if bias.shape != (len(weight),):
-        raise InputError(f"the parts of {shown(name)} differ in length; save the policy again")
+        raise InputError(f"the parts of {named(name)} differ in length; save the policy again")
     return weight.T, bias
 
 
 def _array(state: Weights, name: str) -> NDArray[np.float32]:
     if name not in state:
-        raise InputError(f"the policy's weights lack {shown(name)}; save the policy again")
+        raise InputError(f"the policy's weights lack {named(name)}; save the policy again")
     return np.asarray(state[name], dtype=np.float32)

@@ -58,8 +58,8 @@ def load_sb3_zip(
     # With one dimension the weights say how many labels there are, and the caller compares.
     counts = label_counts(space) if len(label_counts(space)) > 1 else ()
     try:
-        told = read_data(text)
-        settings = read_settings(told.policy_class, told.arguments)
+        training = read_data(text)
+        settings = read_settings(training.policy_class, training.arguments)
         policy = policy_from_state(
             _state(weights),
             discrete=not box,
@@ -69,22 +69,22 @@ def load_sb3_zip(
             settings=settings,
         )
         if box:
-            check_actions(told.actions, (space.low, space.high), env_id)
+            check_actions(training.actions, (space.low, space.high), env_id)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     notes = []
-    if told.policy_class is None:
+    if training.policy_class is None:
         notes.append(
             f"{path} does not name the class of its policy; it was read as the one whose weights "
             "have these names"
         )
-    statistics, note = find_statistics(source, told, normalise, env)
+    statistics, note = find_statistics(source, training, normalise, env)
     if statistics is not None and len(statistics.mean) != policy.n_features:
         raise InputError(
             f"{path} takes {policy.n_features} features, and the statistics given with it or "
             f"beside it are of {len(statistics.mean)}; give those of this policy"
         )
-    odd = odd_observations(told, env.observation_space, env_id)
+    odd = odd_observations(training, env.observation_space, env_id)
     notes += [each for each in (note, f"{path}: {odd}" if odd else "") if each]
     return replace(policy, normalisation=statistics), tuple(notes)
 
@@ -94,7 +94,7 @@ def _entries(path: Path) -> tuple[bytes, bytes]:
     try:
         with opened(limited_bytes(path, MAX_POLICY_BYTES)) as archive:
             check_unpacked_size(archive)
-            found = []
+            contents = []
             # Half of what a policy may take: the weights are in memory twice while they are read.
             for name, most in (("policy.pth", MAX_POLICY_BYTES // 2), ("data", MAX_BYTES)):
                 entry = archive.getinfo(name)
@@ -103,8 +103,8 @@ def _entries(path: Path) -> tuple[bytes, bytes]:
                         f"its {name} unpacks to more than {most // 2**20} MB, more than any "
                         "MlpPolicy has; give a policy file"
                     )
-                found.append(entry_content(archive, entry, most))
-            return found[0], found[1]
+                contents.append(entry_content(archive, entry, most))
+            return contents[0], contents[1]
     except KeyError as error:
         raise InputError(
             f"{path} is not a model of Stable-Baselines3 (it lacks policy.pth or data); "

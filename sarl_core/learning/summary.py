@@ -13,7 +13,7 @@ from sarl_core.environments.failures import failure_known
 from sarl_core.learning.arms import ARMS, LearningArm
 from sarl_core.learning.curves import Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
-from sarl_core.rollouts.statistics import Interval, summarise_groups
+from sarl_core.rollouts.statistics import ReturnStatistics, summarise_groups
 
 SAFE_SHARE = 0.5
 """An arm is called safe while learning if it crashes at most this share as often as the learner
@@ -41,7 +41,7 @@ class TrialSummary:
 
     means: tuple[float, ...]
     halves: tuple[float, float]
-    returns: Interval
+    returns: ReturnStatistics
     crash_rate: float
     intervention_rate: float
     coverage: float
@@ -198,7 +198,7 @@ def _trials(trials: Sequence[Trial]) -> TrialSummary:
 
 
 @lru_cache(maxsize=256)
-def _returns(groups: tuple[tuple[float, ...], ...]) -> Interval:
+def _returns(groups: tuple[tuple[float, ...], ...]) -> ReturnStatistics:
     """Kept, because who watches a study asks every second, and what is finished stays."""
     return summarise_groups(groups)
 

@@ -73,7 +73,7 @@ class ExampleFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class PlayedEpisodes:
     """The steps of one player's episodes.
 
     Attributes:
@@ -104,7 +104,7 @@ class Examples:
 
     env_id: str
     frames: dict[int, tuple[ExampleFrame, ...]]
-    played: tuple[Played, ...]
+    played: tuple[PlayedEpisodes, ...]
     size: tuple[int, int]
     notes: tuple[str, ...] = ()
 
@@ -115,7 +115,7 @@ class Examples:
         return tuple(dict.fromkeys((*self.notes, *played)))
 
 
-class _Place(NamedTuple):
+class _FramePlace(NamedTuple):
     """A step of what was played."""
 
     played: int
@@ -167,34 +167,34 @@ def example_frames(
     rule_set = shield.rule_set
     # Half the way is playing, half is drawing.
     total = 2 * episodes * len(players)
-    played: list[Played] = []
-    places: dict[int, list[_Place]] = {rule: [] for rule in rules}
+    played: list[PlayedEpisodes] = []
+    places: dict[int, list[_FramePlace]] = {rule: [] for rule in rules}
     for number, player in enumerate(players):
-        if played and all(len(found) >= each for found in places.values()):
+        if played and all(len(chosen) >= each for chosen in places.values()):
             break
 
-        def told(done: int, _: int, before: int = number * episodes) -> None:
+        def advance(done: int, _: int, before: int = number * episodes) -> None:
             report(progress, before + done, total)
 
-        played.append(_play(env_id, shield, player, episodes, seed, max_steps, told))
-        for rule, found in places.items():
-            if len(found) < each:
-                found += _spread(played[-1].steps, rule, rule_set, number, each - len(found))
+        played.append(_play(env_id, shield, player, episodes, seed, max_steps, advance))
+        for rule, chosen in places.items():
+            if len(chosen) < each:
+                chosen += _spread(played[-1].steps, rule, rule_set, number, each - len(chosen))
     report(progress, total // 2, total)
-    wanted = sorted({place for found in places.values() for place in found})
+    wanted = sorted({place for chosen in places.values() for place in chosen})
     pictures = _trimmed(_pictures(env_id, played, wanted, width, progress))
     files = _files(pictures)
     frames = {
         rule: tuple(
-            _frame(played[place.played], place, files[place]) for place in found if place in files
+            _frame(played[place.played], place, files[place]) for place in chosen if place in files
         )
-        for rule, found in places.items()
+        for rule, chosen in places.items()
     }
     report(progress, total, total)
     size = next(iter(pictures.values())).shape[1::-1] if pictures else (width, 0)
     return Examples(
         env_id=env_id,
-        frames={rule: found for rule, found in frames.items() if found},
+        frames={rule: drawn for rule, drawn in frames.items() if drawn},
         played=tuple(played),
         size=(int(size[0]), int(size[1])),
         notes=notes,
@@ -208,29 +208,29 @@ def _play(
     episodes: int,
     seed: int,
     max_steps: int | None,
-    told: Progress,
-) -> Played:
-    found = rollout(
+    progress: Progress,
+) -> PlayedEpisodes:
+    episodes_played = rollout(
         env_id,
         make_agent(player.agent, env_id, stochastic=player.stochastic, seed=seed),
         shield=shield if player.shielded else None,
         episodes=episodes,
         seed=seed,
         max_steps=max_steps,
-        progress=told,
+        progress=progress,
     )
-    steps = found.steps
+    steps = episodes_played.steps
     assert steps is not None
     if not player.shielded:
         rules = shield.rules_in_force(steps.observation)
         columns = {name: getattr(steps, name) for name in StepTable.__dataclass_fields__}
         steps = StepTable(**(columns | {"rules": rules}))
-    return Played(player, found.seeds, steps, found.remarks)
+    return PlayedEpisodes(player, episodes_played.seeds, steps, episodes_played.remarks)
 
 
 def _spread(
     steps: StepTable, rule: int, rule_set: RuleSet, played: int, count: int
-) -> list[_Place]:
+) -> list[_FramePlace]:
     """Some steps at which a rule was in force, of as many episodes as possible."""
     rows = np.flatnonzero(steps.rules[:, rule_set.rules[rule].dimension] == rule)
     if not len(rows) or not count:
@@ -239,36 +239,39 @@ def _spread(
     groups = np.split(rows, first[1:])
     # Each turn takes one step of every chosen episode; within an episode, from its middle out.
     chosen = np.linspace(0, len(groups) - 1, min(count, len(groups))).round().astype(np.int64)
-    found: list[int] = []
+    picked: list[int] = []
     turns = -(-count // len(chosen))
     for turn in range(turns):
         for group in (groups[index] for index in chosen):
-            if turn < len(group) and len(found) < count:
-                found.append(int(group[(2 * turn + 1) * len(group) // (2 * turns)]))
+            if turn < len(group) and len(picked) < count:
+                picked.append(int(group[(2 * turn + 1) * len(group) // (2 * turns)]))
     return [
-        _Place(played, int(steps.episode[row]), int(steps.step[row])) for row in sorted(set(found))
+        _FramePlace(played, int(steps.episode[row]), int(steps.step[row]))
+        for row in sorted(set(picked))
     ]
 
 
 def _pictures(
     env_id: str,
-    played: Sequence[Played],
-    wanted: Sequence[_Place],
+    played: Sequence[PlayedEpisodes],
+    wanted: Sequence[_FramePlace],
     width: int,
     progress: Progress | None,
-) -> dict[_Place, NDArray[np.uint8]]:
-    found: dict[_Place, NDArray[np.uint8]] = {}
+) -> dict[_FramePlace, NDArray[np.uint8]]:
+    pictures: dict[_FramePlace, NDArray[np.uint8]] = {}
     reels = sorted({(place.played, place.episode) for place in wanted})
     with no_display():
         for done, (number, episode) in enumerate(reels):
             report(progress, len(reels) + done, 2 * len(reels))
             one = played[number]
             steps = {place.step for place in wanted if place[:2] == (number, episode)}
-            shown = _draw(
+            drawn = _draw(
                 env_id, int(one.seeds[episode]), one.steps.of_episode(episode), steps, width
             )
-            found |= {_Place(number, episode, step): picture for step, picture in shown.items()}
-    return found
+            pictures |= {
+                _FramePlace(number, episode, step): picture for step, picture in drawn.items()
+            }
+    return pictures
 
 
 class _AstrayError(Exception):
@@ -328,7 +331,9 @@ def _smaller(picture: NDArray[np.uint8], width: int) -> NDArray[np.uint8]:
     return np.asarray(whole)
 
 
-def _trimmed(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, NDArray[np.uint8]]:
+def _trimmed(
+    pictures: dict[_FramePlace, NDArray[np.uint8]],
+) -> dict[_FramePlace, NDArray[np.uint8]]:
     """Without the rows at the top and at the bottom in which no picture ever shows anything."""
     if not pictures or len({picture.shape for picture in pictures.values()}) > 1:
         return pictures
@@ -347,24 +352,24 @@ def _trimmed(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, NDArray[
     return {place: picture[first:last] for place, picture in pictures.items()}
 
 
-def _files(pictures: dict[_Place, NDArray[np.uint8]]) -> dict[_Place, bytes]:
+def _files(pictures: dict[_FramePlace, NDArray[np.uint8]]) -> dict[_FramePlace, bytes]:
     """PNG files that share their colours."""
     from PIL import Image
 
     palette = Palette()
     indexes = {place: palette.indexes(pictures[place]) for place in sorted(pictures)}
     colours = palette.colours.tobytes()
-    found = {}
+    files = {}
     for place, picture in indexes.items():
         image = Image.fromarray(picture)
         image.putpalette(colours)
         file = io.BytesIO()
         image.save(file, format="PNG", optimize=True)
-        found[place] = file.getvalue()
-    return found
+        files[place] = file.getvalue()
+    return files
 
 
-def _frame(played: Played, place: _Place, picture: bytes) -> ExampleFrame:
+def _frame(played: PlayedEpisodes, place: _FramePlace, picture: bytes) -> ExampleFrame:
     steps = played.steps.of_episode(place.episode)
     return ExampleFrame(
         player=played.player.name,

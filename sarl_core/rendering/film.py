@@ -59,12 +59,12 @@ class Palette:
         padded = np.zeros((*picture.shape[:2], 4), dtype=np.uint8)
         padded[..., :3] = picture
         keys = padded.view("<u4")[..., 0]
-        found = self._index_of[keys]
-        unknown = found == _UNKNOWN
+        entries = self._index_of[keys]
+        unknown = entries == _UNKNOWN
         if unknown.any():
             self._learn(keys[unknown])
-            found = self._index_of[keys]
-        return np.asarray(found)
+            entries = self._index_of[keys]
+        return np.asarray(entries)
 
     def _add(self, colour: NDArray[np.int32]) -> None:
         self._colours[self._used] = colour
@@ -223,12 +223,12 @@ class Film:
         Returns:
             Shape (height, width), indexes into the palette; read-only.
         """
-        shown = self._shown
+        latest = self._shown
         begin, picture = number // _WHOLE_EVERY * _WHOLE_EVERY, None
-        if shown is not None and begin <= shown[0] <= number:
-            if shown[0] == number:
-                return shown[1]
-            begin, picture = shown[0] + 1, shown[1].copy()
+        if latest is not None and begin <= latest[0] <= number:
+            if latest[0] == number:
+                return latest[1]
+            begin, picture = latest[0] + 1, latest[1].copy()
         for patch in self._patches[begin : number + 1]:
             picture = self._patched(picture, patch)
         assert picture is not None

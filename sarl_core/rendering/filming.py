@@ -61,7 +61,7 @@ def film_episode(
     seed: int,
     film: Film,
     limit: int,
-    told: Callable[[int, int], None],
+    progress: Callable[[int, int], None],
 ) -> Episodes:
     """Play one episode, and film it.
 
@@ -72,7 +72,7 @@ def film_episode(
         seed: Of the episode.
         film: Gets a picture before each step, and one of the last state.
         limit: An episode that has not ended by then is cut off.
-        told: Called with (steps done, most steps); may raise to stop.
+        progress: Called with (steps done, most steps); may raise to stop.
 
     Returns:
         The one episode, with its steps.
@@ -85,7 +85,7 @@ def film_episode(
     def observer(view: View) -> None:
         film.add(picture_of(view.env, env_id))
         if view.step:
-            told(view.step, limit)
+            progress(view.step, limit)
 
     with no_display():
         episodes = run_seeds(
@@ -97,7 +97,7 @@ def film_episode(
             observer=observer,
             render_mode="rgb_array",
         )
-    told(limit, limit)
+    progress(limit, limit)
     return episodes
 
 

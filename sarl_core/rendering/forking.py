@@ -68,7 +68,7 @@ class Fork:
     rest: Rest
 
     @property
-    def kept(self) -> Episodes:
+    def unchanged(self) -> Episodes:
         """The episode with the change, the same as `rollout` plays it."""
         return self.replay.episodes[0]
 
@@ -86,7 +86,7 @@ class Fork:
     @property
     def difference(self) -> float:
         """What the return gains, or loses where it is negative, when the change is withheld."""
-        return float(self.withheld.returns[0] - self.kept.returns[0])
+        return float(self.withheld.returns[0] - self.unchanged.returns[0])
 
     @property
     def first_picture(self) -> int:
@@ -166,12 +166,12 @@ def fork(
     titles = (f"{actor.name}, change kept", f"{actor.name}, change withheld")
     for part, title in enumerate(titles):
 
-        def told(done: int, total: int, part: int = part) -> None:
+        def advance(done: int, total: int, part: int = part) -> None:
             report(progress, done + part * total, 2 * total)
 
         film = Film(palette)
         guard = shield if not part else _Withholding(shield, step, rest)
-        episode = film_episode(env_id, actor, guard, seed, film, limit, told)
+        episode = film_episode(env_id, actor, guard, seed, film, limit, advance)
         if not part:
             _check_step(episode, step, seed)
         assert episode.steps is not None

@@ -39,7 +39,7 @@ _MP4 = (
 )
 
 
-class Shown(NamedTuple):
+class TimedPicture(NamedTuple):
     """A picture of an animation.
 
     Attributes:
@@ -51,7 +51,7 @@ class Shown(NamedTuple):
     delay: int
 
 
-def schedule(count: int, fps: float) -> tuple[Shown, ...]:
+def schedule(count: int, fps: float) -> tuple[TimedPicture, ...]:
     """When to show which picture of a GIF, whose delays are hundredths of a second.
 
     Delays alternate where the rate does not divide 100 (30 a second: 3, 4, 3), so that the
@@ -74,18 +74,18 @@ def schedule(count: int, fps: float) -> tuple[Shown, ...]:
             else f"{fps} pictures a second cannot be shown; give a number above 0"
         )
     starts = [int(100 * number / fps + 0.5) for number in range(count + 1)]
-    kept = [0]
+    numbers = [0]
     for number in range(1, count):
-        if starts[number] - starts[kept[-1]] >= _LEAST_DELAY:
-            kept.append(number)
-    if len(kept) > 1 and starts[count] - starts[kept[-1]] < _LEAST_DELAY:
-        kept.pop()
-    ends = [starts[number] for number in kept[1:]] + [starts[count]]
-    delays = [end - starts[number] for number, end in zip(kept, ends, strict=True)]
-    kept[-1] = count - 1
+        if starts[number] - starts[numbers[-1]] >= _LEAST_DELAY:
+            numbers.append(number)
+    if len(numbers) > 1 and starts[count] - starts[numbers[-1]] < _LEAST_DELAY:
+        numbers.pop()
+    ends = [starts[number] for number in numbers[1:]] + [starts[count]]
+    delays = [end - starts[number] for number, end in zip(numbers, ends, strict=True)]
+    numbers[-1] = count - 1
     return tuple(
-        Shown(number, min(max(delay, _LEAST_DELAY), _LONGEST_DELAY))
-        for number, delay in zip(kept, delays, strict=True)
+        TimedPicture(number, min(max(delay, _LEAST_DELAY), _LONGEST_DELAY))
+        for number, delay in zip(numbers, delays, strict=True)
     )
 
 
@@ -113,16 +113,16 @@ def gif_bytes(
         InputError: If there is nothing to show.
         CancelledError: If `progress` returned False.
     """
-    shown = schedule(count, fps)
-    first = indexes(shown[0].number)
+    timed = schedule(count, fps)
+    first = indexes(timed[0].number)
     height, width = first.shape
     table = np.zeros((256, 3), dtype=np.uint8)
     table[: len(colours)] = colours
     out = io.BytesIO()
     out.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0xF7, 0, 0) + table.tobytes())
     out.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # again and again
-    before, waiting, delay = first, (first, 0, 0), shown[0].delay
-    for done, (number, next_delay) in enumerate(shown[1:], start=1):
+    before, waiting, delay = first, (first, 0, 0), timed[0].delay
+    for done, (number, next_delay) in enumerate(timed[1:], start=1):
         picture = indexes(number)
         change = _change(before, picture)
         if change is None and delay + next_delay <= _LONGEST_DELAY:
@@ -131,10 +131,10 @@ def gif_bytes(
             _write_picture(out, *waiting, delay)
             waiting, delay = change or (picture[:1, :1], 0, 0), next_delay
         before = picture
-        report(progress, done, len(shown))
+        report(progress, done, len(timed))
     _write_picture(out, *waiting, delay)
     out.write(b"\x3b")
-    report(progress, len(shown), len(shown))
+    report(progress, len(timed), len(timed))
     return out.getvalue()
 
 

@@ -258,11 +258,11 @@ def _replay(
     panels: list[Panel] = []
     for part, shield in enumerate(shields):
 
-        def told(done: int, total: int, part: int = part) -> None:
+        def advance(done: int, total: int, part: int = part) -> None:
             report(progress, done + part * total, total * len(shields))
 
         film = Film(palette)
-        episode = film_episode(env_id, actor, shield, seed, film, limit, told)
+        episode = film_episode(env_id, actor, shield, seed, film, limit, advance)
         assert episode.steps is not None
         episodes.append(episode)
         ending = (

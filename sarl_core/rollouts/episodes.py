@@ -26,7 +26,7 @@ from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import Observer, play
-from sarl_core.rollouts.statistics import Interval, Rate, rate_of, summarise
+from sarl_core.rollouts.statistics import Rate, ReturnStatistics, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class Episodes:
         return replace(self, **changed)
 
     @cached_property
-    def statistics(self) -> Interval:
+    def statistics(self) -> ReturnStatistics:
         """Mean, interquartile mean and its interval of the returns; worked out once."""
         return summarise(self.returns)
 
@@ -232,21 +232,21 @@ class Episodes:
 
     def _known(self) -> dict[str, float]:
         """What is not known of all episodes, where it is."""
-        found: dict[str, float] = {}
+        known: dict[str, float] = {}
         if self.cut.any():
-            found["cut"] = int(self.cut.sum())
+            known["cut"] = int(self.cut.sum())
         if not np.isnan(self.freedom).any():
-            found["freedom"] = float((self.freedom * self.lengths).sum() / self.lengths.sum())
+            known["freedom"] = float((self.freedom * self.lengths).sum() / self.lengths.sum())
         if not np.isnan(self.cost).any():
-            found["cost"] = float(self.cost.mean())
+            known["cost"] = float(self.cost.mean())
         if self.failures is not None:
-            found |= {
+            known |= {
                 "failures": self.failures.count,
                 "failure_rate": self.failures.rate,
                 "failure_low": self.failures.low,
                 "failure_high": self.failures.high,
             }
-        return found
+        return known
 
     def to_dict(self) -> dict[str, Any]:
         """The document that ``evaluate --json`` prints, ready for JSON."""

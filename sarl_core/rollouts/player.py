@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sarl_core.shielding.shield import Shield
 
 
-class Outcome(NamedTuple):
+class EpisodeArrays(NamedTuple):
     """Arrays of E finished episodes; the names are those of `Episodes`."""
 
     returns: NDArray[np.float64]
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
     invalid: NDArray[np.int64] | None
 
 
-class Choice(NamedTuple):
+class CheckedActions(NamedTuple):
     """What agent and shield made of B states; actions with one column a dimension."""
 
     proposed: Actions
@@ -92,7 +92,7 @@ def play(
     finished: Callable[[], None] | None = None,
     observer: Observer | None = None,
     render_mode: str | None = None,
-) -> Outcome:
+) -> EpisodeArrays:
     """Run one episode for each seed.
 
     Args:
@@ -113,7 +113,7 @@ def play(
     Raises:
         InputError: If the environment cannot be used, or the shield is not for it.
     """
-    run = _Run(env_id, agent, shield, seeds, max_steps, keep_steps, observer, render_mode)
+    run = _Lanes(env_id, agent, shield, seeds, max_steps, keep_steps, observer, render_mode)
     try:
         for _ in range(min(batch, len(seeds))):
             run.start()
@@ -127,7 +127,7 @@ def play(
     return run.outcome()
 
 
-class _Run:
+class _Lanes:
     """The state of `play`: lanes that step together, and what they have brought so far."""
 
     def __init__(
@@ -261,14 +261,14 @@ class _Run:
             self.start()
         return len(ended)
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> EpisodeArrays:
         """What the episodes brought."""
         steps = None
         if self.keep_steps:
             columns = [np.concatenate(column) for column in zip(*self.chunks, strict=True)]
             order = np.lexsort((columns[1], columns[0]))
             steps = StepTable(*(column[order] for column in columns))
-        return Outcome(
+        return EpisodeArrays(
             self.returns,
             self.lengths,
             self.interventions,
@@ -294,7 +294,7 @@ def choose(
     adapter: SpaceAdapter,
     states: NDArray[np.float32],
     generators: list[np.random.Generator],
-) -> Choice:
+) -> CheckedActions:
     """Let the agent propose and the shield decide.
 
     Args:
@@ -317,12 +317,14 @@ def choose(
         none = np.full(proposed.shape, -1, dtype=np.int64)
         never = np.zeros(len(states), dtype=np.bool_)
         valid = np.full(len(states), None, dtype=np.object_)
-        return Choice(proposed, proposed, none, never, np.full(len(states), np.inf), never, valid)
+        return CheckedActions(
+            proposed, proposed, none, never, np.full(len(states), np.inf), never, valid
+        )
     decision = shield.decide_batch(states, adapter.shaped(proposed))
     executed: Any = decision.executed
     if executed.dtype != proposed.dtype:  # what is executed is a number of the agents' kind, too
         executed = np.array(executed.tolist(), dtype=proposed.dtype)
-    return Choice(
+    return CheckedActions(
         proposed,
         adapter.columns(executed),
         decision.rules,

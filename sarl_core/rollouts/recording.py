@@ -15,7 +15,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.player import Outcome, play
+from sarl_core.rollouts.player import EpisodeArrays, play
 from sarl_core.rollouts.seeds import DEMONSTRATED
 from sarl_core.rollouts.steps import concatenate
 
@@ -62,7 +62,7 @@ def record(
         name, value, least = ("steps", steps, 1) if steps < 1 else ("seed", seed, 0)
         raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
-    outcomes: list[Outcome] = []
+    outcomes: list[EpisodeArrays] = []
     episodes = done = 0
     report(progress, 0, steps)
     while done < steps:
@@ -80,7 +80,7 @@ def record(
 
 
 def _demonstrations(
-    env_id: str, agent: str, seed: int, outcomes: list[Outcome], steps: int
+    env_id: str, agent: str, seed: int, outcomes: list[EpisodeArrays], steps: int
 ) -> Demonstrations:
     description = describe_environment(env_id)
 

@@ -115,7 +115,7 @@ def without_rule(shield: Shield, index: int) -> Shield:
 
 def _decides_otherwise(episodes: Episodes, shield: Shield, index: int) -> NDArray[np.bool_]:
     """In which episodes other actions would be executed without a rule, (E,) bool."""
-    found = np.zeros(len(episodes), dtype=np.bool_)
+    otherwise = np.zeros(len(episodes), dtype=np.bool_)
     steps = episodes.steps
     assert steps is not None
     rows = np.flatnonzero((steps.rules == index).any(axis=1))
@@ -123,5 +123,5 @@ def _decides_otherwise(episodes: Episodes, shield: Shield, index: int) -> NDArra
         others = without_rule(shield, index)
         decided = others.decide_batch(steps.observation[rows], steps.proposed[rows])
         other = decided.executed.reshape(len(rows), -1) != steps.executed[rows]
-        found[steps.episode[rows[other.any(axis=1)]]] = True
-    return found
+        otherwise[steps.episode[rows[other.any(axis=1)]]] = True
+    return otherwise

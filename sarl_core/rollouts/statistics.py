@@ -17,7 +17,7 @@ _CUT = 0.25  # the share of the values left out at either end
 
 
 @dataclass(frozen=True)
-class Interval:
+class ReturnStatistics:
     """Statistics of one number per episode.
 
     Attributes:
@@ -135,7 +135,7 @@ def interquartile_mean(values: ArrayLike, axis: int = -1) -> NDArray[np.float64]
     return np.asarray(trim_mean(np.asarray(values, dtype=np.float64), _CUT, axis=axis))
 
 
-def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
+def summarise(values: ArrayLike, *, seed: int = 0) -> ReturnStatistics:
     """Mean, deviation and interquartile mean with its 95 % percentile bootstrap interval.
 
     The percentile method, because it is defined for every sample: the corrected ones divide
@@ -160,9 +160,9 @@ def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
         )
     if (array == array[0]).all():
         value = float(array[0])
-        return Interval(mean=value, std=0.0, iqm=value, low=value, high=value)
+        return ReturnStatistics(mean=value, std=0.0, iqm=value, low=value, high=value)
     low, high = _bootstrap(array, seed)
-    return Interval(
+    return ReturnStatistics(
         mean=float(array.mean()),
         std=float(array.std(ddof=1)),
         iqm=float(interquartile_mean(array)),
@@ -171,7 +171,7 @@ def summarise(values: ArrayLike, *, seed: int = 0) -> Interval:
     )
 
 
-def summarise_groups(groups: Sequence[ArrayLike], *, seed: int = 0) -> Interval:
+def summarise_groups(groups: Sequence[ArrayLike], *, seed: int = 0) -> ReturnStatistics:
     """Mean, deviation and interquartile mean where episodes are of several learners.
 
     Episodes of one learner are alike. So the interval comes from drawing learners with
@@ -196,20 +196,20 @@ def summarise_groups(groups: Sequence[ArrayLike], *, seed: int = 0) -> Interval:
     learners, episodes = values.shape
     rng = np.random.default_rng(seed)
     at_once = max(1, _NUMBERS_AT_ONCE // values.size)
-    found = []
+    means = []
     for start in range(0, _RESAMPLES, at_once):
         count = min(at_once, _RESAMPLES - start)
         drawn = rng.integers(learners, size=(count, learners, 1))
         of_each = rng.integers(episodes, size=(count, learners, episodes))
-        found.append(interquartile_mean(values[drawn, of_each].reshape(count, -1), axis=1))
-    low, high = np.quantile(np.concatenate(found), [0.025, 0.975])
+        means.append(interquartile_mean(values[drawn, of_each].reshape(count, -1), axis=1))
+    low, high = np.quantile(np.concatenate(means), [0.025, 0.975])
     return replace(whole, low=float(low), high=float(high))
 
 
 def _bootstrap(array: NDArray[np.float64], seed: int) -> tuple[float, float]:
     from scipy.stats import bootstrap
 
-    found: Any = bootstrap(
+    drawn: Any = bootstrap(
         (array,),
         interquartile_mean,
         n_resamples=_RESAMPLES,
@@ -217,4 +217,4 @@ def _bootstrap(array: NDArray[np.float64], seed: int) -> tuple[float, float]:
         batch=max(1, _NUMBERS_AT_ONCE // len(array)),
         rng=np.random.default_rng(seed),
     )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+    return float(drawn.confidence_interval.low), float(drawn.confidence_interval.high)

@@ -63,12 +63,12 @@ class StepTable:
 
     def __repr__(self) -> str:
         """Shapes, as `StepTable(episode=int64[100], ...)`."""
-        shown = [
+        columns = [
             f"{column.name}={value.dtype}{list(value.shape)}"
             for column in fields(self)
             for value in [getattr(self, column.name)]
         ]
-        return f"StepTable({', '.join(shown)})"
+        return f"StepTable({', '.join(columns)})"
 
     @property
     def covered(self) -> NDArray[np.bool_]:

@@ -94,7 +94,7 @@ class TaskPiece(NamedTuple):
     result: Episodes | SarlError
 
 
-class _Place(NamedTuple):
+class _PiecePlace(NamedTuple):
     """Which episodes of which task a piece is."""
 
     task: int
@@ -173,7 +173,7 @@ def _run_here(tasks: Sequence[Task]) -> Iterator[TaskPiece]:
 
 def _calls(
     progress: Sequence[_Progress],
-) -> Iterator[tuple[_Place, Callable[..., tuple[Episodes, float]], tuple[Any, ...]]]:
+) -> Iterator[tuple[_PiecePlace, Callable[..., tuple[Episodes, float]], tuple[Any, ...]]]:
     """Pieces to run, each cut off when there is room for it."""
     pack_once = cache(pack)  # tasks that have the same shield share what is sent of it
     for index, state in enumerate(progress):
@@ -182,14 +182,14 @@ def _calls(
         if task.shield is not None:
             shield = PackedShield(pack_once(task.shield), task.without)
         while not state.failed and state.submitted < len(state.seeds):
-            place = _Place(index, state.submitted)
+            place = _PiecePlace(index, state.submitted)
             seeds, keep_steps = state.next_seeds(), task.keep_steps
             arguments = (task.env_id, task.agent, shield, seeds, keep_steps, task.max_steps)
             yield place, _work, arguments
 
 
 def _handed_over(
-    place: _Place, outcome: tuple[Episodes, float] | SarlError, state: _Progress
+    place: _PiecePlace, outcome: tuple[Episodes, float] | SarlError, state: _Progress
 ) -> Iterator[TaskPiece]:
     """What can be handed over when a piece is finished."""
     if isinstance(outcome, SarlError):

@@ -110,9 +110,9 @@ def deciding(ground: Ground, rule_set: RuleSet | None = None) -> Deciding:
             rows = np.flatnonzero(rule_set.rules[index].applies(ground.states))
             _fill(*columns, rows, np.full(len(rows), index))
         if ground.in_trees[dimension]:
-            found = target[ground.mined[:, dimension]]  # -1 takes the last, which is no rule
-            rows = np.flatnonzero(found >= 0)
-            _fill(*columns, rows, found[rows])
+            mined = target[ground.mined[:, dimension]]  # -1 takes the last, which is no rule
+            rows = np.flatnonzero(mined >= 0)
+            _fill(*columns, rows, mined[rows])
     return Deciding(first, second)
 
 

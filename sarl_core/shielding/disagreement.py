@@ -136,7 +136,7 @@ def disagreement(
         raise ValueError("the two rule sets were walked with different states")
     rule_sets = [ground.rule_set for ground in grounds]
     rules = [deciding(ground).first for ground in grounds]
-    labels = [labels_at(ruled, found) for ruled, found in zip(rule_sets, rules, strict=True)]
+    labels = [labels_at(ruled, in_force) for ruled, in_force in zip(rule_sets, rules, strict=True)]
     return Disagreement(
         rule_sets[0],
         rule_sets[1],
@@ -186,11 +186,11 @@ def sampled_states(
             for feature, _, threshold in rule.conditions:
                 low[feature] = min(low[feature], threshold)
                 high[feature] = max(high[feature], threshold)
-    asked = np.isfinite(low)
-    low, high = np.where(asked, low, 0.0), np.where(asked, high, 0.0)
+    bounded = np.isfinite(low)
+    low, high = np.where(bounded, low, 0.0), np.where(bounded, high, 0.0)
     # Around a single threshold as much room as it is far from 0, or 1 where it is 0.
     alone = np.where(low == 0.0, 1.0, np.abs(low))
-    margin = np.where(asked, np.where(high > low, _MARGIN * (high - low), alone), 0.0)
+    margin = np.where(bounded, np.where(high > low, _MARGIN * (high - low), alone), 0.0)
     largest = float(np.finfo(np.float32).max)
     low, high = np.clip(low - margin, -largest, largest), np.clip(high + margin, -largest, largest)
     drawn = np.random.default_rng(seed).random((count, width))

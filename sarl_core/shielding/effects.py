@@ -116,7 +116,7 @@ def _conflicts(
         inverse = inverse.reshape(-1)
         right = _counts(inverse[labels[rows, dimensions] == did], len(unique)).tolist()
         other_right = _counts(inverse[behind[rows, dimensions] == did], len(unique)).tolist()
-    found = [
+    conflicts = [
         Conflict(
             rule,
             other,
@@ -127,10 +127,10 @@ def _conflicts(
         )
         for at, (rule, other) in enumerate(unique.tolist())
     ]
-    return tuple(sorted(found, key=lambda conflict: -conflict.states))
+    return tuple(sorted(conflicts, key=lambda conflict: -conflict.states))
 
 
-class Change(NamedTuple):
+class EditEffect(NamedTuple):
     """What differs between two verdicts on the same B states.
 
     Attributes:
@@ -148,7 +148,7 @@ class Change(NamedTuple):
     newly_uncovered: int
 
 
-def change(before: Verdicts, after: Verdicts) -> Change:
+def change(before: Verdicts, after: Verdicts) -> EditEffect:
     """Compare two verdicts on the same states.
 
     Args:
@@ -159,7 +159,7 @@ def change(before: Verdicts, after: Verdicts) -> Change:
         Counts of states.
     """
     differs = before.labels != after.labels
-    return Change(
+    return EditEffect(
         len(differs),
         int(differs.any(axis=1).sum()),
         tuple(differs.sum(axis=0).tolist()),

@@ -23,7 +23,7 @@ _LARGEST = np.finfo(np.float32).max
 _DOWN, _UP = np.float32(-np.inf), np.float32(np.inf)
 
 
-class Change(NamedTuple):
+class FeatureChange(NamedTuple):
     """One feature moved as little as possible.
 
     Attributes:
@@ -53,13 +53,13 @@ class NearMiss(NamedTuple):
     """
 
     rule: int
-    changes: tuple[Change, ...]
+    changes: tuple[FeatureChange, ...]
     distance: float
     in_force: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class FeatureLine:
     """What the shield does along one feature, all others as they are.
 
     Attributes:
@@ -86,7 +86,7 @@ class DecisionChange(NamedTuple):
         distance: The change in units of the feature's spread.
     """
 
-    change: Change
+    change: FeatureChange
     executed: NDArray[Any]
     rules: NDArray[np.int64]
     distance: float
@@ -149,21 +149,21 @@ class Neighbourhood:
         nearest = np.argsort(distances, kind="stable")[:most]
         rows, distances = rows[nearest], distances[nearest]
         # The same states that the rules ask for, and not the rules' word for it.
-        found = self.shield.rules_in_force(wanted[rows])
+        in_force = self.shield.rules_in_force(wanted[rows])
         return tuple(
             NearMiss(
                 rule=int(self._index[row]),
                 changes=tuple(
-                    Change(feature, float(here[feature]), float(wanted[row, feature]))
+                    FeatureChange(feature, float(here[feature]), float(wanted[row, feature]))
                     for feature in np.flatnonzero(differs[row]).tolist()
                 ),
                 distance=float(distance),
                 in_force=bool((at == self._index[row]).any()),
             )
-            for row, distance, at in zip(rows.tolist(), distances.tolist(), found, strict=True)
+            for row, distance, at in zip(rows.tolist(), distances.tolist(), in_force, strict=True)
         )
 
-    def lines(self, state: ArrayLike, action: Any) -> tuple[Line, ...]:
+    def lines(self, state: ArrayLike, action: Any) -> tuple[FeatureLine, ...]:
         """What the shield would do along each feature.
 
         Args:
@@ -183,23 +183,23 @@ class Neighbourhood:
         for feature in range(len(here)):
             # Rules whose other conditions hold; no other can apply anywhere along the line.
             rows = np.flatnonzero(count == broken[:, feature])
-            found = _starts(
+            edges = _starts(
                 self._first[rows, feature],
                 after(self._last[rows, feature]),
                 self._begin[rows, feature],
                 self._beyond[rows, feature],
             )
-            at = np.repeat(here[None], len(found), axis=0)
-            at[:, feature] = found
+            at = np.repeat(here[None], len(edges), axis=0)
+            at[:, feature] = edges
             # Before the first start: any value below it, so the one just below.
-            below = np.nextafter(found[1], _DOWN) if len(found) > 1 else here[feature]
+            below = np.nextafter(edges[1], _DOWN) if len(edges) > 1 else here[feature]
             at[0, feature] = max(below, -_LARGEST)  # below that there is no state
-            starts.append(found)
+            starts.append(edges)
             states.append(at)
         decided = self._decide(np.concatenate(states), action)
         ends = np.cumsum([len(part) for part in starts])
         return tuple(
-            Line(
+            FeatureLine(
                 feature=feature,
                 starts=part,
                 decisions=BatchDecision(
@@ -226,7 +226,7 @@ class Neighbourhood:
 
 
 def decision_changes(
-    line: Line, value: float, spread: float
+    line: FeatureLine, value: float, spread: float
 ) -> tuple[DecisionChange | None, DecisionChange | None]:
     """The least change downwards and upwards that makes the shield execute another action.
 
@@ -244,7 +244,7 @@ def decision_changes(
 
     def change(stretch: int, after: float) -> DecisionChange:
         return DecisionChange(
-            Change(line.feature, float(np.float32(value)), after),
+            FeatureChange(line.feature, float(np.float32(value)), after),
             executed[stretch],
             line.decisions.rules[stretch],
             abs(after - float(np.float32(value))) / spread,
@@ -308,6 +308,6 @@ def _float32(values: NDArray[Any]) -> States:
 
 def _starts(*edges: States) -> States:
     """Where something may change, ascending, with -inf at the front."""
-    found = np.unique(np.concatenate(edges))
-    found = found[np.isfinite(found)]
-    return np.concatenate([np.array([_DOWN], dtype=np.float32), found])
+    starts = np.unique(np.concatenate(edges))
+    starts = starts[np.isfinite(starts)]
+    return np.concatenate([np.array([_DOWN], dtype=np.float32), starts])

@@ -142,14 +142,14 @@ def read_layers(text: str) -> tuple[list[Layer], str]:
     Returns:
         The outermost first, and the environment's id; "" where that is not told.
     """
-    found = _WRAPPED.fullmatch(text)
-    if found is None:
+    match = _WRAPPED.fullmatch(text)
+    if match is None:
         return [], ""
-    *names, _ = found[1].split("<")[1:] or [""]
+    *names, _ = match[1].split("<")[1:] or [""]
     loaded = list(_descendants(gymnasium.Wrapper))
     return [
         Layer(name, tuple(one for one in loaded if one.__name__ == name)) for name in names
-    ], found[2]
+    ], match[2]
 
 
 def _layers(env: Any) -> Iterator[Layer]:

@@ -34,23 +34,23 @@ def random_state(
     generator = np.random.default_rng(seed)
     order = generator.permutation(len(observations))
     for start in range(0, len(order), _AT_ONCE):
-        found = _first(shield, observations[order[start : start + _AT_ONCE]], covered=covered)
-        if found is not None:
-            return found
+        state = _first(shield, observations[order[start : start + _AT_ONCE]], covered=covered)
+        if state is not None:
+            return state
     for _ in range(0, _MIXED, _AT_ONCE):
         rows = generator.integers(0, len(observations), (_AT_ONCE, observations.shape[1]))
         mixed = np.take_along_axis(observations, rows, axis=0)
-        found = _first(shield, mixed, covered=covered)
-        if found is not None:
-            return found
+        state = _first(shield, mixed, covered=covered)
+        if state is not None:
+            return state
     return None
 
 
 def _first(
     shield: Shield, states: NDArray[np.float32], *, covered: bool
 ) -> NDArray[np.float32] | None:
-    found = np.flatnonzero((shield.rules_in_force(states) >= 0).all(axis=1) == covered)
-    return states[found[0]].copy() if len(found) else None
+    rows = np.flatnonzero((shield.rules_in_force(states) >= 0).all(axis=1) == covered)
+    return states[rows[0]].copy() if len(rows) else None
 
 
 class Span(NamedTuple):

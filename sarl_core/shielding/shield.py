@@ -301,13 +301,13 @@ class Shield:
         """Decide m action dimensions, each of them valid."""
         executed = None
         outside = False
-        found: list[int | None] = []
+        rules: list[int | None] = []
         nearest = float("inf")
         numbers = values.tolist()
         for dimension, matcher in enumerate(self._matchers):
             rule, margin = matcher.match(state)
             nearest = min(nearest, margin)
-            found.append(rule)
+            rules.append(rule)
             if rule is None:
                 continue
             value = numbers[dimension]
@@ -325,11 +325,11 @@ class Shield:
                     else self._replace.one(rule, value)
                 )
         if executed is None:
-            return Decision(handed, action, tuple(found), False, nearest, outside)
+            return Decision(handed, action, tuple(rules), False, nearest, outside)
         changed = executed.reshape(np.shape(handed))
         if not isinstance(handed, np.ndarray):
             changed = changed[()]
-        return Decision(changed, action, tuple(found), True, nearest, outside)
+        return Decision(changed, action, tuple(rules), True, nearest, outside)
 
     def decide_batch(self, observations: ArrayLike, actions: ArrayLike) -> BatchDecision:
         """Check many actions at once, each exactly as `decide` would.
@@ -371,9 +371,9 @@ class Shield:
         margin = np.full(len(states), np.nan)
         executed = values.copy()
         intervened, outside = np.zeros((2, len(states)), dtype=np.bool_)
-        found = self._decide_rows(np.ascontiguousarray(states[valid]), values[valid])
+        decided = self._decide_rows(np.ascontiguousarray(states[valid]), values[valid])
         columns = (executed, rules, intervened, margin, outside)
-        for column, part in zip(columns, found, strict=True):
+        for column, part in zip(columns, decided, strict=True):
             column[valid] = part
         return BatchDecision(
             _passed(executed.reshape(len(states), *shape), proposed, sorted(unread)),

@@ -135,12 +135,12 @@ def _observed(venv: VecEnv) -> Observed:
         texts = dict.fromkeys(venv.env_method("__str__"))
     except (AttributeError, NotImplementedError):
         texts = {"": None}
-    found = []
+    environments = []
     for text in texts:
         inner, env_id = read_layers(text)
-        found.append(behind([*layers, *inner], env_id))
+        environments.append(behind([*layers, *inner], env_id))
     # One of them without names is enough: the shield has one order for all.
-    return min(found, key=lambda one: one.env_id)
+    return min(environments, key=lambda one: one.env_id)
 
 
 def _row(observations: Any, i: int) -> Any:

@@ -179,14 +179,14 @@ def fitted(
     names = catalogued(
         seen.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
     )
-    found = fitted_rules(
+    ordered = fitted_rules(
         rule_set,
         Named(seen.whose, tuple(name for name, _ in names.features), seen.env_id),
         names.actions,
     )
-    if found.rule_set is not rule_set:
-        shield = shield.with_rules(found.rule_set)
-    return FittedShield(shield.for_space(action_space), found.notes)
+    if ordered.rule_set is not rule_set:
+        shield = shield.with_rules(ordered.rule_set)
+    return FittedShield(shield.for_space(action_space), ordered.notes)
 
 
 def check_fit(

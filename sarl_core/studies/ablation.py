@@ -114,8 +114,8 @@ class Ablation:
         cut = int((self.cut & self.use.matters[list(self.rules)]).sum())
         if not cut:
             return self.base.remarks
-        told = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
-        return (*self.base.remarks, told)
+        said = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
+        return (*self.base.remarks, said)
 
     @property
     def unused(self) -> tuple[int, ...]:
@@ -239,5 +239,5 @@ def rules_to_take_out(use: RuleUse, most: int) -> tuple[tuple[int, ...], tuple[i
     """
     changed, matched = use.changed.sum(axis=1), use.matched.sum(axis=1)
     order = np.lexsort((np.arange(len(changed)), -matched, -changed))
-    found = [int(index) for index in order if use.matters[index].any()]
-    return tuple(found[:most]), tuple(found[most:])
+    mattering = [int(index) for index in order if use.matters[index].any()]
+    return tuple(mattering[:most]), tuple(mattering[most:])

@@ -39,7 +39,7 @@ class _Outcome(NamedTuple):
     cut: bool
 
 
-class Step(NamedTuple):
+class AblationProgress(NamedTuple):
     """How far an ablation is.
 
     Attributes:
@@ -103,7 +103,9 @@ class AblationRecord:
         self._without: dict[int, dict[int, _Outcome]] = {}
         self._latest: tuple[tuple[int, int, int], Ablation] | None = None
 
-    def run(self, episodes: int, most: int, runner: Runner) -> Generator[Step, None, None]:
+    def run(
+        self, episodes: int, most: int, runner: Runner
+    ) -> Generator[AblationProgress, None, None]:
         """Run what is not known yet. Who stops iterating keeps what is finished.
 
         Args:
@@ -124,7 +126,7 @@ class AblationRecord:
         chosen, _ = rules_to_take_out(use, most)
         matters = {rule: np.flatnonzero(use.matters[rule]).tolist() for rule in chosen}
         total = episodes + sum(map(len, matters.values()))
-        yield Step(total - self._open(matters), total, "Taking rules out …")
+        yield AblationProgress(total - self._open(matters), total, "Taking rules out …")
         for first in range(0, len(chosen), _TOGETHER):
             # What another caller has found meanwhile is not run again.
             missing = self._missing({rule: matters[rule] for rule in chosen[first:][:_TOGETHER]})
@@ -136,7 +138,7 @@ class AblationRecord:
                 self._keep(rule, piece.result)
                 place = chosen.index(rule) + 1
                 done = total - self._open(matters)
-                yield Step(done, total, f"Without rule {place} of {len(chosen)} …")
+                yield AblationProgress(done, total, f"Without rule {place} of {len(chosen)} …")
 
     def _missing(self, matters: Mapping[int, Sequence[int]]) -> dict[int, tuple[int, ...]]:
         """The episodes that are to be run without each rule, where there are any."""
@@ -163,9 +165,9 @@ class AblationRecord:
             max_steps=self.max_steps,
         )
 
-    def _run_base(self, episodes: int, runner: Runner) -> Generator[Step, None, None]:
+    def _run_base(self, episodes: int, runner: Runner) -> Generator[AblationProgress, None, None]:
         have = len(self._base) if self._base is not None else 0
-        yield Step(min(have, episodes), episodes, "With all rules …")
+        yield AblationProgress(min(have, episodes), episodes, "With all rules …")
         if have >= episodes:
             return
         task = Task(
@@ -181,7 +183,7 @@ class AblationRecord:
             assert isinstance(piece.result, Episodes)
             self._extend(piece.result)
             have += len(piece.result)
-            yield Step(have, episodes, f"With all rules: {have} of {episodes} episodes")
+            yield AblationProgress(have, episodes, f"With all rules: {have} of {episodes} episodes")
 
     def _extend(self, fresh: Episodes) -> None:
         """Take in more episodes under all rules; another caller may have done so already."""
@@ -204,13 +206,13 @@ class AblationRecord:
         with self._lock:
             return dict(self._without.get(rule, {}))
 
-    def _keep(self, rule: int, found: Episodes) -> None:
-        places = (found.seeds - self.seed).tolist()
+    def _keep(self, rule: int, episodes: Episodes) -> None:
+        places = (episodes.seeds - self.seed).tolist()
         outcomes = map(
             _Outcome,
-            found.returns.tolist(),
-            found.failed.tolist(),
-            found.cut.tolist(),
+            episodes.returns.tolist(),
+            episodes.failed.tolist(),
+            episodes.cut.tolist(),
         )
         with self._lock:
             self._without.setdefault(rule, {}).update(zip(places, outcomes, strict=True))
@@ -248,7 +250,7 @@ class AblationRecord:
                 for place in places:
                     returns[-1][place], failed[-1][place], cut[-1][place] = known[place]
             shape = (len(finished), episodes)
-            found = Ablation(
+            ablation = Ablation(
                 shield=self.shield,
                 base=base,
                 use=use,
@@ -259,8 +261,8 @@ class AblationRecord:
                 left_out=(*(rule for rule in chosen if rule not in finished), *rest),
                 played=played,
             )
-            self._latest = key, found
-            return found
+            self._latest = key, ablation
+            return ablation
 
 
 def ablate(
@@ -316,9 +318,9 @@ def ablate(
     runner = partial(run_tasks, executor=executor_of(jobs, executor))
     for done, total, _ in record.run(episodes, most, runner):
         report(progress, done, total)
-    found = record.result(episodes, most)
-    assert found is not None
-    return found
+    ablation = record.result(episodes, most)
+    assert ablation is not None
+    return ablation
 
 
 def _pieces(pieces: Iterator[TaskPiece]) -> Iterator[TaskPiece]:

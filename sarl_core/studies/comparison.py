@@ -136,13 +136,13 @@ def compare(
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"two of the compared arms are called {twice!r}; give each its own name")
     total = len(arms) * episodes
-    found = []
+    compared = []
     for index, arm in enumerate(arms):
 
-        def told(done: int, _: int, before: int = index * episodes) -> None:
+        def advance(done: int, _: int, before: int = index * episodes) -> None:
             report(progress, before + done, total)
 
-        found.append(
+        compared.append(
             compare_arm(
                 env_id,
                 arm,
@@ -150,10 +150,10 @@ def compare(
                 seed=seed,
                 jobs=jobs,
                 executor=executor,
-                progress=told,
+                progress=advance,
             )
         )
-    return Comparison(env_id, seed, tuple(arms), tuple(found))
+    return Comparison(env_id, seed, tuple(arms), tuple(compared))
 
 
 def compare_arm(
@@ -234,7 +234,7 @@ def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) 
         `return_difference`, `difference_low`, `difference_high`, `return_p`, `failure_p` and
         `effect`, None where the episodes without a shield are not given.
     """
-    found = None if alone is None else shield_effect(alone, episodes)
+    effect = None if alone is None else shield_effect(alone, episodes)
     row: dict[str, Any] = {
         "arm": arm.name,
         "agent": episodes.agent,
@@ -247,12 +247,12 @@ def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) 
         row["crash_rate"] = None
     if arm.rules is None:
         row |= {"intervention_rate": None, "coverage": None, "outside_rate": None}
-    known = found is not None and found.failures is not None
+    known = effect is not None and effect.failures is not None
     return row | {
-        "return_difference": None if found is None else found.returns.mean,
-        "difference_low": None if found is None else found.returns.low,
-        "difference_high": None if found is None else found.returns.high,
-        "return_p": None if found is None else found.return_p,
-        "failure_p": found.failure_p if found is not None and known else None,
-        "effect": None if found is None else found.effect,
+        "return_difference": None if effect is None else effect.returns.mean,
+        "difference_low": None if effect is None else effect.returns.low,
+        "difference_high": None if effect is None else effect.returns.high,
+        "return_p": None if effect is None else effect.return_p,
+        "failure_p": effect.failure_p if effect is not None and known else None,
+        "effect": None if effect is None else effect.effect,
     }

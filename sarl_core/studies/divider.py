@@ -169,7 +169,7 @@ def study_divider(
 
     def run(actor: Agent) -> Episodes:
         nonlocal done
-        found = rollout(
+        played = rollout(
             env_id,
             actor,
             episodes=episodes,
@@ -180,7 +180,7 @@ def study_divider(
             progress=lambda now, _: report(progress, done + now, total),
         )
         done += episodes
-        return found
+        return played
 
     unchanged = run(expert)
     known = {(each.divided[0].divider, each.snapping): run(each) for each in variants}

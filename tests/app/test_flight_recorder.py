@@ -128,7 +128,7 @@ def test_the_change_of_a_step_is_withheld(wanted: Episodes) -> None:
     assert not errors(app)
     found = fork("CartPole-v1", "novice", shield(), step=step, rest="alone", seed=SEED)
     shown = metrics(app)
-    assert shown["Return with it"] == f"{found.kept.returns[0]:,.1f}"
+    assert shown["Return with it"] == f"{found.unchanged.returns[0]:,.1f}"
     assert shown["Return without it"] == f"{found.withheld.returns[0]:,.1f}"
     assert shown["Return with it"] == shown["Return with rules"]
     assert "Without it the return is" in texts(app)

@@ -27,7 +27,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.evidence import DataBox
-from sarl_core.shielding.near import Change, Neighbourhood
+from sarl_core.shielding.near import FeatureChange, Neighbourhood
 from sarl_core.shielding.shield import Shield
 
 FEATURES = (Feature("pole angle", "rad"), Feature("left leg contact", ""), Feature("speed <b>", ""))
@@ -72,11 +72,11 @@ def test_where_a_state_leaves_the_data_is_said():
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (Change(0, 0.155, 0.125), "pole angle were 0.03 rad less"),
-        (Change(0, 0.0, 0.5), "pole angle were 0.5 rad more"),
-        (Change(1, 0.0, 0.50000006), "there were left leg contact"),
-        (Change(1, 1.0, 0.5), "there were no left leg contact"),
-        (Change(2, 0.0, 2.0), "speed <b> were 2 more"),
+        (FeatureChange(0, 0.155, 0.125), "pole angle were 0.03 rad less"),
+        (FeatureChange(0, 0.0, 0.5), "pole angle were 0.5 rad more"),
+        (FeatureChange(1, 0.0, 0.50000006), "there were left leg contact"),
+        (FeatureChange(1, 1.0, 0.5), "there were no left leg contact"),
+        (FeatureChange(2, 0.0, 2.0), "speed <b> were 2 more"),
     ],
 )
 def test_a_change_in_words(change, text):
@@ -84,7 +84,7 @@ def test_a_change_in_words(change, text):
 
 
 def test_a_near_miss_in_words():
-    changes = (Change(0, 0.0, -0.25), Change(1, 0.0, 0.50000006))
+    changes = (FeatureChange(0, 0.0, -0.25), FeatureChange(1, 0.0, 0.50000006))
     assert near_miss_text(changes, FEATURES) == (
         "pole angle were 0.25 rad less and there were left leg contact"
     )

@@ -50,7 +50,7 @@ def test_a_fork_is_the_original_and_the_same_until_it_parts(name: str, rest: Res
     before = original(env_id, shield, 100_003)
     step = int(np.flatnonzero(before.intervened)[5])
     found = fork(env_id, "novice", shield, step=step, rest=rest, seed=100_003)
-    kept, withheld = found.kept.steps, found.withheld.steps
+    kept, withheld = found.unchanged.steps, found.withheld.steps
     assert kept is not None
     assert withheld is not None
     assert same(kept, before, len(before))
@@ -74,7 +74,7 @@ def test_a_fork_is_the_original_and_the_same_until_it_parts(name: str, rest: Res
         decided = shield.decide_batch(withheld.observation[after], withheld.proposed[after])
         assert (decided.executed.reshape(-1) == withheld.executed[after].reshape(-1)).all()
         assert (decided.rules == withheld.rules[after]).all()
-    assert found.difference == found.withheld.returns[0] - found.kept.returns[0]
+    assert found.difference == found.withheld.returns[0] - found.unchanged.returns[0]
 
 
 def test_the_branch_without_is_what_the_environment_does_with_those_actions(cart: Shield) -> None:

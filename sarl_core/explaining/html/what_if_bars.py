@@ -15,7 +15,7 @@ from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.near import Line
+from sarl_core.shielding.near import FeatureLine
 
 _PALE = 0.32
 # The mark is dark with a white edge, so that it is seen on every colour and on both grounds.
@@ -37,7 +37,7 @@ _STYLE = """<style>
 
 
 def lines_html(
-    lines: Sequence[Line],
+    lines: Sequence[FeatureLine],
     ranges: Sequence[tuple[float, float]],
     values: Sequence[float],
     features: Sequence[Feature],
@@ -77,7 +77,7 @@ def lines_html(
 
 
 def stretches(
-    line: Line, ends: tuple[float, float], dimension: int, rule_set: RuleSet
+    line: FeatureLine, ends: tuple[float, float], dimension: int, rule_set: RuleSet
 ) -> list[tuple[float, float, int, bool]]:
     """The parts of a bar, neighbours that look the same made one.
 

@@ -17,7 +17,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.contradictions import NEAR, find_contradictions
 from sarl_core.mining.validation.evidence import FEWEST_EPISODES
 from sarl_core.mining.validation.holding_out import verdict
-from sarl_core.rendering.example_frames import Examples, Played
+from sarl_core.rendering.example_frames import Examples, PlayedEpisodes
 
 FEW_STATES = 30
 _MOST_NAMED = 24
@@ -213,7 +213,7 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
 
 
 def _beyond(
-    played: Played, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
+    played: PlayedEpisodes, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
 ) -> Beyond:
     seen, rules = played.steps.observation, played.steps.rules
     low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)

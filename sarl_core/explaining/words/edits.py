@@ -13,7 +13,7 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.effects import Change, Conflict, Verdicts
+from sarl_core.shielding.effects import Conflict, EditEffect, Verdicts
 
 
 def edit_text(edit: Edit, rule_set: RuleSet) -> str:
@@ -55,7 +55,7 @@ def state_text(rule: Rule) -> str:
     return kind if rule.enabled else f"{kind}, off"
 
 
-def change_text(found: Change, before: Verdicts, after: Verdicts, *, states: str) -> str:
+def change_text(found: EditEffect, before: Verdicts, after: Verdicts, *, states: str) -> str:
     """What edits change at once, as a sentence.
 
     Args:

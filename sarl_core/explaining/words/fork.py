@@ -48,7 +48,7 @@ def fork_text(fork: Fork) -> str:
         As "With the change the return is 120.5 and it lands and rests, after 210 steps. Without
         it the return is −80.2 (200.7 less) and it crashes, after 95 steps."
     """
-    env_id = fork.kept.env_id
+    env_id = fork.unchanged.env_id
     with_it, without = fork.branches
     gain = fork.difference
     compared = f"{abs(gain):,.1f} {'more' if gain > 0 else 'less'}" if gain else "the same"

@@ -18,7 +18,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.written import value_text
-from sarl_core.shielding.near import Change
+from sarl_core.shielding.near import FeatureChange
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def outside_texts(
     return tuple(texts)
 
 
-def change_text(change: Change, feature: Feature) -> str:
+def change_text(change: FeatureChange, feature: Feature) -> str:
     """A change of one feature, after "if".
 
     Args:
@@ -112,7 +112,7 @@ def change_text(change: Change, feature: Feature) -> str:
     return f"{feature.name} were {with_unit(number_text(abs(change.by)), feature)} {way}"
 
 
-def near_miss_text(changes: tuple[Change, ...], features: tuple[Feature, ...]) -> str:
+def near_miss_text(changes: tuple[FeatureChange, ...], features: tuple[Feature, ...]) -> str:
     """What a rule that nearly applies lacks.
 
     Args:
@@ -187,7 +187,7 @@ def by_use(rule_set: RuleSet) -> tuple[int, ...]:
     return tuple(sorted(range(count), key=lambda index: (-asked[index], -rules[index], index)))
 
 
-def _is_contact(change: Change, feature: Feature) -> bool:
+def _is_contact(change: FeatureChange, feature: Feature) -> bool:
     """Whether the change turns a yes into a no, or back."""
     between = (change.before + change.after) / 2
     crosses = min(change.before, change.after) < 1 and max(change.before, change.after) > 0
