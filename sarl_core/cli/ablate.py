@@ -86,7 +86,7 @@ def ablate(
 
         shield = read_shield(rules, projection, outside, on_invalid)
         assert shield is not None
-        found = run(
+        ablation = run(
             env,
             read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
             shield,
@@ -99,31 +99,31 @@ def ablate(
         )
         if out is not None:
             with whole_file(out) as unfinished:
-                safe_cells(found.to_frame()).to_csv(unfinished, index=False)
+                safe_cells(ablation.to_frame()).to_csv(unfinished, index=False)
     if as_json:
-        terminal.print_json(_document(found))
+        terminal.print_json(_document(ablation))
     else:
-        _print(found, out)
+        _print(ablation, out)
 
 
-def _document(found: Ablation) -> dict[str, Any]:
-    rules = found.shield.rule_set.rules
+def _document(ablation: Ablation) -> dict[str, Any]:
+    rules = ablation.shield.rule_set.rules
     return {
-        "env_id": found.base.env_id,
-        "agent": found.base.agent,
-        "episodes": len(found.base),
-        "seed": int(found.base.seeds[0]),
-        "mean_return": float(found.base.returns.mean()),
-        "failures": found.base_failures if found.failures_known else None,
-        "rules": found.to_frame().to_dict("records"),
-        "without_difference": [rules[index].id for index in found.unused],
-        "left_out": [rules[index].id for index in found.left_out],
-        "episodes_run": found.played,
-        "notes": list(found.remarks),
+        "env_id": ablation.base.env_id,
+        "agent": ablation.base.agent,
+        "episodes": len(ablation.base),
+        "seed": int(ablation.base.seeds[0]),
+        "mean_return": float(ablation.base.returns.mean()),
+        "failures": ablation.base_failures if ablation.failures_known else None,
+        "rules": ablation.to_frame().to_dict("records"),
+        "without_difference": [rules[index].id for index in ablation.unused],
+        "left_out": [rules[index].id for index in ablation.left_out],
+        "episodes_run": ablation.played,
+        "notes": list(ablation.remarks),
     }
 
 
-def _print(found: Ablation, out: Path | None) -> None:
+def _print(ablation: Ablation, out: Path | None) -> None:
     from sarl_core.cli.answers import print_notes
     from sarl_core.explaining.figures.ablation import (
         ablation_text,
@@ -132,8 +132,8 @@ def _print(found: Ablation, out: Path | None) -> None:
         signed,
     )
 
-    rule_set, known = found.shield.rule_set, found.failures_known
-    if found.rules:
+    rule_set, known = ablation.shield.rule_set, ablation.failures_known
+    if ablation.rules:
         terminal.print_table(
             ("rule", "verdict", "return without it", "95 % interval", "failures", "changed"),
             [
@@ -142,13 +142,13 @@ def _print(found: Ablation, out: Path | None) -> None:
                     effect.verdict,
                     signed(effect.difference.mean),
                     interval_text(effect),
-                    f"{effect.failures} (with it {found.base_failures})" if known else "–",
+                    f"{effect.failures} (with it {ablation.base_failures})" if known else "–",
                     f"{effect.changed:,}",
                 )
-                for effect in found.effects
+                for effect in ablation.effects
             ],
         )
-    terminal.print_lines([*ablation_text(found), *filter(None, [left_out_text(found)])])
-    print_notes(found.remarks)
+    terminal.print_lines([*ablation_text(ablation), *filter(None, [left_out_text(ablation)])])
+    print_notes(ablation.remarks)
     if out is not None:
         terminal.print_lines([f"Wrote {out}."])

@@ -118,20 +118,20 @@ def aggregate(
             seed=seed,
             max_steps=max_steps,
         )
-        shown = read_demonstrations(file, env)
-        agents = _agents(agent, expert, env or shown.env_id, normalise)
-        read = shown.notes
-        shown, notes = in_order_of(shown, describe_environment(env or shown.env_id))
+        start = read_demonstrations(file, env)
+        agents = _agents(agent, expert, env or start.env_id, normalise)
+        read = start.notes
+        start, notes = in_order_of(start, describe_environment(env or start.env_id))
         notes = tuple(dict.fromkeys((*read, *notes)))
     if nobody:
-        _gaps(shown, plan, env or shown.env_id, agents[0], out, jobs, as_json, notes)
+        _gaps(start, plan, env or start.env_id, agents[0], out, jobs, as_json, notes)
         return
     with terminal.working("Asking the expert") as advance:
         from sarl_core.improving.aggregation import aggregate as run
         from sarl_core.improving.aggregation_files import save_aggregation
 
-        found = run(
-            shown,
+        aggregation = run(
+            start,
             plan,
             env_id=env,
             agent=agents[0],
@@ -139,10 +139,10 @@ def aggregate(
             jobs=jobs,
             progress=advance,
         )
-    written, card = save_aggregation(found, out, command=_command(context))
-    if not found.is_finished:
-        raise terminal.StoppedError(_what_is_left(found, written, out))
-    notes = tuple(dict.fromkeys((*notes, *found.remarks)))
+    written, card = save_aggregation(aggregation, out, command=_command(context))
+    if not aggregation.is_finished:
+        raise terminal.StoppedError(_what_is_left(aggregation, written, out))
+    notes = tuple(dict.fromkeys((*notes, *aggregation.remarks)))
     if as_json:
         terminal.print_json({**card, "notes": list(notes)})
         return
@@ -159,14 +159,14 @@ def aggregate(
                 share_text(one.coverage, decimals=1),
                 share_text(one.disagreement, decimals=1),
             )
-            for one in found.rounds
+            for one in aggregation.rounds
         ],
     )
     reported = card["reported"]
     terminal.print_lines(
         [
-            f"Wrote {out}: {card['rules']} rules of round {found.chosen}"
-            f"{', refined' if found.refined else ''}.",
+            f"Wrote {out}: {card['rules']} rules of round {aggregation.chosen}"
+            f"{', refined' if aggregation.refined else ''}.",
             f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
             f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
             *_beside(reported, card["env_id"]),
@@ -205,14 +205,14 @@ def _agents(
     )
 
 
-def _what_is_left(found: Aggregation, written: Path, out: Path) -> str:
+def _what_is_left(aggregation: Aggregation, written: Path, out: Path) -> str:
     """In one line, what a stopped run leaves behind."""
     from sarl_core.improving.aggregation_files import chosen_by
 
     beside = "" if written == out else f" ({out} stays as it was)"
     return (
-        f"stopped after {len(found.rounds)} of {found.plan.rounds} rounds; the best "
-        f"rules so far are in {written}{beside}, chosen by {chosen_by(found)}; no "
+        f"stopped after {len(aggregation.rounds)} of {aggregation.plan.rounds} rounds; the best "
+        f"rules so far are in {written}{beside}, chosen by {chosen_by(aggregation)}; no "
         "fresh episode has tried them"
     )
 
@@ -228,7 +228,7 @@ def _thresholds(support: float | None, confidence: float | None) -> Thresholds |
 
 
 def _gaps(
-    shown: Demonstrations,
+    start: Demonstrations,
     plan: Plan,
     env_id: str,
     agent: Agent,
@@ -242,14 +242,14 @@ def _gaps(
         raise InputError(
             "without thresholds every state is covered; give --support and --confidence"
         )
-    found: Gaps | None = None
+    gaps: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
         from sarl_core.improving.gaps import gaps_so_far
         from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
 
         at = plan.thresholds
-        rules = mine_rules(shown, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
+        rules = mine_rules(start, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
         try:
             for so_far in gaps_so_far(
                 env_id,
@@ -262,24 +262,24 @@ def _gaps(
                 max_steps=plan.max_steps,
                 progress=advance,
             ):
-                found = so_far
+                gaps = so_far
         except KeyboardInterrupt:
-            if found is None:
+            if gaps is None:
                 raise
-    assert found is not None
-    if found.episodes < plan.episodes:
-        raise terminal.StoppedError(_keep_gaps(found, out, plan.episodes))
-    _write_gaps(found, out)
-    if found.cut:
+    assert gaps is not None
+    if gaps.episodes < plan.episodes:
+        raise terminal.StoppedError(_keep_gaps(gaps, out, plan.episodes))
+    _write_gaps(gaps, out)
+    if gaps.cut:
         steps = plan.max_steps or MAX_STEPS
-        notes = (*notes, cut_text(env_id, found.cut, found.episodes, steps))
-    notes = tuple(dict.fromkeys((*notes, *found.notes)))
+        notes = (*notes, cut_text(env_id, gaps.cut, gaps.episodes, steps))
+    notes = tuple(dict.fromkeys((*notes, *gaps.notes)))
     document: dict[str, Any] = {
         "file": str(out),
         "rules": len(rules),
-        "met": found.met,
-        "without_a_rule": len(found),
-        "share": found.share,
+        "met": gaps.met,
+        "without_a_rule": len(gaps),
+        "share": gaps.share,
         "notes": list(notes),
     }
     if as_json:
@@ -289,29 +289,29 @@ def _gaps(
 
     terminal.print_lines(
         [
-            f"Wrote {out}: {len(found):,} of {found.met:,} states that were met "
-            f"({share_text(found.share, decimals=1)}) have no rule and need a demonstration.",
+            f"Wrote {out}: {len(gaps):,} of {gaps.met:,} states that were met "
+            f"({share_text(gaps.share, decimals=1)}) have no rule and need a demonstration.",
             *(f"note: {note}" for note in notes),
         ]
     )
 
 
-def _write_gaps(found: Gaps, path: Path) -> None:
+def _write_gaps(gaps: Gaps, path: Path) -> None:
     from sarl_core.files import whole_file
 
     with whole_file(path) as unfinished:
-        found.to_frame().to_csv(unfinished, index=False)
+        gaps.to_frame().to_csv(unfinished, index=False)
 
 
-def _keep_gaps(found: Gaps, out: Path, planned: int) -> str:
+def _keep_gaps(gaps: Gaps, out: Path, planned: int) -> str:
     """Write what a stopped search has found, and say so in one line."""
     from sarl_core.improving.aggregation_files import stopped_path
 
     written = stopped_path(out)
-    _write_gaps(found, written)
+    _write_gaps(gaps, written)
     beside = "" if written == out else f" ({out} stays as it was)"
     return (
-        f"stopped after {found.episodes} of {planned} episodes; the {len(found):,} "
+        f"stopped after {gaps.episodes} of {planned} episodes; the {len(gaps):,} "
         f"states without a rule that they met are in {written}{beside}"
     )
 

@@ -121,11 +121,11 @@ def _describe_action(dimension: ActionDimension, values: NDArray[Any]) -> dict[s
     }
 
 
-def _spread(values: NDArray[Any], kept: NDArray[np.bool_] | None = None) -> dict[str, float]:
+def _spread(values: NDArray[Any], counted_in: NDArray[np.bool_] | None = None) -> dict[str, float]:
     """Least, median, mean and largest value; of the finished episodes, where some are."""
     numbers = values.astype(np.float64)
-    if kept is not None and kept.any():
-        numbers = numbers[kept]
+    if counted_in is not None and counted_in.any():
+        numbers = numbers[counted_in]
     return {
         "min": float(numbers.min()),
         "median": float(np.median(numbers)),

@@ -49,22 +49,22 @@ def diff(
                 "the same every time; --demonstrations takes those of a file."
             )
         else:
-            shown = read_demonstrations(demonstrations, None)
-            one, more = rules_for(one, shown, called="the states")
-            other, notes = comparable(one, other)[0], (*shown.notes, *notes, *more)
-            states = shown.observations
+            recorded = read_demonstrations(demonstrations, None)
+            one, more = rules_for(one, recorded, called="the states")
+            other, notes = comparable(one, other)[0], (*recorded.notes, *notes, *more)
+            states = recorded.observations
             states_from = f"The states are those of {demonstrations}."
-        found = disagreement(one, other, states)
+        difference = disagreement(one, other, states)
     from sarl_core.explaining.words.difference import difference_document, difference_lines
 
     names = (str(first), str(second))
     if as_json:
         document = difference_document(
-            found,
+            difference,
             names=names,
             states_from=str(demonstrations or "random over the range of the thresholds"),
         )
         terminal.print_json({**document, "notes": list(notes)})
     else:
-        lines = difference_lines(found, names=names, states_from=states_from)
+        lines = difference_lines(difference, names=names, states_from=states_from)
         terminal.print_lines([*lines, *(f"note: {note}" for note in notes)])

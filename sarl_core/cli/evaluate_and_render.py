@@ -56,7 +56,7 @@ def evaluate(
         from sarl_core.rollouts.episodes import rollout
 
         shield = read_shield(rules, projection, outside, on_invalid)
-        found = rollout(
+        played = rollout(
             env,
             read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
             shield=shield,
@@ -66,14 +66,14 @@ def evaluate(
             max_steps=max_steps,
             progress=advance,
         )
-        document = found.to_dict()
+        document = played.to_dict()
     if as_json:
         terminal.print_json(document)
         return
     from sarl_core.cli.answers import print_episodes
 
     shielded = "unshielded" if rules is None else f"shielded by {rules}"
-    print_episodes(document, env, f"{found.agent} in {env}, {shielded}", shield)
+    print_episodes(document, env, f"{played.agent} in {env}, {shielded}", shield)
 
 
 def render(

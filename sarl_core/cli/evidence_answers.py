@@ -122,8 +122,8 @@ def _influences(judged: Judged) -> dict[str, Any]:
     }
 
 
-def _described(found: Influence | None) -> dict[str, Any] | None:
-    return None if found is None else found._asdict()
+def _described(influence: Influence | None) -> dict[str, Any] | None:
+    return None if influence is None else influence._asdict()
 
 
 def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
@@ -201,12 +201,15 @@ def _facts(judged: Judged, where: str) -> list[tuple[str, str]]:
     facts = [
         (
             f"coverage on {where}",
-            f"{_told(judged.coverage)} of the states of an episode, on average",
+            f"{_share_and_interval(judged.coverage)} of the states of an episode, on average",
         ),
     ]
     if judged.fidelity.share is not None:
         facts.append(
-            (f"fidelity on {where}", f"{_told(judged.fidelity)} of those with a rule, on average")
+            (
+                f"fidelity on {where}",
+                f"{_share_and_interval(judged.fidelity)} of those with a rule, on average",
+            )
         )
     moves = influence_text(judged.influence)
     if moves:
@@ -218,16 +221,16 @@ def _facts(judged: Judged, where: str) -> list[tuple[str, str]]:
     return facts
 
 
-def _told(found: HeldOut) -> str:
-    share = "none" if found.share is None else share_text(found.share)
-    return f"{share} ({interval_text(found)})"
+def _share_and_interval(held_out: HeldOut) -> str:
+    share = "none" if held_out.share is None else share_text(held_out.share)
+    return f"{share} ({interval_text(held_out)})"
 
 
 def rule_line(rule: Rule, rule_set: RuleSet) -> str:
     """A rule in words, with its counts where episodes were held out."""
     if rule.held_out is None:
         return sentence(rule, rule_set)
-    told = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}"
+    text = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}"
     if not rule.held_out.samples:
-        return f"{told}."
-    return f"{told}, {interval_text(rule.held_out)}."
+        return f"{text}."
+    return f"{text}, {interval_text(rule.held_out)}."

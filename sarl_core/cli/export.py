@@ -134,16 +134,16 @@ def _lines(prepared: Prepared, out: Path, vectors: Path) -> list[str]:
     )
     if rounding.kept:
         lines.append(f"{counted(len(rounding.kept), 'threshold')} stayed:")
-        lines += [f"  {_kept(one, prepared.rule_set)}" for one in rounding.kept[:_SHOWN]]
+        lines += [f"  {_unrounded(one, prepared.rule_set)}" for one in rounding.kept[:_SHOWN]]
         if len(rounding.kept) > _SHOWN:
             lines.append(f"  and {len(rounding.kept) - _SHOWN:,} more; --json lists them all.")
     return lines
 
 
-def _kept(kept: Any, rule_set: RuleSet) -> str:
+def _unrounded(threshold: Any, rule_set: RuleSet) -> str:
     from sarl_core.decimals import decimal_text
     from sarl_core.demonstrations.splits import written_threshold
 
-    name = rule_set.source.features[kept.feature].name
+    name = rule_set.source.features[threshold.feature].name
     # What tells all states apart as it does: as a double it may have digits that tell nothing.
-    return f"{name} {decimal_text(written_threshold(kept.threshold, None))} ({kept.why})"
+    return f"{name} {decimal_text(written_threshold(threshold.threshold, None))} ({threshold.why})"

@@ -95,12 +95,12 @@ def learn(
         notes = plan.notes
     with terminal.working("Learning") as advance, _stopping(watched) as stopped:
 
-        def told(done: int, total: int) -> bool:
+        def advance_or_stop(done: int, total: int) -> bool:
             advance(done, total)
             return not stopped()
 
         try:
-            study = run_study(plan, out, progress=told)
+            study = run_study(plan, out, progress=advance_or_stop)
         except CancelledError as error:
             raise terminal.StoppedError(str(error)) from error
     summaries = summarise_study(study)
@@ -130,20 +130,20 @@ def _stopping(watched: bool) -> Iterator[Callable[[], bool]]:
     Yields:
         Whether to stop.
     """
-    asked = threading.Event()
+    stop = threading.Event()
     before: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, lambda *_: asked.set())
+            before[number] = signal.signal(number, lambda *_: stop.set())
     if watched:
 
         def wait() -> None:
             sys.stdin.read()
-            asked.set()
+            stop.set()
 
         threading.Thread(target=wait, daemon=True).start()
     try:
-        yield asked.is_set
+        yield stop.is_set
     finally:
         for restored, handler in before.items():
             signal.signal(restored, handler)

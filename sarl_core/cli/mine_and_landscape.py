@@ -205,24 +205,24 @@ def landscape(
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        shown = read_demonstrations(file, env)
-        trees = grow_policy_trees(shown, divider=divider)
-        found = threshold_landscape(trees, *grid)
+        recorded = read_demonstrations(file, env)
+        trees = grow_policy_trees(recorded, divider=divider)
+        plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
         title = f"{source.env_id or file.name}: {source.steps:,} steps"
-        save_landscape(found, names, out, title=title)
+        save_landscape(plane, names, out, title=title)
     if as_json:
-        terminal.print_json({**landscape_document(found, names), "notes": list(shown.notes)})
+        terminal.print_json({**landscape_document(plane, names), "notes": list(recorded.notes)})
         return
     from sarl_core.cli.answers import print_notes
 
-    cells = f"{found.rule_count.size:,} cells"
+    cells = f"{plane.rule_count.size:,} cells"
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
     terminal.print_lines(
         [
-            f"Wrote {out}: {cells}, {found.rule_count.min():,} to {found.rule_count.max():,} "
+            f"Wrote {out}: {cells}, {plane.rule_count.min():,} to {plane.rule_count.max():,} "
             f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
         ]
     )
-    print_notes(shown.notes)
+    print_notes(recorded.notes)

@@ -99,7 +99,7 @@ def report(
         given = read_demonstrations(demonstrations, env)
         card = read_card(rules)
         results = [one for path in comparison or () for one in read_results(path)]
-        asked: dict[str, object] = {
+        options: dict[str, object] = {
             "--demonstrations": demonstrations,
             "--comparison": comparison,
             "--in-full": None if in_full == _IN_FULL else in_full,
@@ -113,7 +113,7 @@ def report(
             "--out": out,
         }
         mined = mining_command(rule_set, rules, demonstrations, given, env=env)
-        found = make_report(
+        document = make_report(
             rule_set,
             given,
             in_full=in_full,
@@ -125,7 +125,7 @@ def report(
             max_steps=max_steps,
             commands=(
                 *([mined] if mined else []),
-                command_line("report", rules, asked),
+                command_line("report", rules, options),
             ),
             rules_name=rules.name,
             demonstrations_name=demonstrations.name,
@@ -133,31 +133,31 @@ def report(
             comparison=results,
             progress=advance,
         )
-        found.save(out)
-    size = len(found.html.encode())
+        document.save(out)
+    size = len(document.html.encode())
     if as_json:
         terminal.print_json(
             {
                 "out": str(out),
-                "rules": found.rules,
-                "in_full": found.in_full,
-                "pictures": found.pictures,
-                "without_pictures": found.without or None,
+                "rules": document.rules,
+                "in_full": document.in_full,
+                "pictures": document.pictures,
+                "without_pictures": document.without or None,
                 "bytes": size,
-                "notes": list(found.notes),
+                "notes": list(document.notes),
             }
         )
         return
     lines = [
-        f"Wrote {out}: {found.rules:,} rules, {found.in_full:,} of them in full, "
-        f"{found.pictures:,} pictures, {size / 1e6:.1f} MB."
+        f"Wrote {out}: {document.rules:,} rules, {document.in_full:,} of them in full, "
+        f"{document.pictures:,} pictures, {size / 1e6:.1f} MB."
     ]
-    if found.without:
-        lines.append(f"There are no pictures: {found.without}.")
+    if document.without:
+        lines.append(f"There are no pictures: {document.without}.")
     from sarl_core.cli.answers import print_notes
 
     terminal.print_lines(lines)
-    print_notes(found.notes)
+    print_notes(document.notes)
 
 
 def _player(agent: str | None, env_id: str, normalise: str | None) -> Agent | str | None:

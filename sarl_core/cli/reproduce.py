@@ -68,17 +68,13 @@ def reproduce(
     @contextmanager
     def watch(study: Study) -> Iterator[Progress]:
         with terminal.working(f"{study.place} ({len(done) + 1} of {len(chosen)})") as advance:
-
-            def told(count: int, total: int) -> None:
-                advance(count, total)
-
-            yield told
+            yield advance
 
     try:
         report = run(out, chosen, effort=QUICK if quick else FULL, watch=watch, finished=finished)
     except KeyboardInterrupt as error:
-        kept = f"{', '.join(done)} in {out} can be used" if done else "no figure was finished"
-        raise terminal.StoppedError(f"stopped; {kept}") from error
+        usable = f"{', '.join(done)} in {out} can be used" if done else "no figure was finished"
+        raise terminal.StoppedError(f"stopped; {usable}") from error
     if as_json:
         from sarl_core.paper.report import report_document
 

@@ -95,15 +95,15 @@ def lasting_streams() -> Iterator[Stream]:
         Standard output, to be asked at the end whether it failed.
     """
     _open_missing_descriptors()
-    kept = sys.stdout, sys.stderr
-    out, error = (Stream(stream or _nowhere()) for stream in kept)
+    streams = sys.stdout, sys.stderr
+    out, error = (Stream(stream or _nowhere()) for stream in streams)
     sys.stdout, sys.stderr = out, error
     try:
         yield out
     finally:
         out.flush()
         error.flush()
-        sys.stdout, sys.stderr = kept
+        sys.stdout, sys.stderr = streams
 
 
 @contextmanager

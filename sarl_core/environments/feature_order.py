@@ -177,16 +177,16 @@ def shortened(names: Sequence[str]) -> str:
     Returns:
         At most about a line.
     """
-    shown: list[str] = []
+    texts: list[str] = []
     length = 0
     for name in names:
         text = name if len(name) <= 40 else f"{name[:37]}..."
         length += len(text) + 2
-        if shown and length > _MOST_CHARACTERS:
+        if texts and length > _MOST_CHARACTERS:
             break
-        shown.append(text)
-    rest = len(names) - len(shown)
-    return ", ".join(shown) + (f" and {rest} more" if rest else "")
+        texts.append(text)
+    rest = len(names) - len(texts)
+    return ", ".join(texts) + (f" and {rest} more" if rest else "")
 
 
 def _bare(env_id: str) -> str:

@@ -183,11 +183,7 @@ class _Clock:
     def of(self) -> Progress:
         """For work that counts its own episodes from 0."""
         before = self.done
-
-        def told(done: int, _: int) -> None:
-            self.tick(before + done - self.done)
-
-        return told
+        return lambda done, _: self.tick(before + done - self.done)
 
 
 @dataclass(frozen=True)
@@ -293,14 +289,14 @@ class _Run:
     def round(self, number: int, clock: _Clock) -> None:
         trees = self.grow(number - 1)
         rules = self.rules(trees)
-        found = self.shielded(
+        played = self.shielded(
             rules,
             self.seeds.rounds + (number - 1) * seeds.SEEDS_A_ROUND,
             self.plan.episodes,
             clock,
             keep_steps=True,
         )
-        table = found.steps
+        table = played.steps
         assert table is not None
         wanted = ask(self.expert, table.observation)
         covered = table.rules >= 0
@@ -319,11 +315,11 @@ class _Run:
                 number=number,
                 pairs=trees[0].source.steps,
                 rules=len(rules),
-                returns=found.returns,
+                returns=played.returns,
                 coverage=float(covered.any(axis=1).mean()),
                 disagreement=float(otherwise.sum() / max(int(covered.sum()), 1)),
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
-                cut=int(found.cut.sum()),
+                cut=int(played.cut.sum()),
             )
         )
         self.answers.add(table, wanted, seed=self.seed(number))
@@ -337,7 +333,7 @@ class _Run:
 
     def best_of(self, candidates: list[RuleSet], seed: int, clock: _Clock) -> tuple[int, float]:
         """The best candidate, and its mean return over all episodes that it was given."""
-        found = successive_halving(
+        tried = successive_halving(
             len(candidates),
             lambda index, first, count: (
                 self.shielded(candidates[index], first, count, clock).returns
@@ -346,7 +342,7 @@ class _Run:
             first=_FIRST_VALIDATION,
             most=self.plan.validation,
         )
-        return found.best, float(found.means[found.best])
+        return tried.best, float(tried.means[tried.best])
 
     def refine(self, clock: _Clock) -> None:
         """Move thresholds and labels of the best rules, and keep what is better."""
@@ -380,8 +376,8 @@ class _Run:
         candidates = [start.trees, *marks]
         # On other episodes than those of the rounds: the first candidate was chosen by them.
         second = self.seed(seeds.SECOND_VALIDATION)
-        found, mean = self.best_of([self.rules(one) for one in candidates], second, clock)
-        self.choice = _Choice(start.index, candidates[found], mean, refined=found > 0)
+        index, mean = self.best_of([self.rules(one) for one in candidates], second, clock)
+        self.choice = _Choice(start.index, candidates[index], mean, refined=index > 0)
         self.seeds = self.seeds._replace(second_validation=second)
 
     def report(self, clock: _Clock) -> None:
@@ -395,7 +391,7 @@ class _Run:
     def result(self) -> Aggregation:
         choice = self.choice
         if choice is None:  # stopped early: the episodes of the rounds are all there is
-            best = int(np.argmax([found.mean_return for found in self.rounds]))
+            best = int(np.argmax([finished.mean_return for finished in self.rounds]))
             choice = _Choice(best, self.trees[best])
         pairs = self.answers.pairs(choice.index)
         return Aggregation(

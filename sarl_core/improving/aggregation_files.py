@@ -48,11 +48,11 @@ class Saved(NamedTuple):
     card: dict[str, Any]
 
 
-def save_aggregation(found: Aggregation, out: Path, *, command: str) -> Saved:
+def save_aggregation(aggregation: Aggregation, out: Path, *, command: str) -> Saved:
     """Write the rule file and its card: both, or neither.
 
     Args:
-        found: To be kept.
+        aggregation: To be kept.
         out: The rule file, `.json`. That of a stopped run takes no other's place: see
             `stopped_path`.
         command: That makes it again; stands in the card.
@@ -64,41 +64,41 @@ def save_aggregation(found: Aggregation, out: Path, *, command: str) -> Saved:
         InputError: If the folder does not exist.
         WorkError: If it cannot be written to.
     """
-    if not found.is_finished:
+    if not aggregation.is_finished:
         out = stopped_path(out)
     for path in (out, card_path(out)):
         if path.is_dir():
             raise WorkError(f"{path} is a folder and cannot be written; choose another name")
-    card = aggregation_card(found, command=command)
+    card = aggregation_card(aggregation, command=command)
     # Both are written before the first takes its place.
     with whole_file(out) as rules:
-        write_rules(found.rule_set, rules)
+        write_rules(aggregation.rule_set, rules)
         with whole_file(card_path(out)) as beside:
             beside.write_text(json.dumps(card, indent=2) + "\n", encoding="utf-8")
     return Saved(out, card)
 
 
-def chosen_by(found: Aggregation) -> str:
+def chosen_by(aggregation: Aggregation) -> str:
     """What the rules were chosen by, as it stands after "chosen by".
 
     Args:
-        found: Finished or stopped.
+        aggregation: Finished or stopped.
     """
-    up_to = f"the mean of up to {found.plan.validation} episodes"
-    if found.seeds.validation is None:
+    up_to = f"the mean of up to {aggregation.plan.validation} episodes"
+    if aggregation.seeds.validation is None:
         return "the episodes of their round only"
-    if found.seeds.second_validation is not None:
+    if aggregation.seeds.second_validation is not None:
         return f"{up_to} of a second validation"
-    if found.refined:
+    if aggregation.refined:
         return f"{up_to} of validation, then by those of a refinement that was not finished"
     return f"{up_to} of validation"
 
 
-def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
+def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any]:
     """How rules came about and what they achieve, ready for JSON.
 
     Args:
-        found: The aggregation.
+        aggregation: The aggregation.
         command: That makes it again.
 
     Returns:
@@ -108,11 +108,11 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
     import gymnasium
     import sklearn
 
-    plan, rules = found.plan, found.rule_set
+    plan, rules = aggregation.plan, aggregation.rule_set
     return {
-        "what": f"{_most_rules(found)} rules an action dimension for {found.env_id}",
+        "what": f"{_most_rules(aggregation)} rules an action dimension for {aggregation.env_id}",
         "command": command,
-        "env_id": found.env_id,
+        "env_id": aggregation.env_id,
         "rules": len(rules),
         "rules_per_dimension": [len(rules.of_dimension(i)) for i in range(len(rules.actions))],
         "cut": rules.cut,
@@ -125,18 +125,18 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
         **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
         "episodes_a_round": plan.episodes,
         "generations": plan.generations,
-        "rounds": [_round(one) for one in found.rounds],
-        "chosen_round": found.chosen,
-        "refined": found.refined,
-        "chosen_by": chosen_by(found),
+        "rounds": [_round(one) for one in aggregation.rounds],
+        "chosen_round": aggregation.chosen,
+        "refined": aggregation.refined,
+        "chosen_by": chosen_by(aggregation),
         "validation_mean": None
-        if found.validation_mean is None
-        else round(found.validation_mean, 2),
+        if aggregation.validation_mean is None
+        else round(aggregation.validation_mean, 2),
         "reported_on": f"{plan.report} episodes used for nothing else"
-        if found.is_finished
+        if aggregation.is_finished
         else None,
-        "reported": _reported(found),
-        "seeds": found.seeds._asdict(),
+        "reported": _reported(aggregation),
+        "seeds": aggregation.seeds._asdict(),
         "demonstrations": {
             "digest": rules.source.digest,
             "steps": rules.source.steps,
@@ -152,8 +152,8 @@ def aggregation_card(found: Aggregation, *, command: str) -> dict[str, Any]:
     }
 
 
-def _most_rules(found: Aggregation) -> int:
-    rules = found.rule_set
+def _most_rules(aggregation: Aggregation) -> int:
+    rules = aggregation.rule_set
     return max(len(rules.of_dimension(index)) for index in range(len(rules.actions)))
 
 
@@ -170,8 +170,8 @@ def _round(one: Round) -> dict[str, Any]:
     }
 
 
-def _reported(found: Aggregation) -> dict[str, Any] | None:
-    episodes = found.reported
+def _reported(aggregation: Aggregation) -> dict[str, Any] | None:
+    episodes = aggregation.reported
     if episodes is None:
         return None
     spread = summarise(episodes.returns)

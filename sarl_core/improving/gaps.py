@@ -106,7 +106,7 @@ def find_gaps(
     """
     _, shield, notes = check_environment(env_id, Shield(rules, projection=projection))
     assert shield is not None
-    found = rollout(
+    played = rollout(
         env_id,
         agent,
         shield=shield,
@@ -117,7 +117,7 @@ def find_gaps(
         max_steps=max_steps,
         progress=progress,
     )
-    table = found.steps
+    table = played.steps
     assert table is not None
     missing = table.rules < 0
     rows = np.flatnonzero(missing.any(axis=1))
@@ -129,8 +129,8 @@ def find_gaps(
         missing=missing[rows],
         met=len(table),
         episodes=episodes,
-        cut=int(found.cut.sum()),
-        notes=tuple(dict.fromkeys((*notes, *found.notes))),
+        cut=int(played.cut.sum()),
+        notes=tuple(dict.fromkeys((*notes, *played.notes))),
     )
 
 
@@ -174,7 +174,7 @@ def gaps_so_far(
     for start in range(0, episodes, size):
         count = min(size, episodes - start)
 
-        def told(done: int, _: int, start: int = start) -> bool | None:
+        def advance(done: int, _: int, start: int = start) -> bool | None:
             return progress(start + done, episodes) if progress is not None else None
 
         pieces.append(
@@ -188,7 +188,7 @@ def gaps_so_far(
                 jobs=jobs,
                 executor=executor,
                 max_steps=max_steps,
-                progress=told,
+                progress=advance,
             )
         )
         yield join_gaps(pieces)

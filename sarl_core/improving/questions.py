@@ -170,10 +170,10 @@ class Answers:
         Returns:
             The pairs of the start and of the latest rounds.
         """
-        kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
+        rounds_kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
 
         def column(parts: list[Any]) -> Any:
-            return np.concatenate([parts[index] for index in kept])
+            return np.concatenate([parts[index] for index in rounds_kept])
 
         return answered(
             self._env_id,

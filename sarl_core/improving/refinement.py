@@ -58,7 +58,7 @@ class _Parameters:
         return np.concatenate(parts)
 
     def structures(self, values: NDArray[np.float64]) -> list[TreeStructure]:
-        found = []
+        candidates = []
         at = 0
         for tree, spread in zip(self.trees, self.spreads, strict=True):
             leaves = tree.feature == LEAF
@@ -69,14 +69,14 @@ class _Parameters:
             count = int(leaves.sum()) * labels
             label[leaves] = values[at : at + count].reshape(-1, labels).argmax(axis=1)
             at += count
-            found.append(
+            candidates.append(
                 without_idle_queries(
                     TreeStructure(
                         tree.feature, threshold, tree.children_left, tree.children_right, label
                     )
                 )
             )
-        return found
+        return candidates
 
 
 def refine(
@@ -127,7 +127,7 @@ def refine(
     generator = np.random.default_rng(seed)
     here = parameters.start()
     momentum, size = np.zeros_like(here), np.zeros_like(here)
-    found = []
+    candidates = []
     stops = {round(generations * (number + 1) / marks) for number in range(marks)}
     total = generations * generation_cost()
     most = -np.inf
@@ -169,8 +169,8 @@ def refine(
         here = here + _STEP * _SHAKE * steady / scale
         report(progress, number * generation_cost(), total)
         if number in stops:
-            found.append(trees_at(here))
-    return found
+            candidates.append(trees_at(here))
+    return candidates
 
 
 def generation_cost() -> int:
@@ -230,7 +230,7 @@ def _mean_return(
         for index, structure in enumerate(structures)
     ]
     shield = Shield(leaf_rules(trees), projection=projection)
-    found = rollout(
+    played = rollout(
         env_id,
         agent,
         shield=shield,
@@ -239,4 +239,4 @@ def _mean_return(
         keep_steps=False,
         max_steps=max_steps,
     )
-    return float(found.returns.mean())
+    return float(played.returns.mean())

@@ -107,12 +107,12 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
         raise InputError(f"{path} is not a checkpoint of a learner; {advice}")
     if document.get("version") != _VERSION:
         raise InputError(f"{path} is a checkpoint of another version of this program; {advice}")
-    kept = document.get("identity")
-    if kept != dict(identity):
+    saved_earlier = document.get("identity")
+    if saved_earlier != dict(identity):
         other = [
             name
             for name in identity
-            if not isinstance(kept, dict) or kept.get(name) != identity[name]
+            if not isinstance(saved_earlier, dict) or saved_earlier.get(name) != identity[name]
         ]
         raise InputError(
             f"{path} is the checkpoint of another run (its {' and '.join(other) or 'settings'} "
@@ -140,12 +140,12 @@ def _memory_of(learner: Any) -> dict[str, Any]:
         memory["log_ent_coef"] = learner.log_ent_coef.detach().clone()
     replay = getattr(learner, "replay_buffer", None)
     if replay is not None:
-        kept = replay.buffer_size if replay.full else replay.pos
+        filled = replay.buffer_size if replay.full else replay.pos
         memory["replay"] = {
             "pos": replay.pos,
             "full": replay.full,
             **{
-                name: torch.from_numpy(np.ascontiguousarray(getattr(replay, name)[:kept]))
+                name: torch.from_numpy(np.ascontiguousarray(getattr(replay, name)[:filled]))
                 for name in _REPLAYED
             },
         }
@@ -160,9 +160,9 @@ def _remember(learner: Any, memory: Mapping[str, Any]) -> None:
     if "log_ent_coef" in memory:
         learner.log_ent_coef.data.copy_(memory["log_ent_coef"])
     if "replay" in memory:
-        replay, kept = learner.replay_buffer, memory["replay"]
-        replay.pos, replay.full = int(kept["pos"]), bool(kept["full"])
+        replay, saved = learner.replay_buffer, memory["replay"]
+        replay.pos, replay.full = int(saved["pos"]), bool(saved["full"])
         for name in _REPLAYED:
-            getattr(replay, name)[: len(kept[name])] = kept[name].numpy()
+            getattr(replay, name)[: len(saved[name])] = saved[name].numpy()
     if "lessons" in memory:
         learner.rollout_buffer.lessons.restore(memory["lessons"])

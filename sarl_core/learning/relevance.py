@@ -255,13 +255,13 @@ def _test(
 
     first = np.array(describe_environment(env_id).label_first, dtype=np.int64)
     agent = PolicyAgent("learner", export_policy(learner, env_id=env_id), True, first)
-    shown = record(env_id, agent, steps=steps, seed=RELEVANCE + SEEDS_A_LEARNER * seed)
+    recorded = record(env_id, agent, steps=steps, seed=RELEVANCE + SEEDS_A_LEARNER * seed)
     applied, broken = [], []
     for shield in shields:
-        decision = shield.decide_batch(shown.observations, shown.actions)
+        decision = shield.decide_batch(recorded.observations, recorded.actions)
         applied.append(int((decision.rules >= 0).any(axis=1).sum()))
         broken.append(int(decision.intervened.sum()))
-    returns, ended = shown.episode_returns, shown.episode_finished
+    returns, ended = recorded.episode_returns, recorded.episode_finished
     assert returns is not None
     some = ended is not None and bool(ended.any())
     return (applied, broken), float(returns[ended].mean() if some else returns.mean())

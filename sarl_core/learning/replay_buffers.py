@@ -95,20 +95,20 @@ class Lessons:
 
     def state(self) -> dict[str, Any]:
         """What a checkpoint keeps of it."""
-        kept = len(self)
+        count = len(self)
         return {
             "seen": self.seen,
-            "observations": torch.from_numpy(self.observations[:kept].copy()),
-            "actions": torch.from_numpy(self.actions[:kept].copy()),
-            "taught": torch.from_numpy(self.taught[:kept].copy()),
+            "observations": torch.from_numpy(self.observations[:count].copy()),
+            "actions": torch.from_numpy(self.actions[:count].copy()),
+            "taught": torch.from_numpy(self.taught[:count].copy()),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Take up where `state` was."""
-        kept = len(state["actions"])
-        self.observations[:kept] = state["observations"].numpy()
-        self.actions[:kept] = state["actions"].numpy()
-        self.taught[:kept] = state["taught"].numpy()
+        count = len(state["actions"])
+        self.observations[:count] = state["observations"].numpy()
+        self.actions[:count] = state["actions"].numpy()
+        self.taught[:count] = state["taught"].numpy()
         self.seen = int(state["seen"])
 
 

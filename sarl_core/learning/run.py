@@ -232,7 +232,7 @@ def _try(
 ) -> Trial:
     """Episodes with a learned policy, which acts deterministically."""
     first = np.zeros(policy.n_dimensions, dtype=np.int64)
-    found = rollout(
+    played = rollout(
         env_id,
         PolicyAgent("learner", policy, False, first),
         shield=shield,
@@ -242,11 +242,11 @@ def _try(
         max_steps=max_steps,
         progress=still,
     )
-    steps = float(found.lengths.sum())
+    steps = float(played.lengths.sum())
     return Trial(
-        returns=tuple(found.returns.tolist()),
-        crashes=int(found.failed.sum()),
-        intervention_rate=float(found.interventions.sum()) / steps,
-        coverage=float(found.covered.sum()) / steps,
-        cut=int(found.cut.sum()),
+        returns=tuple(played.returns.tolist()),
+        crashes=int(played.failed.sum()),
+        intervention_rate=float(played.interventions.sum()) / steps,
+        coverage=float(played.covered.sum()) / steps,
+        cut=int(played.cut.sum()),
     )

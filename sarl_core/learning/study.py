@@ -152,15 +152,15 @@ def run_study(
         for index, (seed, arm) in enumerate(todo):
             before = index * plan.steps
 
-            def told(done: int, _: int, before: int = before) -> bool:
+            def advance(done: int, _: int, before: int = before) -> bool:
                 return progress is None or progress(before + done, total) is not False
 
             if not _finished(folder, arm, seed):
                 try:
-                    _one(plan, folder, arm, seed, told)
+                    _one(plan, folder, arm, seed, advance)
                 except DivergedError as error:
                     diverged.append(f"{arm.title}, seed {seed}: {error}")
-            elif not told(plan.steps, plan.steps):
+            elif not advance(plan.steps, plan.steps):
                 raise CancelledError("stopped")
     except CancelledError as error:
         study = load_study(folder)

@@ -117,8 +117,8 @@ class ArmSummary:
         }
 
     def _trials(self, trials: TrialSummary) -> dict[str, Any]:
-        found = _trial_dict(trials)
-        return found if self.failures_known else found | {"crash_rate": None}
+        fields = _trial_dict(trials)
+        return fields if self.failures_known else fields | {"crash_rate": None}
 
 
 def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
@@ -130,10 +130,10 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
     Returns:
         One entry an arm that has a finished run, in the study's order.
     """
-    found = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
+    by_arm = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
     if not failure_known(study.env_id):
-        return tuple(replace(summary, failures_known=False) for summary in found.values())
-    return tuple(_judged(summary, found.get(summary.arm.alone)) for summary in found.values())
+        return tuple(replace(summary, failures_known=False) for summary in by_arm.values())
+    return tuple(_judged(summary, by_arm.get(summary.arm.alone)) for summary in by_arm.values())
 
 
 def best(summaries: Sequence[ArmSummary]) -> ArmSummary | None:

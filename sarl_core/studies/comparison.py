@@ -13,7 +13,7 @@ import numpy as np
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.failures import failure_known
 from sarl_core.errors import InputError
-from sarl_core.progress import Progress, report
+from sarl_core.progress import Progress, part_of
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside, Shield
@@ -136,24 +136,19 @@ def compare(
         twice = next(name for name in names if names.count(name) > 1)
         raise InputError(f"two of the compared arms are called {twice!r}; give each its own name")
     total = len(arms) * episodes
-    compared = []
-    for index, arm in enumerate(arms):
-
-        def advance(done: int, _: int, before: int = index * episodes) -> None:
-            report(progress, before + done, total)
-
-        compared.append(
-            compare_arm(
-                env_id,
-                arm,
-                episodes=episodes,
-                seed=seed,
-                jobs=jobs,
-                executor=executor,
-                progress=advance,
-            )
+    played = tuple(
+        compare_arm(
+            env_id,
+            arm,
+            episodes=episodes,
+            seed=seed,
+            jobs=jobs,
+            executor=executor,
+            progress=part_of(progress, index * episodes, total),
         )
-    return Comparison(env_id, seed, tuple(arms), tuple(compared))
+        for index, arm in enumerate(arms)
+    )
+    return Comparison(env_id, seed, tuple(arms), played)
 
 
 def compare_arm(
