@@ -10,7 +10,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.settings import known_seeds_notice
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.ablation.outcome import outcome
 from sarl_dashboard.views.ablation.settings import settings
 
@@ -22,7 +22,7 @@ st.caption(
 try:
     choice = settings()
 except SarlError as error:
-    st.error(in_full(str(error)), icon=":material/error:")
+    refuse(error)
     st.stop()
 if choice.on_demonstrated_seeds:
     known_seeds_notice()

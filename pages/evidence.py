@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import influence_sentences
+from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.hold_out import leave_out_choice
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import compact_set
@@ -43,7 +44,7 @@ if not evidence.rule_set.rules:
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
 else:
     show_overview(evidence)
-    cross_fitting.told(
+    elsewhere_notice(
         evidence.thresholds,
         evidence.rule_set.fidelity,
         lambda judged: "".join(map(note, influence_sentences(judged))),

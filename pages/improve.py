@@ -10,7 +10,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.state.data import require_demonstrations
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.order import order_of
 from sarl_dashboard.views.improve.run import run_of
 from sarl_dashboard.views.improve.settings import settings
@@ -27,5 +27,5 @@ order = None
 try:
     order = order_of(choices, demonstrations)
 except SarlError as error:
-    st.error(in_full(str(error)), icon=":material/error:")
+    refuse(error)
 run_of(order)

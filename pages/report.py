@@ -8,7 +8,7 @@ from sarl_core.errors import SarlError
 from sarl_dashboard.jobs.report import comparison_of_session
 from sarl_dashboard.state.data import chosen_dataset, require_demonstrations
 from sarl_dashboard.state.rule_files import OWN_FILE
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.report.order import order_of
 from sarl_dashboard.views.report.preview import report_of
 from sarl_dashboard.views.report.settings import settings
@@ -27,6 +27,6 @@ if choices.rules == OWN_FILE and choices.rule_file is None:
 try:
     order = order_of(choices, demonstrations)
 except SarlError as error:
-    st.error(in_full(str(error)), icon=":material/error:")
+    refuse(error)
     st.stop()
 report_of(order, chosen_dataset().replace("_", "-"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_dashboard.components.edits_notice import notice
+from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.views.rules.in_force import rules_in_force
@@ -16,6 +17,6 @@ in_force = rules_in_force(require_demonstrations())
 if not in_force.rule_set.rules:
     nothing_in_force(in_force.thresholds)
 else:
-    cross_fitting.told(in_force.thresholds, in_force.rule_set.fidelity)
+    elsewhere_notice(in_force.thresholds, in_force.rule_set.fidelity)
     search_and_rules(in_force)
 cross_fitting.make_ready()

@@ -12,7 +12,7 @@ from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.state.environments import demonstrated, environment_of
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.lines import guards, line, pilots
 from sarl_dashboard.views.shield.settings import settings
 from sarl_dashboard.views.shield.table import comparison_of
@@ -28,7 +28,7 @@ try:
     describe_environment(env_id)
     agents = pilots(choices, env_id)
 except SarlError as error:
-    st.error(in_full(str(error)), icon=":material/error:")
+    refuse(error)
     st.stop()
 shields = guards(choices)
 lines = [line(choices, env_id, agent, shield) for agent in agents for shield in shields]

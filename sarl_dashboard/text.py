@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import re
 
+import streamlit as st
+
 _SIGNS = r"\`*_{}[]<>#$~|:&!^+-"
 # What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
 _JOINER = "\u2060"
@@ -15,6 +17,11 @@ def in_full(text: str) -> str:
     """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
     first = text.split(" ", 1)[0]
     return escaped(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
+
+
+def refuse(problem: Exception | str) -> None:
+    """Say what is wrong, in its one sentence."""
+    st.error(in_full(str(problem)), icon=":material/error:")
 
 
 def escaped(text: str) -> str:

@@ -8,10 +8,11 @@ from typing import Any, Generic
 
 import streamlit as st
 
+from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted
 from sarl_dashboard.jobs.episodes import Batch, Row, known, run_batch
-from sarl_dashboard.jobs.job import Job, Place, Result
-from sarl_dashboard.text import in_full
+from sarl_dashboard.jobs.job import Job, Place, Result, Tell
+from sarl_dashboard.text import refuse
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +80,7 @@ def run_bar(
     if job is None or job.key != offer.key or offer.complete:
         return
     for sentence in (*offer.problems, *([str(job.error)] if job.error is not None else [])):
-        st.error(in_full(sentence), icon=":material/error:")
+        refuse(sentence)
     if job.cancelled:
         st.info(offer.cancelled, icon=":material/pause_circle:")
 
@@ -127,3 +128,27 @@ def episodes_bar(place: Place[Batch], rows: Sequence[Row], episodes: int) -> Non
             problems=sorted({str(error) for key, error in problems if key in keys}),
         ),
     )
+
+
+def waited_for(work: Callable[[Tell], Result]) -> Result | None:
+    """Do work that the page waits for; say what is wrong where it fails.
+
+    Args:
+        work: Gives the result, and tells how far it is.
+
+    Returns:
+        The result; None where it failed.
+    """
+    slot = st.empty()
+    bar = slot.progress(0.0, "Starting …")
+
+    def tell(share: float, text: str) -> None:
+        bar.progress(min(max(share, 0.0), 1.0), text)
+
+    try:
+        return work(tell)
+    except SarlError as error:
+        refuse(error)
+        return None
+    finally:
+        slot.empty()

@@ -7,15 +7,10 @@ it as soon as it is there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Executor
-
-import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import digest_of_pairs
-from sarl_core.explaining.html.headings import note
-from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.progress import Progress
@@ -25,14 +20,13 @@ from sarl_dashboard.jobs.mining import mining
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
-from sarl_dashboard.text import in_full
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
-_PLACE = Place[CrossFit]("elsewhere")
-_LOOK_SECONDS = 1.0
+PLACE = Place[CrossFit]("elsewhere")
 
 
-def _key(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
+def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
+    """What the trees without each fold depend on."""
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
     return ("elsewhere", digest_of_pairs(demonstrations), divider)
@@ -50,7 +44,7 @@ def judged(thresholds: Thresholds) -> Judged | None:
     demonstrations = chosen_demonstrations()
     if demonstrations is None or compact_set.in_force():
         return None
-    key = _key(demonstrations, chosen_divider())
+    key = key_of(demonstrations, chosen_divider())
     fit = RESULTS.get(key)
     return _judged(key, thresholds, fit) if isinstance(fit, CrossFit) else None
 
@@ -60,21 +54,22 @@ def _judged(key: tuple[object, ...], thresholds: Thresholds, _fit: CrossFit) -> 
     return _fit.at(thresholds)
 
 
-def _job(key: tuple[object, ...]) -> Job[CrossFit] | None:
+def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:
     """The work of this session, if it is about these data."""
-    job = _PLACE.job
+    job = PLACE.job
     return job if job is not None and job.key == key else None
 
 
-def _begin(demonstrations: Demonstrations, divider: int) -> None:
-    key, whose = _key(demonstrations, divider), owner()
-    if _PLACE.job is not None:
-        _PLACE.job.cancel()
+def begin(demonstrations: Demonstrations, divider: int) -> None:
+    """Grow the trees without each fold, in the place of what is on its way; for a callback too."""
+    key, whose = key_of(demonstrations, divider), owner()
+    if PLACE.job is not None:
+        PLACE.job.cancel()
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         return cross_fit(demonstrations, divider=divider, executor=executor, progress=progress)
 
-    _PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, whose)))
+    PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, whose)))
 
 
 def make_ready() -> None:
@@ -83,60 +78,8 @@ def make_ready() -> None:
     if demonstrations is None or compact_set.in_force() or len(demonstrations) > UNASKED:
         return
     divider = chosen_divider()
-    key = _key(demonstrations, divider)
-    job = _job(key)
+    key = key_of(demonstrations, divider)
+    job = job_of(key)
     # What was made may have been let go of since, for want of room.
     if key not in RESULTS and (job is None or not (job.running or job.error)):
-        _begin(demonstrations, divider)
-
-
-def told(
-    thresholds: Thresholds, fidelity: float, more: Callable[[Judged], str] = lambda _: ""
-) -> None:
-    """What is known of the rules in other episodes, and a warning where that is much less.
-
-    Args:
-        thresholds: At which they were mined.
-        fidelity: On what they were mined from.
-        more: HTML to stand below.
-    """
-    demonstrations = chosen_demonstrations()
-    if demonstrations is None or compact_set.in_force():
-        return
-    divider = chosen_divider()
-    key = _key(demonstrations, divider)
-    waiting = key not in RESULTS
-
-    @st.fragment(run_every=_LOOK_SECONDS if waiting else None)
-    def as_soon_as_it_is_there() -> None:
-        found = judged(thresholds)
-        if found is not None:
-            if waiting:
-                st.rerun()  # as a whole: the numbers above have it too, and nobody looks any more
-            warning = parting_text(fidelity, found)
-            if warning:
-                st.warning(warning, icon=":material/warning:")
-            st.html(note(judged_sentence(found)) + more(found))
-            return
-        job = _job(key)
-        if job is not None and job.error is not None:
-            st.caption(
-                in_full(f"what the rules are worth in other episodes is not known: {job.error}")
-            )
-        elif job is None and len(demonstrations) > UNASKED:
-            st.button(
-                "Find out what they are worth in other episodes",
-                key="elsewhere",
-                icon=":material/play_arrow:",
-                on_click=_begin,
-                args=(demonstrations, divider),
-                help=f"Of more than {UNASKED:,} steps this takes minutes, and a processor",
-            )
-        else:
-            done = "" if job is None else f" ({job.done} of {max(job.total, 1)})"
-            st.caption(
-                "Finding out what the rules are worth in episodes that they were not mined from "
-                f"…{done}"
-            )
-
-    as_soon_as_it_is_there()
+        begin(demonstrations, divider)

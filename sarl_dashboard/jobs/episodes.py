@@ -84,15 +84,15 @@ class Results:
             None if there are none. The same object as the last time if nothing has changed.
         """
         with self._lock:
-            found = self._episodes.get(key)
-            if found is None:
+            episodes = self._episodes.get(key)
+            if episodes is None:
                 return None
             self._episodes.move_to_end(key)
-            if len(found) <= most:
-                return found
+            if len(episodes) <= most:
+                return episodes
             cut = self._cuts.get(key)
             if cut is None or len(cut) != most:
-                cut = self._cuts[key] = found.part(0, most)
+                cut = self._cuts[key] = episodes.part(0, most)
             return cut
 
     def add(self, row: Row, episodes: Episodes) -> None:
@@ -104,13 +104,13 @@ class Results:
                 asked for the same.
         """
         with self._lock:
-            kept = self._episodes.get(row.key)
-            following = row.seed + (len(kept) if kept is not None else 0)
-            known = following - int(episodes.seeds[0])
-            if not 0 <= known < len(episodes):
+            before = self._episodes.get(row.key)
+            following = row.seed + (len(before) if before is not None else 0)
+            already = following - int(episodes.seeds[0])
+            if not 0 <= already < len(episodes):
                 return
-            fresh = episodes.part(known, len(episodes))
-            self._episodes[row.key] = fresh if kept is None else join([kept, fresh])
+            fresh = episodes.part(already, len(episodes))
+            self._episodes[row.key] = fresh if before is None else join([before, fresh])
             self._episodes.move_to_end(row.key)
             while len(self._episodes) > MOST_RESULTS:
                 gone, _ = self._episodes.popitem(last=False)

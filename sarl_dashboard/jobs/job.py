@@ -23,6 +23,8 @@ from sarl_core.progress import CancelledError
 GONE_AFTER = 20.0  # seconds without a connection: longer than a reload, or a tunnel
 
 Result = TypeVar("Result")
+Tell = Callable[[float, str], None]
+"""Called with the share that is done, 0 to 1, and what is being done."""
 
 
 class Job(Generic[Result]):

@@ -11,15 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TypeVar
 
 import streamlit as st
-from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.environments.description import EnvironmentDescription
-from sarl_core.errors import SarlError
 from sarl_core.explaining.html.lit_path import PathFinder
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
@@ -31,16 +28,14 @@ from sarl_core.rendering.replay import render_episode, side_by_side
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.jobs.job import Tell
 from sarl_dashboard.memory_cache import BoundedCache
-from sarl_dashboard.text import in_full
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
 KEPT_PICTURES = 64  # of a replay, some 30 kB each
 _LATEST = "_replay"
-
-Told = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -148,8 +143,8 @@ class Order:
         request = self.request
         # Fresh weights depend on a seed too: those of the first episode act in all.
         made_for = f" made for {request.seed}" if request.agent == "untrained" else ""
-        told = request.agent_digest + (made_for if seed != request.seed else "")
-        return replace(self, request=replace(request, seed=seed, agent_digest=told))
+        digest = request.agent_digest + (made_for if seed != request.seed else "")
+        return replace(self, request=replace(request, seed=seed, agent_digest=digest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +194,7 @@ def compared(order: Order) -> tuple[Order, int] | None:
 # --- running -----------------------------------------------------------------------------------
 
 
-def run(order: Order, tell: Told) -> Replay:
+def run(order: Order, tell: Tell) -> Replay:
     """Run the episode, without the rules and with them, and draw it.
 
     Raises:
@@ -243,7 +238,7 @@ def run(order: Order, tell: Told) -> Replay:
     )
 
 
-def compare(order: Order, episodes: int, tell: Told) -> tuple[tuple[str, Episodes], ...]:
+def compare(order: Order, episodes: int, tell: Tell) -> tuple[tuple[str, Episodes], ...]:
     """Run several episodes with the rules and without; of the first run the steps are kept.
 
     Args:
@@ -259,7 +254,7 @@ def compare(order: Order, episodes: int, tell: Told) -> tuple[tuple[str, Episode
     wanted = [(ALONE, None)] if shield is None else [(WITH, shield), (WITHOUT, None)]
     for part, (name, guard) in enumerate(wanted):
 
-        def told(done: int, total: int, name: str = name, part: int = part) -> None:
+        def playing(done: int, total: int, name: str = name, part: int = part) -> None:
             tell((part + done / total) / len(wanted), f"{done} of {total} episodes, {name} …")
 
         runs.append(
@@ -272,14 +267,14 @@ def compare(order: Order, episodes: int, tell: Told) -> tuple[tuple[str, Episode
                     episodes=episodes,
                     seed=order.request.seed,
                     keep_steps=part == 0,
-                    progress=told,
+                    progress=playing,
                 ),
             )
         )
     return tuple(runs)
 
 
-def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
+def run_fork(order: Order, step: int, rest: Rest, tell: Tell) -> Fork:
     """Run the episode with what the shield changed at a step, and without it, and draw both.
 
     Args:
@@ -303,7 +298,7 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
     def encoding(done: int, total: int) -> None:
         tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
 
-    found = fork(
+    branched = fork(
         request.env_id,
         agent,
         shield,
@@ -314,9 +309,9 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Told) -> Fork:
         progress=playing,
     )
     dimensions = environment_dimensions(order.description, rule_set)
-    found = replace(found, replay=found.replay.named(dimensions))
-    found.gif(progress=encoding)
-    return found
+    branched = replace(branched, replay=branched.replay.named(dimensions))
+    branched.gif(progress=encoding)
+    return branched
 
 
 def movie(replay: Replay) -> bytes:
@@ -325,29 +320,3 @@ def movie(replay: Replay) -> bytes:
         path = Path(folder) / "replay.mp4"
         replay.film.save(path)
         return path.read_bytes()
-
-
-Result = TypeVar("Result")
-
-
-def with_progress(work: Callable[[Told], Result]) -> Result | None:
-    """Do long work under a progress bar; say what is wrong where it fails."""
-    slot = st.empty()
-    bar = slot.progress(0.0, "Starting …")
-    try:
-        return work(lambda share, text: set_bar(bar, share, text))
-    except SarlError as error:
-        refuse(error)
-        return None
-    finally:
-        slot.empty()
-
-
-def refuse(error: SarlError) -> None:
-    """Say what is wrong, in its one sentence."""
-    st.error(in_full(str(error)), icon=":material/error:")
-
-
-def set_bar(bar: DeltaGenerator, share: float, text: str) -> None:
-    """Move the bar."""
-    bar.progress(min(max(share, 0.0), 1.0), text)

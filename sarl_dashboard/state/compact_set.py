@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import streamlit as st
-
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.mining.budgeted_trees import leaf_rules
@@ -21,7 +19,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, compact_file, compact_rules
 from sarl_dashboard.state.url import set_url_choice, url_choice
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 
 THRESHOLDS = "thresholds"
 # Which set the Rules page has to show, to show a rule of a set that was chosen elsewhere.
@@ -84,7 +82,7 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
         shipped, digest = compact_rules()
         return _counted(f"{digest} {demonstrations.digest}", shipped, demonstrations)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return None
 
 

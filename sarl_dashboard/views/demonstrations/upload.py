@@ -17,7 +17,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations, set_upload
 from sarl_dashboard.state.environments import registered
 from sarl_dashboard.state.url import with_own
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 
 _LOGGER = logging.getLogger(__name__)
 ENVIRONMENTS = tuple(env_id for _, env_id in SHIPPED_SETS.values())
@@ -156,7 +156,7 @@ def upload_section(*, expanded: bool) -> None:
         )
         error = st.session_state.get("_upload_error")
         if error:
-            st.error(in_full(error), icon=":material/error:")
+            refuse(error)
             if chosen_demonstrations() is not None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()

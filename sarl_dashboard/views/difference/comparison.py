@@ -23,7 +23,7 @@ from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.state.data import chosen_demonstrations, digest_or_empty
-from sarl_dashboard.text import escaped, in_full, together
+from sarl_dashboard.text import escaped, refuse, together
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
 
 EVERY = "all"
@@ -63,7 +63,7 @@ def comparison() -> None:
     try:
         compared = _compare(*sides)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return
     _show_states(compared)
     _show_rules(compared)

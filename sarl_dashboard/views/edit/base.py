@@ -8,7 +8,7 @@ from sarl_core.errors import SarlError
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.state.rule_files import OWN_FILE
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import in_full, refuse
 
 
 def base_choice() -> Base:
@@ -30,7 +30,7 @@ def base_choice() -> Base:
     except SarlError as problem:
         error = st.session_state.pop("_edit_error", None)
         if error:
-            st.error(in_full(error), icon=":material/error:")
+            refuse(error)
         st.info(in_full(str(problem)), icon=":material/upload_file:")
         st.stop()
 

@@ -7,7 +7,7 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.edit import form
 from sarl_dashboard.views.edit.conflicts import conflicts
 from sarl_dashboard.views.edit.rule import chosen_rule
@@ -22,7 +22,7 @@ def editing(of: Base) -> None:
         before = edits.verdicts_of(of, ())
         after = edits.verdicts_of(of, edits.history(of).edits)
     except SarlError as problem:
-        st.error(in_full(str(problem)), icon=":material/error:")
+        refuse(problem)
         return
     bar(of)
     numbers(of, before, after)

@@ -13,7 +13,7 @@ from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
-from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.text import escaped, refuse
 
 
 def bar(of: Base) -> None:
@@ -22,7 +22,7 @@ def bar(of: Base) -> None:
     rule_set = edits.edited(of)
     error = st.session_state.pop("_edit_error", None)
     if error:
-        st.error(in_full(error), icon=":material/error:")
+        refuse(error)
     with st.container(horizontal=True, gap="small", vertical_alignment="center"):
         for name, icon, step, waiting in (
             ("Undo", "undo", edits.undo, history.edits[-1:]),

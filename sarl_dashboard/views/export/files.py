@@ -19,7 +19,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.export.settings import Settings
 
 LINES = 120
@@ -70,7 +70,7 @@ def show_file(prepared: Prepared, key: str, settings: Settings) -> None:
     try:
         content = content_of(key, form.suffix, projection, prepared.rule_set)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return
     name = f"{settings.stem}{form.suffix}"
     with st.container(horizontal=True, vertical_alignment="center"):

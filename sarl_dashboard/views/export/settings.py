@@ -15,7 +15,7 @@ from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
-from sarl_dashboard.text import file_name, in_full
+from sarl_dashboard.text import file_name, refuse
 
 
 class Format(NamedTuple):
@@ -91,7 +91,7 @@ def chosen_rules() -> tuple[RuleSet, str]:
     try:
         rule_set, digest = rules_for(choice, uploaded)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         st.stop()
     assert rule_set is not None
     return rule_set, digest

@@ -69,10 +69,10 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
         "Grey: the demonstrated states. Orange: the states without a rule. The features in which "
         "they differ most come first."
     )
-    found = gap_histograms(outcome.order.start, gaps)
+    histograms = gap_histograms(outcome.order.start, gaps)
     features = outcome.order.start.features
     with st.grid(3, min_column_width=280) as grid:
-        for one in found[:FEATURES_SHOWN]:
+        for one in histograms[:FEATURES_SHOWN]:
             feature = features[one.feature]
             with grid.cell():
                 st.markdown(f"**{escaped(feature.name)}**")
@@ -81,8 +81,8 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
                     f"gap_{one.feature}",
                     f"{feature.name}: demonstrated states and states without a rule",
                 )
-    if len(found) > FEATURES_SHOWN:
-        st.caption(f"{FEATURES_SHOWN} of {len(found)} features.")
+    if len(histograms) > FEATURES_SHOWN:
+        st.caption(f"{FEATURES_SHOWN} of {len(histograms)} features.")
 
 
 def show_states(outcome: Outcome, gaps: Gaps) -> None:

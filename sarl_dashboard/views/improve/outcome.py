@@ -83,7 +83,6 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
         return
     returns = improved.reported.returns
     spread = improved.reported.statistics
-    shown = improved.demonstrations
     st.markdown(
         f"A novice that acts at random, kept to the {size} of round "
         f"{improved.chosen}{refined}, reached a mean return of **{spread.mean:,.1f}** over "
@@ -121,7 +120,7 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             ("Rules", f"{len(rules):,}", "Over all actions"),
             (
                 "Demonstrations",
-                f"{len(shown):,}",
+                f"{len(improved.demonstrations):,}",
                 "State-action pairs that they were made of, all answered by the expert",
             ),
         ):
@@ -130,14 +129,14 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
 
 def failures_of(episodes: Episodes) -> tuple[str, str]:
     """The share of episodes that ended in failure, and what it tells."""
-    found = episodes.failures
-    if found is None:
+    failed = episodes.failures
+    if failed is None:
         why = no_failures_text(episodes.env_id)
         return "–", f"{why[0].upper()}{why[1:]}"
     return (
-        at_least_text(found.rate, found.unknown),
-        f"{found.count:,} of {found.of:,} fresh episodes, 95 % interval {share_text(found.low)} to "
-        f"{share_text(found.high)}",
+        at_least_text(failed.rate, failed.unknown),
+        f"{failed.count:,} of {failed.of:,} fresh episodes, 95 % interval {share_text(failed.low)} to "
+        f"{share_text(failed.high)}",
     )
 
 

@@ -17,7 +17,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.state.data import SHIPPED_SETS
 from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
 BUDGETS = "budgets.json"
@@ -39,7 +39,7 @@ def show_shipped() -> None:
             show_card(card)
         show_budgets()
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
 
 
 def read_document(path: Path) -> dict[str, Any] | None:

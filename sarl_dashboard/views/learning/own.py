@@ -11,7 +11,7 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.learning import Order, learning, study_of
-from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.settings import settings
 from sarl_dashboard.views.learning.study import archive, show_curves, show_study
 
@@ -65,7 +65,7 @@ def begun(order: Order | None) -> LearningStudy | None:
     try:
         return study_of(order)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return None
 
 

@@ -14,7 +14,7 @@ from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.environments import environment_of, registered
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, compact_file
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 
 MOST_STEPS, MOST_SEEDS = 500_000, 5
 
@@ -104,7 +104,7 @@ def settings() -> Order | None:
         )
         notes_notice(plan.notes)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return None
     return Order(env_id, rule_set, digest, chosen, int(steps), int(seeds), projection)
 

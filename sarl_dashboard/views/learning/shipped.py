@@ -15,7 +15,7 @@ from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.jobs import learning
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
 from sarl_dashboard.state.rule_files import RULES_FOLDER
-from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.study import show_study
 
 
@@ -32,7 +32,7 @@ def shipped_studies() -> dict[str, LearningStudy]:
         try:
             studies[plan.parent.name] = shipped(plan.parent, plan.stat().st_mtime_ns)
         except (SarlError, OSError) as error:
-            st.error(in_full(str(error)), icon=":material/error:")
+            refuse(error)
     return studies
 
 

@@ -30,9 +30,9 @@ def show_study(study: LearningStudy, name: str) -> None:
     """
     summaries = summarise_study(study)
     answer, *more = finding(study, summaries)
-    found = best(summaries)
-    (st.success if found is not None else st.info)(
-        escaped(answer), icon=":material/verified_user:" if found is not None else ":material/info:"
+    way = best(summaries)
+    (st.success if way is not None else st.info)(
+        escaped(answer), icon=":material/verified_user:" if way is not None else ":material/info:"
     )
     picture, words = st.columns([3, 2], gap="large")
     with picture:

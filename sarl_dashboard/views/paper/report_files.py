@@ -15,7 +15,7 @@ from sarl_core.paper.study import FULL_MINUTES, Drawing
 from sarl_core.paper.tables import read_table
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +51,7 @@ def require_report() -> Report:
     try:
         reproduced = report()
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         st.caption("This makes it again:")
         st.code(COMMAND, language="sh")
         st.stop()

@@ -11,7 +11,7 @@ from sarl_core.paper.study import replication
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.session import is_dark
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.paper import report_files
 from sarl_dashboard.views.paper.claims import show_claims
 
@@ -43,7 +43,7 @@ def show_study(name: str, entry: Entry | None) -> None:
         frame = report_files.table(name, entry)
         parts = study.parts(frame)
     except SarlError as error:
-        st.error(in_full(str(error)), icon=":material/error:")
+        refuse(error)
         return
     st.caption(f"Made from {replication(frame)} for each environment.")
     part = parts[0]

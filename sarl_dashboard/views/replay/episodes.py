@@ -18,6 +18,7 @@ from sarl_core.rollouts.flips import pace_of
 from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import flips_rate, flips_title
+from sarl_dashboard.components.run_bar import waited_for
 from sarl_dashboard.jobs.replays import (
     EPISODES,
     WITH,
@@ -25,7 +26,6 @@ from sarl_dashboard.jobs.replays import (
     compare,
     compared,
     kept_comparisons,
-    with_progress,
 )
 
 
@@ -52,7 +52,7 @@ def comparison(order: Order) -> None:
         if st.button(
             f"Run {episodes} episodes", key="compare", icon=":material/stacked_bar_chart:"
         ):
-            runs = with_progress(lambda tell: compare(order, episodes, tell))
+            runs = waited_for(lambda tell: compare(order, episodes, tell))
             if runs is not None:
                 kept_comparisons().put((order.request, episodes), runs)
                 st.session_state["_compared"] = (order, episodes)

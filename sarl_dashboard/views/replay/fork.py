@@ -8,7 +8,8 @@ from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.forking import Fork, Rest
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.jobs.replays import Played, kept_forks, run_fork, with_progress
+from sarl_dashboard.components.run_bar import waited_for
+from sarl_dashboard.jobs.replays import Played, kept_forks, run_fork
 from sarl_dashboard.text import escaped
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
@@ -49,7 +50,7 @@ def fork_section(played: Played, current: int) -> None:
             key="fork",
             icon=":material/call_split:",
         ):
-            branched = with_progress(lambda tell: run_fork(order, current, rest, tell))
+            branched = waited_for(lambda tell: run_fork(order, current, rest, tell))
             if branched is not None:
                 kept_forks().put(key, branched)
                 slot.empty()

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.run_bar import waited_for
 from sarl_dashboard.jobs.replays import (
     Order,
     Played,
     compared,
     kept_replays,
     latest_order,
-    refuse,
     run,
     show_next,
-    with_progress,
 )
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.replay.settings import Settings
 
 
@@ -65,7 +65,7 @@ def run_bar(settings: Settings, jump: Jump | None) -> None:
         refuse(error)
         return
     if kept_replays().get(order.request) is None:
-        replay = with_progress(lambda tell: run(order, tell))
+        replay = waited_for(lambda tell: run(order, tell))
         if replay is None:
             return
         kept_replays().put(order.request, replay)

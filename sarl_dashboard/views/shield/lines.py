@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import streamlit as st
-
 from sarl_core.agents.agent import Agent
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.comparison import ArmStyle, arm_style
@@ -18,7 +16,7 @@ from sarl_dashboard.jobs.episodes import Row, row_key
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, agent_for
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.settings import NO_SHIELD, Choices
 
 # Their places give them their colours, the paper's where it has them.
@@ -112,7 +110,7 @@ def guards(choices: Choices) -> list[Guard]:
                 chosen.append(Guard(choice, RULES_PLACES.index(choice), rules, digest))
     no_boxes_notice([guard.rules for guard in chosen if guard.rules is not None], choices.outside)
     for problem in problems:
-        st.error(in_full(problem), icon=":material/error:")
+        refuse(problem)
     return chosen
 
 

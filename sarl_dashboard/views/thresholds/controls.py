@@ -18,6 +18,7 @@ from sarl_core.mining.threshold_steps import (
     neat_jumps,
     with_step,
 )
+from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
@@ -99,7 +100,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     everything = display.dimension is None
     show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
     if everything:
-        cross_fitting.told(thresholds, float(point.fidelity[0, 0]))
+        elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
     across, down = mark_place(landscape, thresholds.support, thresholds.confidence)
     st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
     if display.compact is not None:

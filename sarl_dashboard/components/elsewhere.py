@@ -1,0 +1,72 @@
+"""What rules are worth in episodes that they were not mined from, beside what they say here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import streamlit as st
+
+from sarl_core.explaining.html.headings import note
+from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
+from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.validation.cross_fitting import Judged
+from sarl_dashboard.cache import RESULTS
+from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.thresholds import chosen_divider
+from sarl_dashboard.text import in_full
+
+_LOOK_SECONDS = 1.0
+
+
+def elsewhere_notice(
+    thresholds: Thresholds, fidelity: float, more: Callable[[Judged], str] = lambda _: ""
+) -> None:
+    """What is known of the rules in other episodes, and a warning where that is much less.
+
+    Args:
+        thresholds: At which they were mined.
+        fidelity: On what they were mined from.
+        more: HTML to stand below.
+    """
+    demonstrations = chosen_demonstrations()
+    if demonstrations is None or compact_set.in_force():
+        return
+    divider = chosen_divider()
+    key = cross_fitting.key_of(demonstrations, divider)
+    waiting = key not in RESULTS
+
+    @st.fragment(run_every=_LOOK_SECONDS if waiting else None)
+    def as_soon_as_it_is_there() -> None:
+        elsewhere = cross_fitting.judged(thresholds)
+        if elsewhere is not None:
+            if waiting:
+                st.rerun()  # as a whole: the numbers above have it too, and nobody looks any more
+            warning = parting_text(fidelity, elsewhere)
+            if warning:
+                st.warning(warning, icon=":material/warning:")
+            st.html(note(judged_sentence(elsewhere)) + more(elsewhere))
+            return
+        job = cross_fitting.job_of(key)
+        if job is not None and job.error is not None:
+            st.caption(
+                in_full(f"what the rules are worth in other episodes is not known: {job.error}")
+            )
+        elif job is None and len(demonstrations) > cross_fitting.UNASKED:
+            st.button(
+                "Find out what they are worth in other episodes",
+                key="elsewhere",
+                icon=":material/play_arrow:",
+                on_click=cross_fitting.begin,
+                args=(demonstrations, divider),
+                help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and a processor",
+            )
+        else:
+            done = "" if job is None else f" ({job.done} of {max(job.total, 1)})"
+            st.caption(
+                "Finding out what the rules are worth in episodes that they were not mined from "
+                f"…{done}"
+            )
+
+    as_soon_as_it_is_there()
