@@ -60,7 +60,8 @@ def elsewhere_notice(
                 icon=":material/play_arrow:",
                 on_click=cross_fitting.begin,
                 args=(demonstrations, divider),
-                help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and a processor",
+                help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and a "
+                "processor",
             )
         else:
             done = "" if job is None else f" ({job.done} of {max(job.total, 1)})"

@@ -135,8 +135,8 @@ def failures_of(episodes: Episodes) -> tuple[str, str]:
         return "–", f"{why[0].upper()}{why[1:]}"
     return (
         at_least_text(failed.rate, failed.unknown),
-        f"{failed.count:,} of {failed.of:,} fresh episodes, 95 % interval {share_text(failed.low)} to "
-        f"{share_text(failed.high)}",
+        f"{failed.count:,} of {failed.of:,} fresh episodes, 95 % interval "
+        f"{share_text(failed.low)} to {share_text(failed.high)}",
     )
 
 
