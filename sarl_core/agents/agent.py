@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
-from sarl_core.environments.feature_order import Named, line_up
+from sarl_core.environments.feature_order import NamedFeatures, line_up
 from sarl_core.errors import InputError
 from sarl_core.shipped import DATA
 
@@ -347,12 +347,12 @@ def order_notes(agent: Agent, env_id: str) -> tuple[str, ...]:
         discrete=here.is_discrete,
     )
     order = line_up(
-        Named(
+        NamedFeatures(
             f"the policy {agent.name}",
             tuple(name for name, _ in names.features),
             agent.policy.env_id,
         ),
-        Named(env_id.rsplit(":", 1)[-1], here.feature_names, env_id),
+        NamedFeatures(env_id.rsplit(":", 1)[-1], here.feature_names, env_id),
     )
     if order.how == "permuted":  # two environments of one catalogue: none is the other's
         raise InputError(

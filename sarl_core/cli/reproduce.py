@@ -13,7 +13,7 @@ from sarl_core.cli import terminal
 from sarl_core.cli.options import Json, out_option
 
 if TYPE_CHECKING:
-    from sarl_core.paper.report import Entry, Report
+    from sarl_core.paper.report import Entry, PaperReport
     from sarl_core.paper.study import Study
     from sarl_core.progress import Progress
 
@@ -83,7 +83,7 @@ def reproduce(
         _print_claims(report, [study.name for study in chosen])
 
 
-def _print_claims(report: Report, names: list[str]) -> None:
+def _print_claims(report: PaperReport, names: list[str]) -> None:
     from sarl_core.paper.chance import chance_text
     from sarl_core.paper.verdicts import VERDICTS
 

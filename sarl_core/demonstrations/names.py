@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import EnvironmentDescription
-from sarl_core.environments.feature_order import Named, line_up
+from sarl_core.environments.feature_order import NamedFeatures, line_up
 from sarl_core.errors import InputError, quoted
 
 
@@ -150,8 +150,8 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
             f"the demonstrations have {there} feature{'' if there == 1 else 's'} and "
             f"{description.env_id} has {wanted}; choose the environment that they are from"
         )
-    first = Named("the demonstrations", own.features, demonstrations.env_id)
-    second = Named(description.env_id, description.feature_names, description.env_id)
+    first = NamedFeatures("the demonstrations", own.features, demonstrations.env_id)
+    second = NamedFeatures(description.env_id, description.feature_names, description.env_id)
     features = line_up(first, second)
     orders = [features]
     if features.how == "permuted":

@@ -23,7 +23,7 @@ _OBSERVATION = ("observation", "observations")
 _MOST_CHARACTERS = 110  # of a list in a message
 
 
-class Named(NamedTuple):
+class NamedFeatures(NamedTuple):
     """One of two things that meet.
 
     Attributes:
@@ -37,7 +37,7 @@ class Named(NamedTuple):
     env_id: str = ""
 
 
-class Order(NamedTuple):
+class FeatureOrder(NamedTuple):
     """How the features of one thing line up with another's.
 
     Attributes:
@@ -56,7 +56,7 @@ class Order(NamedTuple):
         return tuple(entries[place] for place in self.places) if entries else entries
 
 
-def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
+def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "features") -> FeatureOrder:
     """Say which feature of one thing is which of another; the one place that decides it.
 
     Names are the same whatever their capitals, and whether words are parted by spaces, lines or
@@ -90,10 +90,10 @@ def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
     known = first.env_id != "" and _bare(first.env_id) == _bare(second.env_id)
     nameless = [only_counts(side.names) for side in (first, second)]
     if one == other and (known or not all(nameless)):
-        return Order("same", as_they_are)
+        return FeatureOrder("same", as_they_are)
     if sorted(one) == sorted(other) and len(set(one)) == len(one) and not all(nameless):
         places = tuple(one.index(name) for name in other)
-        return Order(
+        return FeatureOrder(
             "permuted",
             places,
             f"the {what} of {first.whose} were put into the order of "
@@ -103,7 +103,7 @@ def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
         who = " and ".join(
             side.whose for side, empty in zip((first, second), nameless, strict=True) if empty
         )
-        return Order(
+        return FeatureOrder(
             "trusted",
             as_they_are,
             f"the {what} of {who} have no names, so they were trusted to be in the order of "
@@ -116,7 +116,7 @@ def line_up(first: Named, second: Named, *, what: str = "features") -> Order:
             for mine, theirs, *plain in zip(first.names, second.names, one, other, strict=True)
             if plain[0] != plain[1]
         ]
-        return Order(
+        return FeatureOrder(
             "trusted",
             as_they_are,
             f"some {what} have other names in {first.whose} than in {second.whose} "

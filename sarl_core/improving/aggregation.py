@@ -38,7 +38,7 @@ _MARKS = 8  # points on the way of a refinement from which the best is chosen
 
 
 @dataclass(frozen=True)
-class Round:
+class AggregationRound:
     """What one round brought.
 
     Attributes:
@@ -91,7 +91,7 @@ class Aggregation:
     plan: Plan
     rule_set: RuleSet
     trees: tuple[PolicyTree, ...]
-    rounds: tuple[Round, ...]
+    rounds: tuple[AggregationRound, ...]
     chosen: int
     validation_mean: float | None
     refined: bool
@@ -127,7 +127,7 @@ def aggregate(
     jobs: int = 1,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    watch: Callable[[Round], None] | None = None,
+    watch: Callable[[AggregationRound], None] | None = None,
 ) -> Aggregation:
     """Improve demonstrations and rules in turns.
 
@@ -219,7 +219,7 @@ class _Run:
         self.plan, self.env_id, self.jobs, self.executor = plan, env_id, jobs, executor
         self.agent, self.expert = agent, expert
         self.answers = Answers(env_id, expert, start)
-        self.rounds: list[Round] = []
+        self.rounds: list[AggregationRound] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
         self.choice: _Choice | None = None
         self.reported: Episodes | None = None
@@ -311,7 +311,7 @@ class _Run:
         otherwise = covered & (said != labels)
         self.trees.append(trees)
         self.rounds.append(
-            Round(
+            AggregationRound(
                 number=number,
                 pairs=trees[0].source.steps,
                 rules=len(rules),

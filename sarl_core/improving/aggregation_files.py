@@ -12,7 +12,7 @@ import numpy as np
 
 from sarl_core.errors import WorkError
 from sarl_core.files import whole_file
-from sarl_core.improving.aggregation import Aggregation, Round
+from sarl_core.improving.aggregation import Aggregation, AggregationRound
 from sarl_core.mining.rule_files import write_rules
 from sarl_core.rollouts.statistics import summarise
 
@@ -157,7 +157,7 @@ def _most_rules(aggregation: Aggregation) -> int:
     return max(len(rules.of_dimension(index)) for index in range(len(rules.actions)))
 
 
-def _round(one: Round) -> dict[str, Any]:
+def _round(one: AggregationRound) -> dict[str, Any]:
     spread = summarise(one.returns)
     return {
         "number": one.number,

@@ -15,7 +15,7 @@ import numpy as np
 
 from sarl_core.errors import InputError, WorkError
 from sarl_core.files import whole_file
-from sarl_core.learning.curves import LearningCurve
+from sarl_core.learning.curves import LearningEpisodes
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -35,7 +35,7 @@ class Rest:
         sittings: In how many goes.
     """
 
-    curve: LearningCurve
+    curve: LearningEpisodes
     seconds: float
     sittings: int
 
@@ -123,7 +123,7 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
         learner.num_timesteps = int(document["steps"])
         _remember(learner, document["memory"])
         return Rest(
-            LearningCurve.from_dict(document["curve"]),
+            LearningEpisodes.from_dict(document["curve"]),
             float(document["seconds"]),
             int(document["sittings"]),
         )

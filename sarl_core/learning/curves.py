@@ -23,7 +23,7 @@ _KINDS: dict[str, type] = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LearningCurve:
+class LearningEpisodes:
     """E episodes that ended while learning, in the order in which they did; read-only.
 
     Attributes:
@@ -54,9 +54,9 @@ class LearningCurve:
         return len(self.ends)
 
     def __repr__(self) -> str:
-        """As `LearningCurve(episodes=412, steps=119936, crashes=130)`."""
+        """As `LearningEpisodes(episodes=412, steps=119936, crashes=130)`."""
         steps = int(self.ends[-1]) if len(self) else 0
-        return f"LearningCurve(episodes={len(self)}, steps={steps}, crashes={self.crashes})"
+        return f"LearningEpisodes(episodes={len(self)}, steps={steps}, crashes={self.crashes})"
 
     @property
     def crashes(self) -> int:
@@ -108,7 +108,7 @@ class LearningCurve:
         return {name: getattr(self, name).tolist() for name in _KINDS}
 
     @classmethod
-    def from_dict(cls, columns: Mapping[str, Any]) -> LearningCurve:
+    def from_dict(cls, columns: Mapping[str, Any]) -> LearningEpisodes:
         """Read what `to_dict` wrote.
 
         Args:
@@ -145,7 +145,7 @@ class Bins:
     interventions: NDArray[np.float64]
 
 
-NO_EPISODES = LearningCurve.from_dict({name: [] for name in _KINDS})
+NO_EPISODES = LearningEpisodes.from_dict({name: [] for name in _KINDS})
 
 
 @dataclass(frozen=True)

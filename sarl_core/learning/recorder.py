@@ -15,7 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from sarl_core.environments.failures import failed
 from sarl_core.learning.arms import Handover, LearningArm
-from sarl_core.learning.curves import LearningCurve
+from sarl_core.learning.curves import LearningEpisodes
 from sarl_core.learning.learners import MaskedPPO
 from sarl_core.learning.replay_buffers import HandoverVecEnv
 
@@ -35,12 +35,12 @@ class Recorder(BaseCallback):
         env_id: str,
         arm: LearningArm,
         env: Any,
-        before: LearningCurve,
+        before: LearningEpisodes,
         *,
         steps: int,
         seed: int,
-        tell: Callable[[LearningCurve, int], bool],
-        keep: Callable[[LearningCurve], None],
+        tell: Callable[[LearningEpisodes, int], bool],
+        keep: Callable[[LearningEpisodes], None],
     ) -> None:
         """Begin, or go on after an earlier sitting.
 
@@ -70,9 +70,9 @@ class Recorder(BaseCallback):
         self.told = self.saved = time.monotonic()
         self._share(np.arange(count))
 
-    def curve(self) -> LearningCurve:
+    def curve(self) -> LearningEpisodes:
         """The episodes that have ended."""
-        return LearningCurve.from_dict(self.columns)
+        return LearningEpisodes.from_dict(self.columns)
 
     def _on_step(self) -> bool:
         dones: NDArray[np.bool_] = self.locals["dones"]

@@ -15,7 +15,7 @@ from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
 from sarl_core.learning.checkpoints import Rest, load_checkpoint, save_checkpoint
-from sarl_core.learning.curves import NO_EPISODES, LearningCurve, Trial
+from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes, Trial
 from sarl_core.learning.experts import export_policy
 from sarl_core.learning.recipes import make_learner
 from sarl_core.mining.rule_set import RuleSet, rules_digest
@@ -32,7 +32,7 @@ class DivergedError(WorkError):
     """The weights of a learner are no numbers any more."""
 
 
-Watch = Callable[[LearningCurve, int], None]
+Watch = Callable[[LearningEpisodes, int], None]
 """Called now and then with the curve so far and the environment steps made."""
 
 
@@ -57,7 +57,7 @@ class LearningResult:
     arm: LearningArm
     steps: int
     seed: int
-    curve: LearningCurve
+    curve: LearningEpisodes
     policy: MlpPolicy
     alone: Trial
     shielded: Trial | None
@@ -131,14 +131,14 @@ def learn(
         fresh = np.random.SeedSequence((seed, learner.num_timesteps)).generate_state(1)
         learner.set_random_seed(int(fresh[0] % 2**31))
 
-    def so_far(curve: LearningCurve) -> Rest:
+    def so_far(curve: LearningEpisodes) -> Rest:
         return Rest(curve, rest.seconds + time.monotonic() - began, rest.sittings + 1)
 
-    def keep(curve: LearningCurve) -> None:
+    def keep(curve: LearningEpisodes) -> None:
         if checkpoint is not None:
             save_checkpoint(checkpoint, learner, identity, so_far(curve))
 
-    def tell(curve: LearningCurve, done: int) -> bool:
+    def tell(curve: LearningEpisodes, done: int) -> bool:
         if watch is not None:
             watch(curve, done)
         return progress is None or progress(min(done, steps), steps) is not False
@@ -169,10 +169,10 @@ def _learn(
     arm: LearningArm,
     steps: int,
     seed: int,
-    before: LearningCurve,
-    tell: Callable[[LearningCurve, int], bool],
-    keep: Callable[[LearningCurve], None],
-) -> LearningCurve:
+    before: LearningEpisodes,
+    tell: Callable[[LearningEpisodes, int], bool],
+    keep: Callable[[LearningEpisodes], None],
+) -> LearningEpisodes:
     """Learn until the steps are made; keep what was learned, then and when stopped.
 
     Raises:

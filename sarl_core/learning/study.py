@@ -11,7 +11,7 @@ import numpy as np
 
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
-from sarl_core.learning.curves import NO_EPISODES, LearningCurve
+from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes
 from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn
 from sarl_core.learning.study_files import (
     FORMAT,
@@ -217,7 +217,7 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
     written = -np.inf
     latest = LearningRun(arm, seed, 0, NO_EPISODES)
 
-    def watch(curve: LearningCurve, done: int) -> None:
+    def watch(curve: LearningEpisodes, done: int) -> None:
         nonlocal written, latest
         latest = LearningRun(arm, seed, min(done, plan.steps), curve)
         if time.monotonic() - written > _WRITTEN_EVERY:

@@ -17,7 +17,7 @@ from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import ARMS, LearningArm
-from sarl_core.learning.curves import LearningCurve, Trial
+from sarl_core.learning.curves import LearningEpisodes, Trial
 from sarl_core.limits import limited_bytes
 
 FORMAT = "sarl-learning"
@@ -50,7 +50,7 @@ class LearningRun:
     arm: LearningArm
     seed: int
     done: int
-    curve: LearningCurve
+    curve: LearningEpisodes
     alone: Trial | None = None
     shielded: Trial | None = None
     seconds: float = 0.0
@@ -182,7 +182,7 @@ def load_run(path: Path) -> LearningRun:
     """
     document = read_json(path)
     try:
-        return _run(document, LearningCurve.from_dict(document["curve"]))
+        return _run(document, LearningEpisodes.from_dict(document["curve"]))
     except _MALFORMED as error:
         raise InputError(f"{path} lacks a part of its run ({error}); delete it") from error
 
@@ -289,7 +289,7 @@ def _entry(run: LearningRun) -> dict[str, Any]:
     }
 
 
-def _run(entry: Mapping[str, Any], curve: LearningCurve) -> LearningRun:
+def _run(entry: Mapping[str, Any], curve: LearningEpisodes) -> LearningRun:
     trials = [
         None if entry[name] is None else Trial.from_dict(entry[name])
         for name in ("alone", "shielded")
@@ -313,7 +313,7 @@ def _from_tables(folder: Path) -> tuple[LearningRun, ...]:
     try:
         table = pd.read_csv(io.BytesIO(limited_bytes(folder / CURVES)))
         curves = {
-            key: LearningCurve.from_dict(
+            key: LearningEpisodes.from_dict(
                 {
                     column: part[heading].to_numpy()
                     for column, heading in zip(_COLUMNS, _HEADINGS, strict=True)
@@ -321,7 +321,7 @@ def _from_tables(folder: Path) -> tuple[LearningRun, ...]:
             )
             for key, part in table.groupby(["arm", "seed"])
         }
-        empty = LearningCurve.from_dict({name: np.zeros(0) for name in _COLUMNS})
+        empty = LearningEpisodes.from_dict({name: np.zeros(0) for name in _COLUMNS})
         return tuple(
             _run(entry, curves.get((entry["arm"], int(entry["seed"])), empty)) for entry in entries
         )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.environments.feature_order import Named, Order, line_up
+from sarl_core.environments.feature_order import FeatureOrder, NamedFeatures, line_up
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
@@ -28,7 +28,7 @@ class Fitted(NamedTuple):
 
 
 def fitted_rules(
-    rule_set: RuleSet, features: Named, actions: Sequence[str], *, rules: str = "the rules"
+    rule_set: RuleSet, features: NamedFeatures, actions: Sequence[str], *, rules: str = "the rules"
 ) -> Fitted:
     """Put rules into the order of an environment's or of demonstrations' features and actions.
 
@@ -46,11 +46,11 @@ def fitted_rules(
     """
     env_id = rule_set.source.env_id
     names = tuple(feature.name for feature in rule_set.source.features)
-    found = [line_up(Named(rules, names, env_id), features)]
+    found = [line_up(NamedFeatures(rules, names, env_id), features)]
     if len(actions) > 1 or len(rule_set.actions) > 1:  # a single one needs no name
         found.append(
             line_up(
-                Named(rules, tuple(action.name for action in rule_set.actions), env_id),
+                NamedFeatures(rules, tuple(action.name for action in rule_set.actions), env_id),
                 features._replace(names=tuple(actions)),
                 what="action dimensions",
             )
@@ -79,7 +79,7 @@ def rules_for(
     """
     fitted = fitted_rules(
         rule_set,
-        Named(
+        NamedFeatures(
             called,
             tuple(feature.name for feature in demonstrations.features),
             demonstrations.env_id,
@@ -120,7 +120,7 @@ def _check_actions(actions: tuple[LabelledDimension, ...], demonstrations: Demon
             )
 
 
-def _reordered(rule_set: RuleSet, features: Order, actions: Order | None) -> RuleSet:
+def _reordered(rule_set: RuleSet, features: FeatureOrder, actions: FeatureOrder | None) -> RuleSet:
     """The rules with every number of a feature and of an action dimension exchanged."""
     feature_to = {mine: theirs for theirs, mine in enumerate(features.places)}
     dimensions = tuple(range(len(rule_set.actions))) if actions is None else actions.places
@@ -135,7 +135,7 @@ def _reordered(rule_set: RuleSet, features: Order, actions: Order | None) -> Rul
 
 
 def _moved(
-    rule: Rule, feature_to: dict[int, int], features: Order, dimension_to: dict[int, int]
+    rule: Rule, feature_to: dict[int, int], features: FeatureOrder, dimension_to: dict[int, int]
 ) -> Rule:
     box = rule.box
     return replace(

@@ -83,7 +83,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Report:
+class PaperReport:
     """What was found so far.
 
     Attributes:
@@ -93,7 +93,7 @@ class Report:
     studies: Mapping[str, Entry] = field(default_factory=dict)
 
 
-def write_report(report: Report, folder: Path) -> None:
+def write_report(report: PaperReport, folder: Path) -> None:
     """Write the report; it appears whole or not at all.
 
     Args:
@@ -108,7 +108,7 @@ def write_report(report: Report, folder: Path) -> None:
         unfinished.write_text(text + "\n", encoding="utf-8")
 
 
-def report_document(report: Report) -> dict[str, Any]:
+def report_document(report: PaperReport) -> dict[str, Any]:
     """The report for JSON.
 
     Args:
@@ -140,7 +140,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def read_report(folder: Path) -> Report | None:
+def read_report(folder: Path) -> PaperReport | None:
     """Read a report.
 
     Args:
@@ -167,7 +167,7 @@ def read_report(folder: Path) -> Report | None:
         ) from error
 
 
-def parse_report(document: Any) -> Report:
+def parse_report(document: Any) -> PaperReport:
     """A report from its JSON document.
 
     Args:
@@ -186,7 +186,7 @@ def parse_report(document: Any) -> Report:
     studies = document.get("studies")
     if not isinstance(studies, dict):
         raise ValueError("it lists no studies")
-    return Report({str(name): _entry(str(name), entry) for name, entry in studies.items()})
+    return PaperReport({str(name): _entry(str(name), entry) for name, entry in studies.items()})
 
 
 def _entry(name: str, entry: Any) -> Entry:

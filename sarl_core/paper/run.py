@@ -18,7 +18,7 @@ from sarl_core.explaining.figures.png import drawing_pictures
 from sarl_core.files import whole_file
 from sarl_core.paper.chance import with_chance
 from sarl_core.paper.replicates import fingerprints
-from sarl_core.paper.report import Entry, Report, read_report, write_report
+from sarl_core.paper.report import Entry, PaperReport, read_report, write_report
 from sarl_core.paper.sheets import SCRIPT, page, picture
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import FULL, Effort, Study
@@ -39,7 +39,7 @@ def reproduce(
     effort: Effort = FULL,
     watch: Watch = lambda _: nullcontext(None),
     finished: Callable[[str, Entry], None] = lambda name, entry: None,
-) -> Report:
+) -> PaperReport:
     """Reproduce figures of the paper.
 
     Each study's files appear when it is finished, and with them its entry in ``report.json``. What
@@ -70,7 +70,7 @@ def reproduce(
                 frames[study.name] = study.measure(effort, progress)
             entry = _entry(study, frames[study.name], effort)
             entries = {**report.studies, study.name: entry}
-            report = Report(
+            report = PaperReport(
                 {
                     name: _judged(entries[name], name, frames, anew=name == study.name)
                     for name in STUDIES
@@ -81,7 +81,7 @@ def reproduce(
             entry = replace(
                 report.studies[study.name], seconds=round(time.monotonic() - started, 1)
             )
-            report = Report({**report.studies, study.name: entry})
+            report = PaperReport({**report.studies, study.name: entry})
             with whole_file(folder / entry.files["picture"]) as unfinished:
                 unfinished.write_bytes(content)
             write_table(frames[study.name], folder / entry.files["table"])
@@ -93,7 +93,7 @@ def reproduce(
     return report
 
 
-def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFrame], Report]:
+def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFrame], PaperReport]:
     """Make the folder, and read what an earlier run left there."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; give a folder")
@@ -105,7 +105,7 @@ def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFram
         ) from error
     if not os.access(folder, os.W_OK):
         raise InputError(f"the folder {folder} cannot be written to; choose another")
-    report = read_report(folder) or Report()
+    report = read_report(folder) or PaperReport()
     unknown = next((name for name in report.studies if name not in STUDIES), None)
     if unknown is not None:
         raise InputError(
@@ -115,7 +115,7 @@ def _open(folder: Path, studies: Iterable[Study]) -> tuple[dict[str, pd.DataFram
     return _read_tables(folder, report, {study.name for study in studies}), report
 
 
-def _read_tables(folder: Path, report: Report, anew: set[str]) -> dict[str, pd.DataFrame]:
+def _read_tables(folder: Path, report: PaperReport, anew: set[str]) -> dict[str, pd.DataFrame]:
     """The tables of a report; a damaged one matters only if its study is not done anew."""
     frames, damaged = {}, {}
     for name, entry in report.studies.items():

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 
 from sarl_core.environments.description import catalogued
-from sarl_core.environments.feature_order import Named
+from sarl_core.environments.feature_order import NamedFeatures
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import fitted_rules
 from sarl_core.shielding.observed import Observed, observed
@@ -181,7 +181,7 @@ def fitted(
     )
     ordered = fitted_rules(
         rule_set,
-        Named(seen.whose, tuple(name for name, _ in names.features), seen.env_id),
+        NamedFeatures(seen.whose, tuple(name for name, _ in names.features), seen.env_id),
         names.actions,
     )
     if ordered.rule_set is not rule_set:

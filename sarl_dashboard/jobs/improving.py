@@ -12,7 +12,7 @@ import streamlit as st
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.improving.aggregation import Aggregation, Round, aggregate
+from sarl_core.improving.aggregation import Aggregation, AggregationRound, aggregate
 from sarl_core.improving.gaps import Gaps, gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
@@ -61,7 +61,7 @@ class Outcome:
     """
 
     order: Order
-    rounds: tuple[Round, ...] = ()
+    rounds: tuple[AggregationRound, ...] = ()
     improved: Aggregation | None = None
     gaps: Gaps | None = None
 
@@ -126,7 +126,7 @@ class _Run:
     order: Order
     executor: Processes
     began: float
-    rounds: tuple[Round, ...] = ()
+    rounds: tuple[AggregationRound, ...] = ()
 
     def improve(self) -> tuple[Outcome, bool]:
         """What came of asking the expert, and whether it was finished."""
@@ -139,7 +139,7 @@ class _Run:
             job.text = self._phase() + self._time_left()
             return wanted
 
-        def watch(finished: Round) -> None:
+        def watch(finished: AggregationRound) -> None:
             self.rounds = (*self.rounds, finished)
             job.result = Outcome(order, self.rounds)
             job.text = self._phase() + self._time_left()

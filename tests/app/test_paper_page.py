@@ -12,7 +12,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core.paper.chance import with_chance
 from sarl_core.paper.dividing import continuous
 from sarl_core.paper.replicates import environments, fingerprints
-from sarl_core.paper.report import Report, write_report
+from sarl_core.paper.report import PaperReport, write_report
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import FULL, FULL_MINUTES, experts_in
 from sarl_core.paper.tables import write_table
@@ -54,7 +54,7 @@ def fill(folder: Path, frames: dict[str, pd.DataFrame]) -> None:
             },
             claims=with_chance(study, frames, deals=3),
         )
-    write_report(Report(entries), folder)
+    write_report(PaperReport(entries), folder)
 
 
 @pytest.fixture
@@ -197,7 +197,7 @@ def test_a_new_run_is_seen_at_once(folder: Path) -> None:
 def test_text_of_a_report_is_text(folder: Path) -> None:
     claim = replace(ENTRY.claims[0], ours="<img src=x onerror=alert(1)> & more")
     fill(folder, FRAMES)
-    write_report(Report({"2": replace(ENTRY, claims=(claim,))}), folder)
+    write_report(PaperReport({"2": replace(ENTRY, claims=(claim,))}), folder)
     app = open_page("paper")
     body = "".join(block.proto.body for block in app.get("html"))
     assert "<img" not in body

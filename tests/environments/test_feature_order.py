@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sarl_core.environments.feature_order import Named, line_up, numbered, only_counts
+from sarl_core.environments.feature_order import NamedFeatures as Named
+from sarl_core.environments.feature_order import line_up, numbered, only_counts
 from sarl_core.errors import InputError
 
 CART = ("cart position", "cart velocity", "pole angle", "pole angular velocity")
@@ -37,7 +38,10 @@ def test_capitals_and_what_parts_words_do_not_matter():
     "names", [numbered(4), ("obs_0", "obs_1", "obs_2", "obs_3"), tuple("0123")]
 )
 def test_names_that_only_count_are_trusted_and_it_is_said(names):
-    for one, other in ((Named("the rules", names), ENV), (ENV, Named("the file", names))):
+    for one, other in (
+        (Named("the rules", names), ENV),
+        (ENV, Named("the file", names)),
+    ):
         order = line_up(one, other)
         assert (order.how, order.places) == ("trusted", (0, 1, 2, 3))
         assert "CartPole-v1" in order.note
@@ -76,7 +80,10 @@ def test_other_names_are_refused_with_both_lists(side):
 def test_long_lists_are_shortened():
     many = tuple(f"a reading of the sensor called {letter * 60}" for letter in "abcdefghijkl")
     with pytest.raises(InputError) as error:
-        line_up(Named("the rules", many), Named("the file", tuple(f"{one}!" for one in many)))
+        line_up(
+            Named("the rules", many),
+            Named("the file", tuple(f"{one}!" for one in many)),
+        )
     assert len(str(error.value)) < 500
     assert "more" in str(error.value)
 

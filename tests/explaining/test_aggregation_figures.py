@@ -16,14 +16,14 @@ from sarl_core.explaining.figures.aggregation import (
     rounds_figure,
 )
 from sarl_core.explaining.figures.gaps import gap_figure, gap_histograms
-from sarl_core.improving.aggregation import Round
+from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.improving.gaps import Gaps, join_gaps
 
 
-def rounds() -> tuple[Round, ...]:
+def rounds() -> tuple[AggregationRound, ...]:
     returns = ([1.0, 3.0], [10.0, 30.0], [5.0, 5.0])
     return tuple(
-        Round(
+        AggregationRound(
             number=number,
             pairs=100 * number,
             rules=4 + number,
@@ -45,7 +45,7 @@ def test_each_round_is_a_point_with_the_spread_of_its_episodes():
 
 
 def test_a_single_episode_has_no_spread():
-    (one,) = points_of([Round(1, 10, 3, np.array([7.0]), 1.0, 0.0, 0.0)])
+    (one,) = points_of([AggregationRound(1, 10, 3, np.array([7.0]), 1.0, 0.0, 0.0)])
     assert (one.mean, one.std) == (7.0, 0.0)
 
 

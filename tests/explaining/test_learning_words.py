@@ -16,7 +16,7 @@ from sarl_core.explaining.figures.learning import (
 )
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, value_text, verdict
 from sarl_core.learning.arms import ARMS
-from sarl_core.learning.curves import LearningCurve, Trial
+from sarl_core.learning.curves import LearningEpisodes, Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
 from sarl_core.learning.summary import summarise_study
 
@@ -24,7 +24,7 @@ RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
 
 
 def a_run(arm: str, seed: int, crashes: int, alone: float) -> LearningRun:
-    curve = LearningCurve.from_dict(
+    curve = LearningEpisodes.from_dict(
         {
             "ends": [(index + 1) * 100 for index in range(10)],
             "returns": [float(index * 10) for index in range(10)],
@@ -183,7 +183,7 @@ def test_curves_are_means_in_bands(study: LearningStudy) -> None:
 
 def test_curves_of_a_run_at_work_end_where_it_is() -> None:
     run = a_run("none", 0, 3, 0.0)
-    curve = LearningCurve.from_dict(
+    curve = LearningEpisodes.from_dict(
         {name: column[:5] for name, column in run.curve.to_dict().items()}
     )
     half = replace(run, curve=curve, done=500, alone=None, shielded=None)
@@ -195,7 +195,7 @@ def test_curves_of_a_run_at_work_end_where_it_is() -> None:
 
 def test_a_run_without_an_episode_draws_nothing_and_breaks_nothing() -> None:
     run = a_run("none", 0, 3, 0.0)
-    empty = LearningCurve.from_dict({name: [] for name in run.curve.to_dict()})
+    empty = LearningEpisodes.from_dict({name: [] for name in run.curve.to_dict()})
     study = a_study(replace(run, curve=empty, done=10, alone=None, shielded=None))
     assert not curves_figure(study).data
 

@@ -14,7 +14,7 @@ import pytest
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.environments.description import describe_environment
 from sarl_core.explaining.exports.steps import (
-    StepRecord,
+    RecordedSteps,
     steps_to_csv,
     steps_to_parquet,
 )
@@ -44,10 +44,12 @@ def played(rules: RuleSet) -> Episodes:
 
 
 @pytest.fixture
-def record(rules: RuleSet, played: Episodes) -> StepRecord:
+def record(rules: RuleSet, played: Episodes) -> RecordedSteps:
     assert played.steps is not None
     features = rules.source.features
-    return StepRecord(played.steps, "CartPole-v1", "novice", [70, 71, 72], features, rules, "all")
+    return RecordedSteps(
+        played.steps, "CartPole-v1", "novice", [70, 71, 72], features, rules, "all"
+    )
 
 
 def test_the_table_says_what_was_recorded(rules: RuleSet, played: Episodes) -> None:
@@ -112,7 +114,7 @@ def test_pages_and_places() -> None:
     )
 
 
-def test_files_hold_every_number_in_full(record: StepRecord) -> None:
+def test_files_hold_every_number_in_full(record: RecordedSteps) -> None:
     steps = record.steps
     csv = pd.read_csv(io.BytesIO(steps_to_csv(record)), dtype={"rule_id": "str"})
     parquet = pq.read_table(io.BytesIO(steps_to_parquet(record)))
@@ -135,7 +137,7 @@ def test_files_hold_every_number_in_full(record: StepRecord) -> None:
     assert described["rules"] == len(ids)
 
 
-def test_no_id_is_taken_for_a_formula(record: StepRecord) -> None:
+def test_no_id_is_taken_for_a_formula(record: RecordedSteps) -> None:
     assert record.rule_set is not None
     first = replace(record.rule_set.rules[0], id="=HYPERLINK(1)")
     sly = replace(record.rule_set, rules=(first, *record.rule_set.rules[1:]))
@@ -146,7 +148,7 @@ def test_no_id_is_taken_for_a_formula(record: StepRecord) -> None:
     assert ",=" not in text
 
 
-def test_without_rules_there_is_no_column_of_them(record: StepRecord) -> None:
+def test_without_rules_there_is_no_column_of_them(record: RecordedSteps) -> None:
     bare = replace(record, rule_set=None)
     assert "rule_id" not in bare.to_frame().columns
 

@@ -16,7 +16,7 @@ from stable_baselines3 import PPO
 from sarl_core import InputError, RuleSet, WorkError, load_demonstrations, mine_rules, rollout
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.learning.arms import ARMS
-from sarl_core.learning.curves import LearningCurve
+from sarl_core.learning.curves import LearningEpisodes
 from sarl_core.learning.run import LearningResult, learn
 from sarl_core.progress import CancelledError
 
@@ -113,10 +113,10 @@ def test_a_stopped_learner_goes_on(cart: Learn, arm: str, tmp_path: Path) -> Non
     checkpoint = tmp_path / "run.pt"
     with pytest.raises(CancelledError, match="stopped after"):
         cart(arm, checkpoint=checkpoint, progress=StopAfter(200))
-    curves: list[LearningCurve] = []
+    curves: list[LearningEpisodes] = []
     steps: list[int] = []
 
-    def watch(curve: LearningCurve, done: int) -> None:
+    def watch(curve: LearningEpisodes, done: int) -> None:
         curves.append(curve)
         steps.append(done)
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sarl_core import InputError
-from sarl_core.learning.curves import NO_EPISODES, LearningCurve, Trial
+from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes, Trial
 
 
 @pytest.fixture
-def curve() -> LearningCurve:
-    return LearningCurve.from_dict(
+def curve() -> LearningEpisodes:
+    return LearningEpisodes.from_dict(
         {
             "ends": [10, 20, 20, 35],
             "returns": [1.0, 2.0, 6.0, -3.5],
@@ -26,29 +26,29 @@ def curve() -> LearningCurve:
     )
 
 
-def test_crashes_are_counted_up_to_and_with_a_step(curve: LearningCurve) -> None:
+def test_crashes_are_counted_up_to_and_with_a_step(curve: LearningEpisodes) -> None:
     steps = np.array([0, 9, 10, 19, 20, 34, 35, 99])
     assert curve.crashes_at(steps).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
     assert curve.crashes == 3
 
 
-def test_bins_hold_the_episodes_that_ended_in_them(curve: LearningCurve) -> None:
+def test_bins_hold_the_episodes_that_ended_in_them(curve: LearningEpisodes) -> None:
     bins = curve.binned(np.array([0, 10, 20, 30, 40]))
     np.testing.assert_array_equal(bins.returns, [1.0, 4.0, np.nan, -3.5])
     np.testing.assert_allclose(bins.interventions, [0.5, 4 / 18, np.nan, 0.2])
 
 
-def test_episodes_outside_of_the_bins_are_left_out(curve: LearningCurve) -> None:
+def test_episodes_outside_of_the_bins_are_left_out(curve: LearningEpisodes) -> None:
     assert curve.binned(np.array([10, 30])).returns.tolist() == [4.0]
 
 
-def test_changes_are_counted_by_steps_and_not_by_episodes(curve: LearningCurve) -> None:
+def test_changes_are_counted_by_steps_and_not_by_episodes(curve: LearningEpisodes) -> None:
     assert curve.intervention_rate == 12 / 43
     assert np.isnan(NO_EPISODES.intervention_rate)
 
 
-def test_a_curve_survives_json_and_nobody_changes_it(curve: LearningCurve) -> None:
-    again = LearningCurve.from_dict(json.loads(json.dumps(curve.to_dict())))
+def test_a_curve_survives_json_and_nobody_changes_it(curve: LearningEpisodes) -> None:
+    again = LearningEpisodes.from_dict(json.loads(json.dumps(curve.to_dict())))
     assert again.to_dict() == curve.to_dict()
     assert again.ends.dtype == np.int64
     assert again.crashed.dtype == np.bool_
@@ -56,20 +56,20 @@ def test_a_curve_survives_json_and_nobody_changes_it(curve: LearningCurve) -> No
         again.returns[0] = 0.0
 
 
-def test_its_size_is_seen_at_a_glance(curve: LearningCurve) -> None:
-    assert repr(curve) == "LearningCurve(episodes=4, steps=35, crashes=3)"
-    assert repr(NO_EPISODES) == "LearningCurve(episodes=0, steps=0, crashes=0)"
+def test_its_size_is_seen_at_a_glance(curve: LearningEpisodes) -> None:
+    assert repr(curve) == "LearningEpisodes(episodes=4, steps=35, crashes=3)"
+    assert repr(NO_EPISODES) == "LearningEpisodes(episodes=0, steps=0, crashes=0)"
 
 
 @pytest.mark.parametrize(
     "damage",
     [{"ends": None}, {"returns": ["?"] * 4}, {"lengths": [1]}, {"ends": [[1, 2, 3, 4]]}],
 )
-def test_a_damaged_curve_is_refused(curve: LearningCurve, damage: dict[str, object]) -> None:
+def test_a_damaged_curve_is_refused(curve: LearningEpisodes, damage: dict[str, object]) -> None:
     with pytest.raises(InputError, match="learning curve"):
-        LearningCurve.from_dict({**curve.to_dict(), **damage})
+        LearningEpisodes.from_dict({**curve.to_dict(), **damage})
     with pytest.raises(InputError, match="learning curve"):
-        LearningCurve.from_dict({"ends": []})
+        LearningEpisodes.from_dict({"ends": []})
 
 
 def test_a_trial_survives_json_and_is_refused_when_damaged() -> None:

@@ -15,7 +15,7 @@ from stable_baselines3 import PPO
 
 from sarl_core import InputError, RuleSet, WorkError, load_demonstrations, mine_rules
 from sarl_core.learning.arms import ARMS, arms_named
-from sarl_core.learning.curves import LearningCurve, Trial
+from sarl_core.learning.curves import LearningEpisodes, Trial
 from sarl_core.learning.run import LearningResult, learn
 from sarl_core.learning.study import LearningPlan, run_study
 from sarl_core.learning.study_files import (
@@ -217,7 +217,7 @@ def test_when_the_disk_is_full_what_is_finished_is_summed_up(
 
 def a_run(arm: str, seed: int, crashes: int, alone: float, steps: int = 1000) -> LearningRun:
     """A run of ten episodes of which some crashed."""
-    curve = LearningCurve.from_dict(
+    curve = LearningEpisodes.from_dict(
         {
             "ends": [(index + 1) * steps // 10 for index in range(10)],
             "returns": [float(index) for index in range(10)],

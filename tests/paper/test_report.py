@@ -14,7 +14,7 @@ from sarl_core import InputError
 from sarl_core.paper.report import (
     REPORT,
     Entry,
-    Report,
+    PaperReport,
     read_report,
     report_document,
     write_report,
@@ -43,7 +43,7 @@ ENTRY = Entry(
 
 
 def document() -> dict[str, Any]:
-    return copy.deepcopy(report_document(Report({"2": ENTRY})))
+    return copy.deepcopy(report_document(PaperReport({"2": ENTRY})))
 
 
 def write(folder: Path, content: object) -> Path:
@@ -53,7 +53,7 @@ def write(folder: Path, content: object) -> Path:
 
 
 def test_a_report_comes_back_as_it_was(tmp_path: Path) -> None:
-    report = Report({"2": ENTRY})
+    report = PaperReport({"2": ENTRY})
     write_report(report, tmp_path)
     assert read_report(tmp_path) == report
     assert [path.name for path in tmp_path.iterdir()] == [REPORT]
@@ -69,7 +69,7 @@ def test_what_is_no_number_is_null(tmp_path: Path) -> None:
     claim = Claim("a", "b", "c", "partly", "d", {"nan": math.nan})
     numbers = {"none": math.inf, "many": [1.0, math.nan], "count": 3}
     entry = Entry(**{**vars(ENTRY), "numbers": numbers, "claims": (claim,)})
-    write_report(Report({"2": entry}), tmp_path)
+    write_report(PaperReport({"2": entry}), tmp_path)
     found = read_report(tmp_path)
     assert found is not None
     assert found.studies["2"].numbers == {"none": None, "many": [1.0, None], "count": 3}
@@ -152,7 +152,7 @@ def test_what_is_no_json_is_refused_too(content: bytes, tmp_path: Path) -> None:
 
 def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sarl_core.paper.report.MAX_BYTES", 10)
-    write_report(Report({"2": ENTRY}), tmp_path)
+    write_report(PaperReport({"2": ENTRY}), tmp_path)
     with pytest.raises(InputError, match="more than"):
         read_report(tmp_path)
 

@@ -12,7 +12,7 @@ from msgspec.structs import asdict
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.documents import MisfitError, Number, conformed, parse_json
-from sarl_core.environments.feature_order import Order
+from sarl_core.environments.feature_order import FeatureOrder
 from sarl_core.errors import InputError, quoted
 
 KEY = "sarl"
@@ -56,7 +56,7 @@ class Metadata:
             return True
         return False if self.action_low else None
 
-    def with_actions_in(self, order: Order) -> Metadata:
+    def with_actions_in(self, order: FeatureOrder) -> Metadata:
         """The same with its action dimensions in another order.
 
         Args:

@@ -30,7 +30,7 @@ from sarl_core.demonstrations.requirements import (
     without_fraction,
 )
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
-from sarl_core.environments.feature_order import Named, line_up, numbered, only_counts
+from sarl_core.environments.feature_order import NamedFeatures, line_up, numbered, only_counts
 from sarl_core.errors import InputError
 
 _LARGEST_CODE = 2**31  # a label that is larger is a slip
@@ -183,8 +183,8 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
 def _in_order(recording: Recording, described: EnvironmentDescription) -> Recording:
     """Bring the columns into the environment's order, by their names."""
     metadata = recording.metadata
-    named = Named("the file", (), metadata.env_id)
-    wanted = Named(described.env_id, described.feature_names, described.env_id)
+    named = NamedFeatures("the file", (), metadata.env_id)
+    wanted = NamedFeatures(described.env_id, described.feature_names, described.env_id)
     names = tuple(feature.name for feature in metadata.features) or recording.feature_names
     features = line_up(named._replace(names=names or numbered(len(wanted.names))), wanted)
     orders = [features]

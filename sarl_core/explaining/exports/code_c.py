@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from sarl_core.explaining.exports.program import (
-    Order,
-    Outcome,
+    CodeLine,
+    DimensionProgram,
     Program,
-    Step,
+    Replacement,
     one_line,
     parts_of,
     program_of,
@@ -221,7 +221,7 @@ def _table(program: Program) -> str:
     return "\n".join(lines)
 
 
-def _row(outcome: Outcome, program: Program) -> str:
+def _row(outcome: Replacement, program: Program) -> str:
     if not program.continuous:
         return f"INT64_C({outcome.low})"
     numbers = [outcome.low, outcome.high]
@@ -232,7 +232,7 @@ def _row(outcome: Outcome, program: Program) -> str:
     return f"{{{', '.join([*shown, *flags])}}}"
 
 
-def _finders(index: int, order: Order, rule_set: RuleSet) -> list[str]:
+def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
     """The functions that find the rule of one action dimension, called ones first."""
     always = any(not rule.conditions for _, rule in order.scanned)
     parts = [[]] if always else parts_of(order.nodes)
@@ -274,7 +274,7 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     ]
 
 
-def _line(step: Step, index: int, rule_set: RuleSet) -> str:
+def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str:
     space = "    " * (step.level + 1)
     match step.kind:
         case "if":

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from sarl_core.explaining.exports.program import (
-    Order,
-    Outcome,
+    CodeLine,
+    DimensionProgram,
     Program,
-    Step,
+    Replacement,
     one_line,
     parts_of,
     program_of,
@@ -223,7 +223,7 @@ def _table(program: Program) -> list[str]:
     ]
 
 
-def _row(outcome: Outcome, *, continuous: bool) -> str:
+def _row(outcome: Replacement, *, continuous: bool) -> str:
     if not continuous:
         return str(int(outcome.low))
     value = "None" if outcome.value is None else _number(outcome.value)
@@ -231,7 +231,7 @@ def _row(outcome: Outcome, *, continuous: bool) -> str:
     return f"({', '.join([*numbers, str(outcome.open_low), str(outcome.open_high)])})"
 
 
-def _finders(index: int, order: Order, rule_set: RuleSet) -> list[str]:
+def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
     """The functions that find the rule of one action dimension."""
     always = any(not rule.conditions for _, rule in order.scanned)
     found = []
@@ -265,7 +265,7 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     ]
 
 
-def _line(step: Step, index: int, rule_set: RuleSet) -> str | None:
+def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str | None:
     space = "    " * (step.level + 1)
     match step.kind:
         case "if":

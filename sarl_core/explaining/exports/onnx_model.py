@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import WorkError
-from sarl_core.explaining.exports.program import Order, Program, largest_float32, program_of
+from sarl_core.explaining.exports.program import (
+    DimensionProgram,
+    Program,
+    largest_float32,
+    program_of,
+)
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
@@ -230,7 +235,7 @@ class _Trees:
         self.nodes_falsenodeids.append(above)
 
 
-def _find(graph: _Graph, index: int, order: Order) -> None:
+def _find(graph: _Graph, index: int, order: DimensionProgram) -> None:
     """Add what finds the rule of one action dimension: `rule_of_<index>`, (B, 1) int64."""
     trees = _Trees()
     if len(order.nodes) == 1:  # a tree of one leaf, which some runtimes do not take

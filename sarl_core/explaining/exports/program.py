@@ -26,7 +26,7 @@ _MOST_LEVELS = 20
 _LONGEST = 120
 
 
-class Outcome(NamedTuple):
+class Replacement(NamedTuple):
     """What a rule makes of a proposed action.
 
     An action carries the rule's label if it is neither below `low` nor above `high`; it is kept.
@@ -47,7 +47,7 @@ class Outcome(NamedTuple):
     open_high: bool
 
 
-class Order(NamedTuple):
+class DimensionProgram(NamedTuple):
     """How the rule of one action dimension is found.
 
     Attributes:
@@ -81,8 +81,8 @@ class Program:
     rule_set: RuleSet
     projection: Projection
     on_invalid: OnInvalid
-    orders: tuple[Order, ...]
-    outcomes: tuple[Outcome, ...]
+    orders: tuple[DimensionProgram, ...]
+    outcomes: tuple[Replacement, ...]
 
     @property
     def continuous(self) -> bool:
@@ -96,7 +96,7 @@ class Program:
         return tuple((each.first, each.first + each.n_labels - 1) for each in dimensions)
 
 
-class Step(NamedTuple):
+class CodeLine(NamedTuple):
     """One line of nested code.
 
     Attributes:
@@ -162,7 +162,7 @@ def program_of(
     )
 
 
-def parts_of(nodes: tuple[RuleNode, ...]) -> list[list[Step]]:
+def parts_of(nodes: tuple[RuleNode, ...]) -> list[list[CodeLine]]:
     """A tree as nested queries, in parts that are not nested too deep.
 
     Args:
@@ -173,21 +173,21 @@ def parts_of(nodes: tuple[RuleNode, ...]) -> list[list[Step]]:
     """
     roots, parts = [0], []
     for root in roots:  # grows on the way
-        steps: list[Step] = []
+        steps: list[CodeLine] = []
         waiting: list[tuple[Literal["node", "else", "end"], int, int]] = [("node", root, 0)]
         while waiting:
             kind, place, level = waiting.pop()
             if kind != "node":
-                steps.append(Step(level, kind))
+                steps.append(CodeLine(level, kind))
                 continue
             node = nodes[place]
             if node.feature == LEAF:
-                steps.append(Step(level, "rule", target=node.rule))
+                steps.append(CodeLine(level, "rule", target=node.rule))
             elif level == _MOST_LEVELS:
-                steps.append(Step(level, "part", target=len(roots)))
+                steps.append(CodeLine(level, "part", target=len(roots)))
                 roots.append(place)
             else:
-                steps.append(Step(level, "if", node.feature, node.threshold))
+                steps.append(CodeLine(level, "if", node.feature, node.threshold))
                 waiting += [
                     ("end", place, level),
                     ("node", node.right, level + 1),
@@ -229,7 +229,7 @@ def one_line(text: str) -> str:
     return seen if len(seen) <= _LONGEST else f"{seen[:_LONGEST]}..."
 
 
-def _order(rule_set: RuleSet, index: int) -> Order:
+def _order(rule_set: RuleSet, index: int) -> DimensionProgram:
     """As the shield arranges them: placed rules in their order, then the tree of the others."""
     rules = [
         (place, rule)
@@ -241,10 +241,10 @@ def _order(rule_set: RuleSet, index: int) -> Order:
     nodes = tree_of(others)
     if nodes is None:
         placed, nodes = [*placed, *others], [NOTHING]
-    return Order(rule_set.actions[index], tuple(placed), tuple(nodes))
+    return DimensionProgram(rule_set.actions[index], tuple(placed), tuple(nodes))
 
 
-def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Outcome, ...]:
+def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Replacement, ...]:
     found = replacements(rule_set, projection)
     settled = np.clip(found.target, found.low, found.high)
     return tuple(
@@ -261,11 +261,11 @@ def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Outcome, ...]:
 
 def _outcome(
     rule: Rule, dimension: LabelledDimension, value: float, low: float, high: float
-) -> Outcome:
+) -> Replacement:
     if not dimension.is_interval:
         action = rule.action + dimension.first  # not through floating point: it may be large
-        return Outcome(action, action, action, open_low=False, open_high=False)
-    return Outcome(
+        return Replacement(action, action, action, open_low=False, open_high=False)
+    return Replacement(
         None if np.isnan(value) else float(np.float32(value)),
         low,
         high,

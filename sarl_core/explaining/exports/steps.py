@@ -21,7 +21,7 @@ FORMAT, VERSION = "sarl-steps", 1
 
 
 @dataclass(frozen=True, eq=False)
-class StepRecord:
+class RecordedSteps:
     """Recorded steps and what is known about them.
 
     Attributes:
@@ -63,7 +63,7 @@ class StepRecord:
         return frame
 
 
-def steps_to_csv(record: StepRecord) -> bytes:
+def steps_to_csv(record: RecordedSteps) -> bytes:
     """Steps as CSV, every number in full.
 
     Args:
@@ -75,7 +75,7 @@ def steps_to_csv(record: StepRecord) -> bytes:
     return str(safe_cells(record.to_frame()).to_csv(index=False)).encode()
 
 
-def steps_to_parquet(record: StepRecord) -> bytes:
+def steps_to_parquet(record: RecordedSteps) -> bytes:
     """Steps as Parquet, with a description under the schema's key ``sarl`` (JSON).
 
     Args:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.explaining.exports.program import Order, largest_float32, program_of
+from sarl_core.explaining.exports.program import DimensionProgram, largest_float32, program_of
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import RuleNode
@@ -207,7 +207,7 @@ def _typical_values(rule_set: RuleSet) -> NDArray[np.float32]:
     return values
 
 
-def _queries(order: Order) -> Iterator[tuple[Sequence[Condition], int, float]]:
+def _queries(order: DimensionProgram) -> Iterator[tuple[Sequence[Condition], int, float]]:
     """Every query with the way to it: of the rules tried one by one, and of the tree."""
     for _, rule in order.scanned:
         for depth, condition in enumerate(rule.conditions):

@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots
 from sarl_core.errors import InputError
 from sarl_core.explaining.figures.colours import LABEL_COLOURS, MARKER_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
-from sarl_core.improving.aggregation import Round
+from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.mining.language import share_text
 
 _BLUE, _GREEN = LABEL_COLOURS[0], LABEL_COLOURS[2]
@@ -66,7 +66,7 @@ class BudgetPoint:
     episodes: int
 
 
-def points_of(rounds: Sequence[Round]) -> tuple[RoundPoint, ...]:
+def points_of(rounds: Sequence[AggregationRound]) -> tuple[RoundPoint, ...]:
     """The rounds of an aggregation as points of the figure.
 
     Args:

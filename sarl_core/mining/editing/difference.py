@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.environments.feature_order import Named, only_counts
+from sarl_core.environments.feature_order import NamedFeatures, only_counts
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
 from sarl_core.mining.rule_order import Fitted, fitted_rules
@@ -87,7 +87,7 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
         )
     fitted = fitted_rules(
         second,
-        Named(
+        NamedFeatures(
             "the first rules",
             tuple(feature.name for feature in first.source.features),
             first.source.env_id,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.paper.report import REPORT, Entry, Report, read_report
+from sarl_core.paper.report import REPORT, Entry, PaperReport, read_report
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import FULL_MINUTES, Drawing
 from sarl_core.paper.tables import read_table
@@ -33,11 +33,11 @@ def stamp(path: Path) -> str:
 
 
 @cached()
-def _report(folder: Path, digest: str) -> Report | None:
+def _report(folder: Path, digest: str) -> PaperReport | None:
     return read_report(folder)
 
 
-def report() -> Report | None:
+def report() -> PaperReport | None:
     """The report as it is now; None where there is none.
 
     Raises:
@@ -46,7 +46,7 @@ def report() -> Report | None:
     return _report(FOLDER, stamp(FOLDER / REPORT))
 
 
-def require_report() -> Report:
+def require_report() -> PaperReport:
     """The report; where there is none, say how to make it and stop the page."""
     try:
         reproduced = report()

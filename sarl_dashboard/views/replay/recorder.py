@@ -13,7 +13,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.decimals import digits_across
-from sarl_core.explaining.exports.steps import StepRecord, steps_to_csv, steps_to_parquet
+from sarl_core.explaining.exports.steps import RecordedSteps, steps_to_csv, steps_to_parquet
 from sarl_core.explaining.figures.colours import label_colour
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.tables.recorder import (
@@ -313,8 +313,8 @@ def downloads(recorded: Recorded, rows: NDArray[np.int64], text: str) -> None:
     """What the table shows, on all its pages, as files; made when asked for."""
     replay, episodes = recorded.replay, recorded.episodes
 
-    def record() -> StepRecord:
-        return StepRecord(
+    def record() -> RecordedSteps:
+        return RecordedSteps(
             recorded.steps.take(rows),
             episodes.env_id,
             episodes.agent,
