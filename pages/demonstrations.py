@@ -33,7 +33,7 @@ if demonstrations is None:
         icon=":material/upload_file:",
     )
     st.stop()
-contents = contents_of(demonstrations.digest, demonstrations)
+contents = contents_of(demonstrations)
 divider = chosen_divider()
 show_overview(demonstrations, contents)
 show_columns(demonstrations)

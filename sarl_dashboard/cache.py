@@ -9,15 +9,23 @@ import inspect
 import os
 import sys
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import fields, is_dataclass
+from operator import attrgetter
+from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, ParamSpec, TypeVar, cast
 
+import numpy as np
 import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.memory_cache import BoundedCache
+from sarl_dashboard.text import digest_of
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,40 +38,86 @@ RESULTS: BoundedCache[object] = BoundedCache(
 _making: defaultdict[object, Lock] = defaultdict(Lock)
 
 
-def cached(*, show_spinner: str = "") -> Callable[[Callable[P, R]], Callable[P, R]]:
+# --- by what results are found again -----------------------------------------------------------
+
+HashFuncs = Mapping[type, Callable[[Any], object]]
+HASH_FUNCS: HashFuncs = {
+    Demonstrations: attrgetter("digest"),
+    PolicyTree: attrgetter("digest"),
+    RuleSet: attrgetter("digest"),
+    bytes: digest_of,
+}
+"""What stands in a key for a thing that is large or has no hash."""
+_PLAIN = (type(None), bool, int, float, str, Path, np.generic)
+
+
+def key_of(value: object, hash_funcs: HashFuncs = HASH_FUNCS) -> object:
+    """What tells a value from all others of other content.
+
+    Args:
+        value: Of a type in `hash_funcs`; a number, a text, a path; or a tuple or frozen dataclass
+            of such.
+        hash_funcs: By type, what stands for a value of it.
+
+    Returns:
+        Small and hashable.
+
+    Raises:
+        TypeError: If something in it is of another type: a key that leaves it out, or that samples
+            it, would bring back what was made from something else.
+    """
+    kind = type(value)
+    if kind in hash_funcs:
+        return kind, hash_funcs[kind](value)
+    if isinstance(value, _PLAIN):
+        return kind, value
+    if isinstance(value, tuple):
+        return kind, *(key_of(part, hash_funcs) for part in value)
+    if is_dataclass(kind) and cast(Any, kind).__dataclass_params__.frozen:
+        return kind, *(key_of(getattr(value, part.name), hash_funcs) for part in fields(kind))
+    raise TypeError(
+        f"{kind.__module__}.{kind.__qualname__} cannot be part of a key; pass what it was made "
+        "from, or give HASH_FUNCS a function for it"
+    )
+
+
+def cached(
+    *, show_spinner: str = "", hash_funcs: HashFuncs | None = None
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Keep what a function gives, for all visitors, as long as there is room.
 
-    Arguments with a leading underscore are not part of the key; the others must be hashable.
-    Streamlit's own cache of resources counts entries; here bytes are counted, and what was made
-    from an upload goes when nobody holds it any more.
+    Results are found again by the content of all arguments (`key_of`). Streamlit's own cache of
+    resources counts entries, and its cache of data samples large ones; here bytes are counted, and
+    what was made from an upload goes when nobody holds it any more.
 
     Args:
         show_spinner: What is said while it works.
+        hash_funcs: By type, what stands for an argument in the place of `HASH_FUNCS`.
 
     Returns:
         A decorator.
     """
+    by_type = {**HASH_FUNCS, **(hash_funcs or {})}
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(function)
-        code = cast(Any, function).__code__  # pages are scripts, and made anew at every run
+        code = cast(Any, function).__code__  # another one once the file was edited
 
         @functools.wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             bound = signature.bind(*args, **kwargs)
             bound.apply_defaults()
-            named = (item for item in bound.arguments.items() if not item[0].startswith("_"))
-            key = (code.co_filename, code, tuple(named))
-            found = RESULTS.get(key)
-            if found is None:
+            key = (code.co_filename, code, key_of(tuple(bound.arguments.values()), by_type))
+            entry = RESULTS.get(key)
+            if entry is None:
                 with _making[key]:  # one visitor makes it, the others wait
-                    found = RESULTS.get(key)
-                    if found is None:
-                        with _telling(show_spinner):
-                            found = (function(*args, **kwargs),)
-                        keep(key, found, owner())
+                    entry = RESULTS.get(key)
+                    if entry is None:
+                        with _spinner(show_spinner):
+                            entry = (function(*args, **kwargs),)
+                        keep(key, entry, owner())
                 _making.pop(key, None)
-            return cast(tuple[R], found)[0]
+            return cast(tuple[R], entry)[0]
 
         return call
 
@@ -82,7 +136,7 @@ def keep(key: object, result: object, owner: str) -> None:
     _give_back(owner)
 
 
-def _telling(text: str) -> AbstractContextManager[object]:
+def _spinner(text: str) -> AbstractContextManager[object]:
     """Say what is going on, where there is a page to say it on."""
     return st.spinner(text) if text and get_script_run_ctx() is not None else nullcontext()
 

@@ -286,6 +286,19 @@ class Demonstrations:
     @cached_property
     def digest(self) -> str:
         """Fingerprint (blake2b, 32 hex digits) of the arrays and of what is known about them."""
+        return self._fingerprint(self.metadata())
+
+    @cached_property
+    def pairs_digest(self) -> str:
+        """The same whatever features, units, actions and labels are called."""
+        nameless = {
+            "features": len(self.features),
+            "action_names": len(self.action_names or ()),
+            "label_names": list(map(len, self.label_names or ())),
+        }
+        return self._fingerprint(self.metadata() | nameless)
+
+    def _fingerprint(self, metadata: dict[str, Any]) -> str:
         digest = hashlib.blake2b(digest_size=16)
         for name in (
             "observations",
@@ -300,7 +313,7 @@ class Demonstrations:
             if value is not None:
                 digest.update(f"{name}{value.dtype}{value.shape}".encode())
                 digest.update(np.ascontiguousarray(value).data)
-        digest.update(json.dumps(self.metadata(), sort_keys=True).encode())
+        digest.update(json.dumps(metadata, sort_keys=True).encode())
         return digest.hexdigest()
 
     def select(self, episodes: Sequence[int] | NDArray[np.int64]) -> Demonstrations:

@@ -181,29 +181,6 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
     return InOrder(demonstrations, tuple(order.note for order in orders if order.note))
 
 
-def digest_of_pairs(demonstrations: Demonstrations) -> str:
-    """Tells demonstrations from others whatever they are called.
-
-    Args:
-        demonstrations: N pairs.
-
-    Returns:
-        Their digest under names that say nothing.
-    """
-    own = names_of(demonstrations)
-
-    def numbers(names: Sequence[str]) -> tuple[str, ...]:
-        return tuple(map(str, range(len(names))))
-
-    nameless = Names(
-        numbers(own.features),
-        ("",) * len(own.units),
-        numbers(own.actions),
-        tuple(map(numbers, own.labels)),
-    )
-    return renamed(demonstrations, nameless).digest
-
-
 def renamed_description(
     description: EnvironmentDescription, names: Names
 ) -> EnvironmentDescription | None:

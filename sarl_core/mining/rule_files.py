@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, NamedTuple, TypeVar
 
+import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict, astuple
@@ -130,8 +131,11 @@ def file_parts(rule_set: RuleSet) -> Iterator[str]:
 
 def _value(value: Any, depth: int, indented: bool) -> str:
     """A value so deep in the document: with a line for each of what is in it, or on one line."""
-    indent = 1 if indented else None
-    text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(value, allow_nan=False, ensure_ascii=False)
+    if indented:
+        # As `json` would, which has no fast way to indent; half a pair has no other encoding.
+        encoded = text.encode(errors="surrogatepass")
+        text = msgspec.json.format(encoded, indent=1).decode(errors="surrogatepass")
     return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
 
 

@@ -20,32 +20,21 @@ from sarl_dashboard.session import is_dark
 WHOLE_TREE = "Whole tree"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class PathInTree:
     """A path to be lit.
 
     Attributes:
-        key: Tells the rules from all others.
         tree: One action dimension's.
-        thresholds: At which it is cut.
-        leaves: Whether every leaf is a rule, whatever the thresholds.
+        cut_at: Thresholds at which it is cut; None where every leaf is a rule.
         node: At the end of the path.
         note: Said below.
     """
 
-    key: object
     tree: PolicyTree
-    thresholds: Thresholds
-    leaves: bool
+    cut_at: Thresholds | None
     node: int
     note: str
-
-    @property
-    def cut_key(self) -> str:
-        """Tells the tree and its cut from all others."""
-        tree = self.tree
-        cut_by = (self.thresholds, self.leaves)
-        return repr((self.key, tree.source.digest, tree.divider, tree.index, cut_by))
 
 
 def show_tree(path: PathInTree, *, around: str, widget: str) -> None:
@@ -71,7 +60,7 @@ def show_tree(path: PathInTree, *, around: str, widget: str) -> None:
         )
     if view == WHOLE_TREE:
         st.plotly_chart(
-            _picture(path.cut_key, path.node, dark, path),
+            _picture(path, dark),
             key="tree_figure",
             config={"displaylogo": False, "scrollZoom": True},
             alt="The decision tree with the path lit",
@@ -82,13 +71,13 @@ def show_tree(path: PathInTree, *, around: str, widget: str) -> None:
             + " Drag or scroll to zoom, double-click to go back."
         )
     else:
-        st.html(_place(path.cut_key, path.node, path.note, dark, path))
+        st.html(_place(path, dark))
 
 
 def make_ready(path: PathInTree) -> None:
     """Make what `show_tree` shows first, for when it is asked for."""
     if _is_reached(path):
-        _place(path.cut_key, path.node, path.note, is_dark(), path)
+        _place(path, is_dark())
 
 
 def _is_reached(path: PathInTree) -> bool:
@@ -97,20 +86,20 @@ def _is_reached(path: PathInTree) -> bool:
 
 
 @cached()
-def _picture(cut_key: str, node: int, dark: bool, _path: PathInTree) -> Any:
-    return tree_figure(_path.tree, _cut(cut_key, _path), node, dark=dark)
+def _picture(path: PathInTree, dark: bool) -> Any:
+    return tree_figure(path.tree, _cut(path.tree, path.cut_at), path.node, dark=dark)
 
 
 @cached()
-def _place(cut_key: str, node: int, note: str, dark: bool, _path: PathInTree) -> str:
-    return place_html(_path.tree, _cut(cut_key, _path), node, note=note, dark=dark)
+def _place(path: PathInTree, dark: bool) -> str:
+    cut = _cut(path.tree, path.cut_at)
+    return place_html(path.tree, cut, path.node, note=path.note, dark=dark)
 
 
 @cached()
-def _cut(cut_key: str, _path: PathInTree) -> NDArray[np.int64]:
+def _cut(tree: PolicyTree, thresholds: Thresholds | None) -> NDArray[np.int64]:
     """The nodes that are rules."""
-    tree, thresholds = _path.tree, _path.thresholds
-    if _path.leaves:
+    if thresholds is None:
         return np.flatnonzero(tree.feature == LEAF)
     return cut_nodes(
         tree,

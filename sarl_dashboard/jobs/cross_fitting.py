@@ -10,7 +10,6 @@ from __future__ import annotations
 from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.names import digest_of_pairs
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.progress import Progress
@@ -29,7 +28,7 @@ def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
     """What the trees without each fold depend on."""
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
-    return ("elsewhere", digest_of_pairs(demonstrations), divider)
+    return ("elsewhere", demonstrations.pairs_digest, divider)
 
 
 def judged(thresholds: Thresholds) -> Judged | None:
@@ -44,14 +43,18 @@ def judged(thresholds: Thresholds) -> Judged | None:
     demonstrations = chosen_demonstrations()
     if demonstrations is None or compact_set.in_force():
         return None
-    key = key_of(demonstrations, chosen_divider())
-    fit = RESULTS.get(key)
-    return _judged(key, thresholds, fit) if isinstance(fit, CrossFit) else None
+    fit = RESULTS.get(key_of(demonstrations, chosen_divider()))
+    return _judged(fit, thresholds) if isinstance(fit, CrossFit) else None
 
 
-@cached()
-def _judged(key: tuple[object, ...], thresholds: Thresholds, _fit: CrossFit) -> Judged:
-    return _fit.at(thresholds)
+def _trees_of(fit: CrossFit) -> tuple[str, ...]:
+    """What tells one from others: the trees know the episodes that they were grown from."""
+    return tuple(tree.digest for fold in fit.folds for tree in fold.trees)
+
+
+@cached(hash_funcs={CrossFit: _trees_of})
+def _judged(fit: CrossFit, thresholds: Thresholds) -> Judged:
+    return fit.at(thresholds)
 
 
 def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:

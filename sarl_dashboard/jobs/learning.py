@@ -56,7 +56,6 @@ class Order:
     Attributes:
         env_id: Environment.
         rules: Of the shield, or None.
-        rules_digest: Tells them from all others.
         arms: Ways to learn.
         steps: Of each run.
         seeds: How many learners of each kind.
@@ -65,7 +64,6 @@ class Order:
 
     env_id: str
     rules: RuleSet | None
-    rules_digest: str
     arms: tuple[LearningArm, ...]
     steps: int
     seeds: int
@@ -74,7 +72,8 @@ class Order:
     @property
     def conditions(self) -> str:
         """Digest of what all runs share."""
-        shared = (self.env_id, self.rules_digest, self.steps, self.projection)
+        rules = self.rules.digest if self.rules is not None else ""
+        shared = (self.env_id, rules, self.steps, self.projection)
         return digest_of(repr(shared).encode())[:16]
 
     @property

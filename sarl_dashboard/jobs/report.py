@@ -46,12 +46,12 @@ class Order:
 
 
 def order_key(
-    rules: str, demonstrations: Demonstrations, wishes: Wishes, comparison: Sequence[Result]
+    rules: RuleSet, demonstrations: Demonstrations, wishes: Wishes, comparison: Sequence[Result]
 ) -> str:
     """Digest of what a report depends on.
 
     Args:
-        rules: Tells the rules from all others, by content.
+        rules: The rules.
         demonstrations: They are about.
         wishes: What it is to hold; no agent among them.
         comparison: Results to show.
@@ -60,7 +60,8 @@ def order_key(
         Hexadecimal digits.
     """
     contents = (wishes.in_full, wishes.frames, wishes.commands, wishes.rules_name)
-    return digest_of(repr((rules, demonstrations.digest, contents, tuple(comparison))).encode())
+    parts = (rules.digest, demonstrations.digest, contents, tuple(comparison))
+    return digest_of(repr(parts).encode())
 
 
 @st.cache_resource

@@ -6,8 +6,8 @@ The words on screen are those in the URL.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import streamlit as st
@@ -23,6 +23,7 @@ from sarl_core.agents.agent import (
 from sarl_core.errors import InputError, SarlError
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.shielding.shield import Projection
+from sarl_dashboard.cache import cached
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.text import digest_of
@@ -36,25 +37,64 @@ def _latest_expert() -> int:
     return max((path.stat().st_mtime_ns for path in EXPERT_FOLDER.glob("*.npz")), default=0)
 
 
-@st.cache_data(max_entries=64, show_spinner=False)
+@cached()
 def _expert_digest(env_id: str, stamp: int) -> str:
     path = shipped_experts().get(env_id)
     return digest_of(path.read_bytes()) if path is not None else ""
 
 
-def named_agent(choice: str, env_id: str) -> str:
-    """What tells an agent of a known name from others, by content.
-
-    Args:
-        choice: One of `AGENTS`, not a file.
-        env_id: Environment.
-    """
-    return f"{choice} {_expert_digest(env_id, _latest_expert()) if choice == 'expert' else ''}"
-
-
 def has_expert(env_id: str) -> bool:
     """Whether an expert is shipped for an environment."""
     return bool(_expert_digest(env_id, _latest_expert()))
+
+
+@dataclass(frozen=True)
+class ChosenAgent:
+    """An agent that was chosen, which a call makes.
+
+    Attributes:
+        choice: One of `AGENTS`.
+        env_id: Environment.
+        seed: Of what is random in it.
+        files: Names and contents of the policy, and of the statistics of its observations.
+        expert: Digest of the shipped expert; "" for other agents.
+    """
+
+    choice: str
+    env_id: str
+    seed: int
+    files: tuple[tuple[str, bytes], ...] = ()
+    expert: str = ""
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells it from others in its environment and with its seed."""
+        return " ".join([self.choice, self.expert, *(digest_of(part) for _, part in self.files)])
+
+    def __call__(self) -> Agent:
+        """Make it.
+
+        Raises:
+            InputError: If it cannot be made.
+        """
+        if not self.files:
+            return make_agent(self.choice, self.env_id, seed=self.seed)
+        with tempfile.TemporaryDirectory() as folder:
+            paths = [Path(folder) / Path(name).name for name, _ in self.files]
+            for path, (_, content) in zip(paths, self.files, strict=True):
+                path.write_bytes(content)
+            try:
+                agent = make_agent(
+                    paths[0], self.env_id, seed=self.seed, normalise=next(iter(paths[1:]), None)
+                )
+            except SarlError as error:
+                # The folder is ours; the person knows the file by its name.
+                raise InputError(str(error).replace(f"{folder}/", "")) from error
+            if not isinstance(agent, PolicyAgent):
+                return agent
+            return replace(
+                agent, notes=tuple(note.replace(f"{folder}/", "") for note in agent.notes)
+            )
 
 
 @dataclass(frozen=True)
@@ -82,9 +122,9 @@ def policy_upload(label: str, key: str, env: str | None) -> PolicyFile | None:
             key=f"{key}_statistics",
             help="Of a policy that was trained under VecNormalize: what VecNormalize.save() wrote.",
         )
-    found = PolicyFile(policy, statistics)
-    say_notes(found, env)
-    return found
+    file = PolicyFile(policy, statistics)
+    say_notes(file, env)
+    return file
 
 
 def policy_uploads(label: str, key: str, env: str | None) -> list[PolicyFile]:
@@ -108,67 +148,47 @@ def policy_uploads(label: str, key: str, env: str | None) -> list[PolicyFile]:
         names = (f"{stem}_vecnormalize.pkl", f"{stem}_vec_normalize.pkl")
         return next((file for file in statistics if file.name in names), None)
 
-    found = [PolicyFile(policy, of(policy)) for policy in policies]
-    used = [file.statistics for file in found]
+    uploaded = [PolicyFile(policy, of(policy)) for policy in policies]
+    used = [file.statistics for file in uploaded]
     for file in statistics:
         if file not in used:
             st.warning(
                 f"{file.name} was not used: call it NAME_vecnormalize.pkl if it belongs to NAME.zip"
             )
-    for policy in found:
+    for policy in uploaded:
         say_notes(policy, env)
-    return found
+    return uploaded
 
 
 def say_notes(file: PolicyFile, env: str | None) -> None:
     """Say on the page how a policy was read, and what looks odd in it."""
     try:
         env_id = environment_of(env)
-        make, digest = agent_for(OWN_FILE, file, env_id, 0)
-        notes = _notes(digest, env_id, make)
+        notes = _notes(agent_for(OWN_FILE, file, env_id, 0))
     except SarlError:
         return  # the page says so where the policy is used
     for note in notes:
         st.warning(f"{note}.")
 
 
-@st.cache_data(max_entries=16, show_spinner=False)
-def _notes(digest: str, env_id: str, _make: Callable[[], Agent]) -> tuple[str, ...]:
-    agent = _make()
+@cached()
+def _notes(chosen: ChosenAgent) -> tuple[str, ...]:
+    agent = chosen()
     return agent.notes if isinstance(agent, PolicyAgent) else ()
 
 
-def agent_for(
-    choice: str, uploaded: PolicyFile | None, env_id: str, seed: int
-) -> tuple[Callable[[], Agent], str]:
-    """How to make the agent, and what tells it from others of its name.
+def agent_for(choice: str, uploaded: PolicyFile | None, env_id: str, seed: int) -> ChosenAgent:
+    """The agent that was chosen.
 
     Raises:
         InputError: If there is no such agent.
     """
     if choice != OWN_FILE:
-        return lambda: make_agent(choice, env_id, seed=seed), named_agent(choice, env_id)
+        expert = _expert_digest(env_id, _latest_expert()) if choice == "expert" else ""
+        return ChosenAgent(choice, env_id, seed, expert=expert)
     if uploaded is None:
         raise InputError("no policy has been uploaded; upload one, or choose another agent")
     files = [file for file in (uploaded.policy, uploaded.statistics) if file is not None]
-    contents = [file.getvalue() for file in files]
-
-    def make() -> Agent:
-        with tempfile.TemporaryDirectory() as folder:
-            paths = [Path(folder) / Path(file.name).name for file in files]
-            for path, content in zip(paths, contents, strict=True):
-                path.write_bytes(content)
-            try:
-                agent = make_agent(
-                    paths[0], env_id, seed=seed, normalise=next(iter(paths[1:]), None)
-                )
-            except SarlError as error:
-                # The folder is ours; the person knows the file by its name.
-                raise InputError(str(error).replace(f"{folder}/", "")) from error
-            if not isinstance(agent, PolicyAgent):
-                return agent
-            return replace(
-                agent, notes=tuple(note.replace(f"{folder}/", "") for note in agent.notes)
-            )
-
-    return make, " ".join(digest_of(content) for content in contents)
+    return ChosenAgent(
+        choice, env_id, seed, tuple((str(file.name), file.getvalue()) for file in files)
+    )

@@ -31,13 +31,11 @@ class Compact:
     """The compact rules of the chosen data.
 
     Attributes:
-        digest: Of the file and of the demonstrations that were counted.
         shipped: The rules as they are in the file.
         trees: The same rules as trees, one an action dimension, counted on the demonstrations.
         counted: The rules with what was counted.
     """
 
-    digest: str
     shipped: RuleSet
     trees: tuple[PolicyTree, ...]
     counted: RuleSet
@@ -79,18 +77,17 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
     if not in_force():
         return None
     try:
-        shipped, digest = compact_rules()
-        return _counted(f"{digest} {demonstrations.digest}", shipped, demonstrations)
+        return _counted(compact_rules(), demonstrations)
     except SarlError as error:
         refuse(error)
         return None
 
 
 @cached(show_spinner="Counting the compact rules …")
-def _counted(digest: str, _shipped: RuleSet, _demonstrations: Demonstrations) -> Compact:
-    trees = recount(_shipped, _demonstrations)
-    found = leaf_rules(trees)
-    compact = Compact(digest, _shipped, trees, found)
+def _counted(shipped: RuleSet, demonstrations: Demonstrations) -> Compact:
+    trees = recount(shipped, demonstrations)
+    rules = leaf_rules(trees)
+    compact = Compact(shipped, trees, rules)
     # The box is of the pairs that the rules were built from, whatever they are counted on.
-    boxed = tuple(replace(rule, box=compact.as_shipped(rule).box) for rule in found.rules)
-    return replace(compact, counted=replace(found, rules=boxed))
+    boxed = tuple(replace(rule, box=compact.as_shipped(rule).box) for rule in rules)
+    return replace(compact, counted=replace(rules, rules=boxed))

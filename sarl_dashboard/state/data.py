@@ -122,19 +122,14 @@ def chosen_demonstrations() -> Demonstrations | None:
 
     None while nothing is uploaded.
     """
-    found = data_parts()
-    return None if found is None else found.mined
+    parts = data_parts()
+    return None if parts is None else parts.mined
 
 
 def held_out_demonstrations() -> Demonstrations | None:
     """The episodes that rules are tried on; None where nothing is held out."""
-    found = data_parts()
-    return None if found is None else found.held_out
-
-
-def held_out_digest() -> str:
-    """What tells the held-out episodes from others; "" where nothing is held out."""
-    return digest_or_empty(held_out_demonstrations())
+    parts = data_parts()
+    return None if parts is None else parts.held_out
 
 
 def require_demonstrations() -> Demonstrations:
@@ -154,8 +149,6 @@ def require_demonstrations() -> Demonstrations:
 
 
 # --- what follows, cached ----------------------------------------------------------------------
-# Streamlit samples large arguments when it hashes them, so everything large is passed with a
-# leading underscore and stands in the key by its digest.
 
 
 @cached(show_spinner="Reading the demonstrations …")
@@ -171,8 +164,3 @@ def shipped_demonstrations(name: str) -> Demonstrations:
     from sarl_core.demonstrations.formats import load_demonstrations
 
     return load_demonstrations(DATA_FOLDER / f"{name}.parquet")
-
-
-def digest_or_empty(demonstrations: Demonstrations | None) -> str:
-    """The digest of demonstrations, "" where there are none."""
-    return "" if demonstrations is None else demonstrations.digest

@@ -19,21 +19,24 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.applying import labels_of
 from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
 from sarl_core.mining.rule_order import fits
-from sarl_core.mining.rule_set import RuleSet, rules_from_json
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.holding_out import with_untried_held_out
 from sarl_core.shielding.deciding import Ground, ground_of
 from sarl_core.shielding.disagreement import sampled_states
 from sarl_core.shielding.effects import Verdicts, verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state import compact_set
-from sarl_dashboard.state.data import (
-    chosen_demonstrations,
-    data_key,
-    held_out_demonstrations,
-    held_out_digest,
-)
+from sarl_dashboard.state.data import chosen_demonstrations, data_key, held_out_demonstrations
 from sarl_dashboard.state.mined import rules_at
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, as_named, compact_rules
+from sarl_dashboard.state.rule_files import (
+    CHOSEN,
+    COMPACT,
+    OWN_FILE,
+    as_named,
+    compact_rules,
+    rules_in_file,
+    unnamed_compact_rules,
+)
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import digest_of
 
@@ -44,22 +47,20 @@ class Base:
 
     Attributes:
         kind: One of the words on screen.
-        key: To which edits belong.
-        digest: Tells these rules from all others.
+        key: To which edits belong, whatever the thresholds and names.
         rule_set: Without edits.
         name: Of the file they are from, "" for none.
     """
 
     kind: str
     key: str
-    digest: str
     rule_set: RuleSet
     name: str = ""
 
     @cached_property
     def basis(self) -> Basis:
         """The states on which edits are counted; looked up once, since much asks for them."""
-        return basis_of(self.rule_set, self.digest)
+        return _basis(self.rule_set, demonstrations_for(self.rule_set))
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +71,11 @@ class Basis:
         ground: The states, walked.
         expert: What the expert did there, None where that is not known.
         noun: What one of them is called.
-        digest: Tells these states from others.
     """
 
     ground: Ground
     expert: NDArray[np.int64] | None
     noun: str
-    digest: str
 
 
 # --- which rules are edited --------------------------------------------------------------------
@@ -107,9 +106,8 @@ def take_file(content: bytes, name: str) -> None:
     Raises:
         InputError: If it is no rule file.
     """
-    rule_set = rules_from_json(content, name=name)
-    digest = digest_of(content)
-    st.session_state["_edit_file"] = Base(OWN_FILE, f"file {digest}", digest, rule_set, name)
+    key = f"file {digest_of(content)}"
+    st.session_state["_edit_file"] = Base(OWN_FILE, key, rules_in_file(content, name), name)
 
 
 def base() -> Base:
@@ -120,17 +118,15 @@ def base() -> Base:
     """
     kind = chosen_kind()
     if kind == OWN_FILE:
-        kept = cast("Base | None", st.session_state.get("_edit_file"))
-        if kept is None:
+        uploaded = cast("Base | None", st.session_state.get("_edit_file"))
+        if uploaded is None:
             raise InputError("no rule file has been uploaded; upload one, or edit other rules")
-        rule_set, digest = as_named(kept.rule_set, kept.digest)
-        return replace(kept, rule_set=rule_set, digest=digest)
+        return replace(uploaded, rule_set=as_named(uploaded.rule_set))
     if kind == COMPACT:
-        rule_set, digest = compact_rules()
-        return Base(kind, f"compact {digest.split()[0]}", digest, rule_set)  # whatever the names
-    rule_set, digest = rules_at(None)
+        return Base(kind, f"compact {unnamed_compact_rules().digest}", compact_rules())
+    rule_set = rules_at()
     # A rule's number is its node's, the same at all thresholds.
-    return Base(kind, repr((data_key(), rule_set.divider)), digest, rule_set)
+    return Base(kind, repr((data_key(), rule_set.divider)), rule_set)
 
 
 # --- the edits ---------------------------------------------------------------------------------
@@ -177,33 +173,21 @@ def redo(of: Base) -> None:
 
 def edited(of: Base) -> RuleSet:
     """The rules with the edits."""
-    return _with(of, history(of).edits)
+    return _edited(of.rule_set, history(of).edits, _tried_on(of))
 
 
-def _with(of: Base, edits: tuple[Edit, ...]) -> RuleSet:
-    """The rules with some edits; those by hand are tried on what is held out, as mined ones are."""
-    found, held_out = chosen_demonstrations(), None
-    if found is not None and found.digest == of.rule_set.source.digest:
-        held_out = held_out_demonstrations()
-    tried = held_out.digest if held_out is not None else ""
-    return _edited(of.digest, _told(edits), tried, edits, of.rule_set, held_out)
-
-
-def _told(edits: tuple[Edit, ...]) -> str:
-    return digest_of(repr(edits).encode())
+def _tried_on(of: Base) -> Demonstrations | None:
+    """What is held out of what the rules were mined from: rules by hand are tried on it too."""
+    demonstrations = chosen_demonstrations()
+    if demonstrations is None or demonstrations.digest != of.rule_set.source.digest:
+        return None
+    return held_out_demonstrations()
 
 
 @cached()
-def _edited(
-    digest: str,
-    told: str,
-    tried: str,
-    _edits: tuple[Edit, ...],
-    _rule_set: RuleSet,
-    _held_out: Demonstrations | None,
-) -> RuleSet:
-    found = apply(_rule_set, _edits)
-    return found if _held_out is None else with_untried_held_out(found, _held_out)
+def _edited(rule_set: RuleSet, edits: tuple[Edit, ...], held_out: Demonstrations | None) -> RuleSet:
+    edited_set = apply(rule_set, edits)
+    return edited_set if held_out is None else with_untried_held_out(edited_set, held_out)
 
 
 # --- for other pages ---------------------------------------------------------------------------
@@ -219,17 +203,16 @@ def offered() -> bool:
         return False
 
 
-def edited_rules() -> tuple[RuleSet, str]:
-    """The edited set, and what tells it from others.
+def edited_rules() -> RuleSet:
+    """The edited set.
 
     Raises:
         InputError: If there is none.
     """
     of = base()
-    edits = history(of).edits
-    if not edits:
+    if not history(of).edits:
         raise InputError("there are no edits of the rules in force; make some on the Edit page")
-    return edited(of), f"{of.digest} {_told(edits)}"
+    return edited(of)
 
 
 # --- what they change --------------------------------------------------------------------------
@@ -241,30 +224,27 @@ def demonstrations_for(rule_set: RuleSet) -> Demonstrations | None:
     return demonstrations if demonstrations and fits(rule_set, demonstrations) else None
 
 
-def basis_of(rule_set: RuleSet, digest: str) -> Basis:
-    """The states on which a rule set is counted: demonstrated ones, where they are its own kind."""
-    demonstrations = demonstrations_for(rule_set)
-    told = demonstrations.digest if demonstrations is not None else ""
-    return _basis(digest, told, rule_set, demonstrations)
-
-
 @cached(show_spinner="Looking which rule decides which state …")
-def _basis(
-    digest: str, told: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None
-) -> Basis:
-    if _demonstrations is None:
-        ground = ground_of(_rule_set, sampled_states([_rule_set]))
-        return Basis(ground, None, "random state", f"{len(ground.states)} random")
-    ground = ground_of(_rule_set, _demonstrations.observations)
-    return Basis(ground, labels_of(_rule_set, _demonstrations), "demonstrated state", told)
+def _basis(rule_set: RuleSet, demonstrations: Demonstrations | None) -> Basis:
+    """The states on which rules are counted: demonstrated ones, where they are their own kind."""
+    if demonstrations is None:
+        ground = ground_of(rule_set, sampled_states([rule_set]))
+        return Basis(ground, None, "random state")
+    ground = ground_of(rule_set, demonstrations.observations)
+    return Basis(ground, labels_of(rule_set, demonstrations), "demonstrated state")
 
 
 def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
     """What the rules with some edits say of the states."""
-    told = f"{of.basis.digest} {_told(edits)} {held_out_digest()}"
-    return _verdicts(of.digest, told, _with(of, edits), of.basis)
+    return _verdicts(of.rule_set, edits, _tried_on(of), demonstrations_for(of.rule_set))
 
 
 @cached()
-def _verdicts(digest: str, told: str, _edited_set: RuleSet, _basis: Basis) -> Verdicts:
-    return verdicts(_basis.ground, _edited_set, _basis.expert)
+def _verdicts(
+    rule_set: RuleSet,
+    edits: tuple[Edit, ...],
+    held_out: Demonstrations | None,
+    demonstrations: Demonstrations | None,
+) -> Verdicts:
+    basis = _basis(rule_set, demonstrations)
+    return verdicts(basis.ground, _edited(rule_set, edits, held_out), basis.expert)

@@ -5,7 +5,6 @@ They belong to the data as they were read, whatever episodes are left out or hel
 
 from __future__ import annotations
 
-import hashlib
 from typing import cast
 
 import streamlit as st
@@ -34,7 +33,7 @@ def named(raw: Demonstrations) -> Demonstrations:
         The same object where nothing was renamed.
     """
     names = _given().get(raw.digest)
-    return raw if names is None else _renamed(raw.digest, names, raw)
+    return raw if names is None else _renamed(raw, names)
 
 
 def given_names(raw: Demonstrations | None) -> Names | None:
@@ -73,11 +72,6 @@ def reset(raw: Demonstrations) -> None:
     _given().pop(raw.digest, None)
 
 
-def digest_of_names(names: Names | None) -> str:
-    """What tells names from others; "" for none."""
-    return "" if names is None else hashlib.blake2b(repr(names).encode()).hexdigest()[:16]
-
-
 @cached()
-def _renamed(digest: str, names: Names, _raw: Demonstrations) -> Demonstrations:
-    return renamed(_raw, names)
+def _renamed(raw: Demonstrations, names: Names) -> Demonstrations:
+    return renamed(raw, names)

@@ -99,21 +99,21 @@ def parted(demonstrations: Demonstrations) -> Parts:
     choice = chosen()
     if not choice.share and not choice.left_out:
         return Parts(demonstrations, demonstrations)
-    return _parted(demonstrations.digest, choice, demonstrations)
+    return _parted(demonstrations, choice)
 
 
 @cached(show_spinner="Choosing the episodes …")
-def _parted(digest: str, choice: Choice, _demonstrations: Demonstrations) -> Parts:
-    there = _demonstrations.episodes[_demonstrations.episode_starts].tolist()
-    gone = set(choice.left_out)
-    kept = [episode for episode in there if episode not in gone]
+def _parted(demonstrations: Demonstrations, choice: Choice) -> Parts:
+    episodes = demonstrations.episodes[demonstrations.episode_starts].tolist()
+    left_out = set(choice.left_out)
+    left = [episode for episode in episodes if episode not in left_out]
     problem = ""
-    remaining = _demonstrations
-    if not kept:
+    remaining = demonstrations
+    if not left:
         problem = "every episode would be left out, so none is; leave out fewer"
-    elif len(kept) < len(there):
+    elif len(left) < len(episodes):
         try:
-            remaining = _demonstrations.select(kept)
+            remaining = demonstrations.select(left)
         except InputError as error:
             problem = f"no episode is left out: {error}"
     if not choice.share:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.errors import InputError
-from sarl_core.mining.rule_set import RuleSet, rules_from_json
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state.edits import edited_rules
 from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (
@@ -15,25 +15,24 @@ from sarl_dashboard.state.rule_files import (
     PAPERS,
     as_named,
     compact_rules,
+    rules_in_file,
 )
-from sarl_dashboard.text import digest_of
 
 EDITED = "edited"
 
 
-def rules_for(choice: str, uploaded: UploadedFile | None) -> tuple[RuleSet | None, str]:
-    """The rule set that was chosen, None for none, and what tells it from others.
+def rules_for(choice: str, uploaded: UploadedFile | None) -> RuleSet | None:
+    """The rule set that was chosen, None for none.
 
     Raises:
         InputError: If it cannot be had.
     """
     if choice == NO_RULES:
-        return None, ""
+        return None
     if choice == OWN_FILE:
         if uploaded is None:
             raise InputError("no rule file has been uploaded; upload one, or choose other rules")
-        content = uploaded.getvalue()
-        return as_named(rules_from_json(content, name=uploaded.name), digest_of(content))
+        return as_named(rules_in_file(uploaded.getvalue(), uploaded.name))
     if choice == COMPACT:
         return compact_rules()
     if choice == EDITED:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.names import Names
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
@@ -20,7 +22,6 @@ from sarl_dashboard.state.data import (
     raw_demonstrations,
     shipped_demonstrations,
 )
-from sarl_dashboard.text import digest_of
 
 OWN_FILE = "own file"
 CHOSEN, NO_RULES, COMPACT = "at the thresholds", "none", "compact"
@@ -28,27 +29,43 @@ PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 RULES_FOLDER = DATA / "rules"
 
 
-def as_named(rule_set: RuleSet, digest: str) -> tuple[RuleSet, str]:
+@cached()
+def rules_in_file(content: bytes, name: str) -> RuleSet:
+    """The rules of an uploaded file.
+
+    Args:
+        content: Of the file.
+        name: Of the file, for errors.
+
+    Raises:
+        InputError: If it is no rule file.
+    """
+    return rules_from_json(content, name=name)
+
+
+def as_named(rule_set: RuleSet) -> RuleSet:
     """Rules from a file, in the order and under the names of the chosen demonstrations.
 
     Args:
         rule_set: As it was read.
-        digest: Tells it from others.
 
     Returns:
-        The rules, as they were read where they do not fit these; and what tells them from
-        others and from themselves under other names or in another order.
+        The same where they do not fit these.
     """
     raw = raw_demonstrations()
     if raw is None or not fits(rule_set, raw):
-        return rule_set, digest
-    ordered = rules_of(rule_set, raw).rule_set
-    if ordered is not rule_set:
-        digest = f"{digest} {raw.digest}"
-    names = given_names.given_names(raw)
-    if names is None:
-        return ordered, digest
-    return renamed_rules(ordered, names), f"{digest} {given_names.digest_of_names(names)}"
+        return rule_set
+    return _renamed(_ordered(rule_set, raw), given_names.given_names(raw))
+
+
+@cached()
+def _ordered(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
+    return rules_of(rule_set, demonstrations).rule_set
+
+
+@cached()
+def _renamed(rule_set: RuleSet, names: Names | None) -> RuleSet:
+    return rule_set if names is None else renamed_rules(rule_set, names)
 
 
 def compact_file() -> Path:
@@ -57,26 +74,30 @@ def compact_file() -> Path:
 
 
 @cached()
-def _rule_file(path: Path, stamp: int, dataset: str) -> tuple[RuleSet, str]:
-    content = path.read_bytes()
-    shipped = rules_from_json(content, name=path.name)
-    return with_splits(shipped, shipped_demonstrations(dataset)), digest_of(content)
+def _compact_rules(path: Path, stamp: int, dataset: str) -> RuleSet:
+    shipped = rules_from_json(path.read_bytes(), name=path.name)
+    return with_splits(shipped, shipped_demonstrations(dataset))
 
 
-def compact_rules() -> tuple[RuleSet, str]:
-    """The compact rules of the chosen data, and what tells them from others.
+def unnamed_compact_rules() -> RuleSet:
+    """The compact rules of the chosen data under the names they came with.
 
     Raises:
         InputError: If there are none, or they cannot be read.
     """
     path = compact_file()
     try:
-        rule_set, digest = _rule_file(path, path.stat().st_mtime_ns, chosen_dataset())
+        return _compact_rules(path, path.stat().st_mtime_ns, chosen_dataset())
     except OSError as error:
         raise InputError(
             f"there are no compact rules for {dataset_label(chosen_dataset())}; choose other rules"
         ) from error
-    names = given_names.given_names(raw_demonstrations())
-    if names is None:
-        return rule_set, digest
-    return renamed_rules(rule_set, names), f"{digest} {given_names.digest_of_names(names)}"
+
+
+def compact_rules() -> RuleSet:
+    """The compact rules of the chosen data.
+
+    Raises:
+        InputError: If there are none, or they cannot be read.
+    """
+    return _renamed(unnamed_compact_rules(), given_names.given_names(raw_demonstrations()))

@@ -14,7 +14,7 @@ from sarl_core import (
     mine_rules,
     save_demonstrations,
 )
-from sarl_core.demonstrations.names import Names, digest_of_pairs, names_of, renamed, tidy
+from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
 from sarl_core.mining.editing.renaming import renamed_rules, renamed_trees
 
 HOSTILE = ("<b>*bold*</b>", 'a "quoted" | name', "=cmd()", "\u202eright to left", "obs_0")
@@ -67,10 +67,10 @@ def test_trees_take_other_names_without_being_grown_again() -> None:
 
 def test_pairs_are_known_under_every_name() -> None:
     pairs = two_actions()
-    assert digest_of_pairs(pairs) == digest_of_pairs(renamed(pairs, NEW)) != pairs.digest
-    assert digest_of_pairs(pairs) != digest_of_pairs(pairs.select([0, 1]))
+    assert pairs.pairs_digest == renamed(pairs, NEW).pairs_digest != pairs.digest
+    assert pairs.pairs_digest != pairs.select([0, 1]).pairs_digest
     other = replace(pairs, actions=pairs.actions[::-1])
-    assert digest_of_pairs(pairs) != digest_of_pairs(other)
+    assert pairs.pairs_digest != other.pairs_digest
 
 
 def test_names_of_other_data_rename_what_fits() -> None:

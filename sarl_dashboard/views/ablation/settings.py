@@ -123,8 +123,8 @@ def settings() -> Choice:
 
     env_id, first = environment_of(env), int(seed or 0)
     describe_environment(env_id)
-    rule_set, rules_digest = rules_for(rules, rule_file)
-    make, agent_digest = agent_for(agent, policy_file, env_id, first)
+    rule_set = rules_for(rules, rule_file)
+    chosen = agent_for(agent, policy_file, env_id, first)
     if rule_set is None or not any(rule.enabled for rule in rule_set.rules):
         raise InputError(
             "there is no rule that could be taken out; lower the thresholds in the sidebar, or "
@@ -133,12 +133,12 @@ def settings() -> Choice:
     no_boxes_notice([rule_set], outside)
     notes_notice(check_environment(env_id, Shield(rule_set)).notes)
     wanted = Wanted(
-        row_key(env_id, agent_digest, f"{rules_digest} {outside}", projection, first),
+        row_key(env_id, chosen.digest, f"{rule_set.digest} {outside}", projection, first),
         env_id,
         first,
         int(episodes or LEAST_EPISODES),
         int(most or 1),
-        make,
+        chosen,
         lambda: Shield(rule_set, projection=projection, outside=outside),
     )
     return Choice(wanted, rules)

@@ -22,13 +22,11 @@ RETURN_COLOUR, LENGTH_COLOUR = "#0b6e99", "#7A8AA0"
 
 
 @cached()
-def action_figures(
-    digest: str, divider: int, _demonstrations: Demonstrations
-) -> tuple[go.Figure, ...]:
+def action_figures(demonstrations: Demonstrations, divider: int) -> tuple[go.Figure, ...]:
     """A figure for each action dimension."""
     figures = []
-    for index, dimension in enumerate(label_dimensions(_demonstrations, divider)):
-        values = _demonstrations.action_columns[:, index]
+    for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
+        values = demonstrations.action_columns[:, index]
         if dimension.is_interval:
             histogram = interval_histogram(values, dimension)
         else:
@@ -40,24 +38,24 @@ def action_figures(
 
 @cached()
 def episode_figures(
-    digest: str, _demonstrations: Demonstrations
+    demonstrations: Demonstrations,
 ) -> tuple[go.Figure | None, go.Figure]:
     """Returns (if there are rewards) and lengths of the episodes."""
-    finished, returns = _demonstrations.episode_finished, _demonstrations.episode_returns
+    finished, returns = demonstrations.episode_finished, demonstrations.episode_returns
     return (
         None
         if returns is None
         else episode_figure(episode_series(returns, finished), "return", RETURN_COLOUR),
         episode_figure(
-            episode_series(_demonstrations.episode_lengths, finished), "length", LENGTH_COLOUR
+            episode_series(demonstrations.episode_lengths, finished), "length", LENGTH_COLOUR
         ),
     )
 
 
 def show_actions(demonstrations: Demonstrations, divider: int) -> None:
     """How often each action was taken; return and length of every episode."""
-    returns, lengths = episode_figures(demonstrations.digest, demonstrations)
-    figures = action_figures(demonstrations.digest, divider, demonstrations)
+    returns, lengths = episode_figures(demonstrations)
+    figures = action_figures(demonstrations, divider)
     dimensions = demonstrations.action_dimensions
     with st.grid(3, min_column_width=300, gap="medium") as grid:
         for index, figure in enumerate(figures[:MOST_FIGURES]):

@@ -23,19 +23,15 @@ AT_FIRST, MOST = 12, 48  # figures
 
 @cached(show_spinner="Counting …")
 def feature_figures(
-    digest: str,
-    divider: int,
-    by: int,
-    features: tuple[int, ...],
-    _demonstrations: Demonstrations,
+    demonstrations: Demonstrations, divider: int, by: int, features: tuple[int, ...]
 ) -> tuple[go.Figure, ...]:
     """A figure for each of some features, coloured by the labels of one action dimension."""
-    dimension = label_dimensions(_demonstrations, divider)[by]
-    labels = dimension.labels_of(_demonstrations.action_columns[:, by])
+    dimension = label_dimensions(demonstrations, divider)[by]
+    labels = dimension.labels_of(demonstrations.action_columns[:, by])
     return tuple(
         feature_figure(
-            _demonstrations.features[index],
-            histogram_by_label(_demonstrations.observations[:, index], labels, dimension.n_labels),
+            demonstrations.features[index],
+            histogram_by_label(demonstrations.observations[:, index], labels, dimension.n_labels),
             dimension,
         )
         for index in features
@@ -90,7 +86,7 @@ def show_features(
     legend(dimensions[by])
     if not features:
         st.caption("Choose a feature above to see how it is distributed.")
-    figures = feature_figures(demonstrations.digest, divider, by, tuple(features), demonstrations)
+    figures = feature_figures(demonstrations, divider, by, tuple(features))
     with st.grid(4, min_column_width=220, gap="small") as grid:
         for index, figure in zip(features, figures, strict=True):
             with grid.cell():

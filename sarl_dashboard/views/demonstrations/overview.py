@@ -27,10 +27,10 @@ class Contents:
 
 
 @cached(show_spinner="Counting …")
-def contents_of(digest: str, _demonstrations: Demonstrations) -> Contents:
-    """Numbers of a set, worked out once for each digest."""
+def contents_of(demonstrations: Demonstrations) -> Contents:
+    """Numbers of a set."""
     return Contents(
-        _demonstrations.summary(), feature_rows(_demonstrations), find_warnings(_demonstrations)
+        demonstrations.summary(), feature_rows(demonstrations), find_warnings(demonstrations)
     )
 
 

@@ -22,31 +22,38 @@ from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
-from sarl_dashboard.state.data import chosen_demonstrations, digest_or_empty
+from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
 
 EVERY = "all"
-Digests = tuple[str, str, str]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Comparison:
     """Two rule sets, held against each other.
 
     Attributes:
-        digests: Of the first, of the second, and of the demonstrations.
+        first: One of them.
+        second: The other.
+        demonstrations: On whose states they are compared; None for random ones.
         names: Of both.
-        disagreement: What differs.
-        states: On which they were compared, shape (n, d).
-        demonstrations: Whose states these are; None where they are random.
     """
 
-    digests: Digests
-    names: tuple[str, str]
-    disagreement: Disagreement
-    states: NDArray[np.float32]
+    first: RuleSet
+    second: RuleSet
     demonstrations: Demonstrations | None
+    names: tuple[str, str]
+
+    @property
+    def disagreement(self) -> Disagreement:
+        """What differs."""
+        return _disagreement(self.first, self.second, self.demonstrations)[0]
+
+    @property
+    def states(self) -> NDArray[np.float32]:
+        """On which they are compared, shape (n, d)."""
+        return _disagreement(self.first, self.second, self.demonstrations)[1]
 
     @property
     def noun(self) -> str:
@@ -62,11 +69,10 @@ def comparison() -> None:
         return
     try:
         compared = _compare(*sides)
+        _show_states(compared)
+        _show_rules(compared)
     except SarlError as error:
         refuse(error)
-        return
-    _show_states(compared)
-    _show_rules(compared)
 
 
 def _compare(first: Side, second: Side) -> Comparison:
@@ -78,31 +84,27 @@ def _compare(first: Side, second: Side) -> Comparison:
         fits(first.rule_set, demonstrations) and fits(second.rule_set, demonstrations)
     ):
         demonstrations = None
-    digests = (first.digest, second.digest, digest_or_empty(demonstrations))
-    disagreements, states = _disagreement(digests, first.rule_set, second.rule_set, demonstrations)
-    return Comparison(digests, names, disagreements, states, demonstrations)
+    return Comparison(first.rule_set, second.rule_set, demonstrations, names)
 
 
 @cached(show_spinner="Comparing …")
 def _disagreement(
-    digests: Digests, _first: RuleSet, _second: RuleSet, _demonstrations: Demonstrations | None
+    first: RuleSet, second: RuleSet, demonstrations: Demonstrations | None
 ) -> tuple[Disagreement, NDArray[np.float32]]:
     """The comparison, and the states."""
-    _second = comparable(_first, _second).rule_set
+    second = comparable(first, second).rule_set
     states = (
-        sampled_states([_first, _second])
-        if _demonstrations is None
-        else _demonstrations.observations
+        sampled_states([first, second]) if demonstrations is None else demonstrations.observations
     )
-    return disagreement(ground_of(_first, states), ground_of(_second, states)), states
+    return disagreement(ground_of(first, states), ground_of(second, states)), states
 
 
 @cached(show_spinner="Writing the rules in plain language …")
-def _rules_frame(digests: Digests, kinds: tuple[str, ...], _found: Disagreement) -> Any:
+def _rules_frame(compared: Comparison, kinds: tuple[str, ...]) -> Any:
     """The rules that differ, as a data frame."""
     import pandas as pd
 
-    rows = rule_rows(_found, kinds)
+    rows = rule_rows(compared.disagreement, kinds)
     rows["Action"] = [[action] for action in rows["Action"]]
     if "changed" not in rows["What"]:
         del rows["Change"]
@@ -110,19 +112,18 @@ def _rules_frame(digests: Digests, kinds: tuple[str, ...], _found: Disagreement)
 
 
 @cached()
-def _decisions(
-    digests: Digests, names: tuple[str, str], dimension: int, _compared: Comparison
-) -> tuple[str, Any]:
+def _decisions(compared: Comparison, dimension: int) -> tuple[str, Any]:
     """What the two say of the states, as a table in HTML, and some states as a data frame."""
     import pandas as pd
 
-    table = confusion_html(_compared.disagreement, dimension, names=names, noun=_compared.noun)
+    names, disagreements = compared.names, compared.disagreement
+    table = confusion_html(disagreements, dimension, names=names, noun=compared.noun)
     rows = example_rows(
-        _compared.disagreement,
+        disagreements,
         dimension,
-        _compared.states,
+        compared.states,
         names=names,
-        demonstrations=_compared.demonstrations,
+        demonstrations=compared.demonstrations,
     )
     return table, pd.DataFrame(rows)
 
@@ -163,7 +164,7 @@ def _show_rules(compared: Comparison) -> None:
         label_visibility="collapsed",
     )
     kinds = KINDS if view in (None, EVERY) else (str(view),)
-    frame = _rules_frame(compared.digests, kinds, disagreements)
+    frame = _rules_frame(compared, kinds)
     column = st.column_config
     action, action_width = action_column(disagreements.first.actions, "What the rule says")
     st.dataframe(
@@ -211,7 +212,7 @@ def _show_states(compared: Comparison) -> None:
             "Action", labels, default=most, key="decided", bind="query-params", required=True
         )
         dimension = labels.index(name) if name in labels else 0
-    table, examples = _decisions(compared.digests, compared.names, dimension, compared)
+    table, examples = _decisions(compared, dimension)
     with st.container(key="confusion"):
         st.html(table)
     count = len(examples)

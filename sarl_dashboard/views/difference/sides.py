@@ -24,12 +24,10 @@ class Side:
 
     Attributes:
         rule_set: Its rules.
-        digest: Tells them from others.
         name: On screen.
     """
 
     rule_set: RuleSet
-    digest: str
     name: str
 
 
@@ -66,8 +64,7 @@ def _side(key: str, label: str, default: str) -> Side:
     if choice == OWN_FILE:
         file = st.file_uploader("Rule file (.json)", key=f"{key}_file")
     if choice == UNEDITED:
-        base = edits.base()
-        return Side(base.rule_set, base.digest, choice)
-    rule_set, digest = rules_for(choice, file)
+        return Side(edits.base().rule_set, choice)
+    rule_set = rules_for(choice, file)
     assert rule_set is not None
-    return Side(rule_set, digest, file.name if file is not None else choice)
+    return Side(rule_set, file.name if file is not None else choice)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import streamlit as st
 
 from sarl_core.explaining.words.edits import state_text
+from sarl_core.mining.editing.edits import Edit, apply
 from sarl_core.mining.language import action_text, conditions_text, counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.state.url import set_url_choice, url_choice
 
@@ -22,8 +25,8 @@ EVERY, TOUCHED = "All rules", "Edited"
 
 
 @cached(show_spinner="Writing the rules in plain language …")
-def _texts(digest: str, _rule_set: RuleSet) -> dict[str, tuple[str, str]]:
-    return {rule.id: _text(rule, _rule_set) for rule in _rule_set.rules}
+def _texts(rule_set: RuleSet) -> dict[str, tuple[str, str]]:
+    return {rule.id: _text(rule, rule_set) for rule in rule_set.rules}
 
 
 def _text(rule: Rule, rule_set: RuleSet) -> tuple[str, str]:
@@ -44,9 +47,9 @@ def in_order(rule_set: RuleSet) -> list[int]:
 
 def table(of: Base, verdicts: Verdicts) -> Rule | None:
     """The rules as edited; returns the chosen one."""
-    rule_set, mined = verdicts.rule_set, _texts(of.digest, of.rule_set)
+    rule_set = verdicts.rule_set
     with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
-        words = st.text_input(
+        search = st.text_input(
             "Search",
             key="search",
             bind="query-params",
@@ -64,28 +67,13 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
             required=True,
             label_visibility="collapsed",
         )
-    order = in_order(rule_set)
-    if view == TOUCHED:
-        order = [at for at in order if _touched(rule_set.rules[at])]
-    texts: dict[int, tuple[str, str]] = {}
-    for at in order:
-        rule = rule_set.rules[at]
-        known = None if rule.origin == "manual" else mined.get(rule.id)
-        texts[at] = known or _text(rule, rule_set)
-    wanted = (words or "").lower().split()
-    if wanted:
-        order = [
-            at
-            for at in order
-            if all(
-                w in f"{' '.join(texts[at])} {rule_set.name_of(rule_set.rules[at])}".lower()
-                for w in wanted
-            )
-        ]
+    words = tuple((search or "").lower().split())
+    rows = _rows(of.rule_set, edits.history(of).edits, view == TOUCHED, words)
+    order = rows.order
     if not order:
         st.info(
             "No rule is edited yet; show all rules and choose one."
-            if view == TOUCHED and not wanted
+            if view == TOUCHED and not words
             else "No rule matches; clear the search to see all.",
             icon=":material/search_off:",
         )
@@ -97,14 +85,12 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
     key = f"edit_table_{hash(tuple(ids))}"
 
     def pick() -> None:
-        rows = st.session_state[key].selection.rows
-        if rows and rows[0] < len(ids):
-            set_url_choice("rule", ids[rows[0]])
+        selected = st.session_state[key].selection.rows
+        if selected and selected[0] < len(ids):
+            set_url_choice("rule", ids[selected[0]])
 
-    by_hand = tuple(texts[at] for at in order if rule_set.rules[at].origin == "manual")
-    written = _written(of.digest, key, by_hand, [texts[at] for at in order])
     st.dataframe(
-        _with_numbers(written, order, verdicts),
+        _with_numbers(rows, verdicts),
         hide_index=True,
         column_config=_columns(rule_set),
         height=table_height(len(order), TABLE_ROWS),
@@ -127,33 +113,60 @@ def _touched(rule: Rule) -> bool:
     return rule.placed or not rule.enabled
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The rows of the table.
+
+    Attributes:
+        order: Places of their rules.
+        texts: What each says and when, as an Arrow table.
+    """
+
+    order: list[int]
+    texts: Any
+
+
 @cached()
-def _written(
-    digest: str,
-    key: str,
-    by_hand: tuple[tuple[str, str], ...],
-    _texts: list[tuple[str, str]],
-) -> Any:
-    """The columns that no edit changes as long as the same rules are shown, as an Arrow table."""
+def _rows(
+    rule_set: RuleSet, edits: tuple[Edit, ...], touched: bool, words: tuple[str, ...]
+) -> Rows:
+    """The rules that are shown, and what no other edit changes of them."""
     import pyarrow as pa
 
-    return pa.table(
-        {
-            "Action": [[does] for does, _ in _texts],
-            "When": [when for _, when in _texts],
-        }
+    edited_set, mined = apply(rule_set, edits), _texts(rule_set)
+    texts: dict[int, tuple[str, str]] = {}
+    for at in in_order(edited_set):
+        rule = edited_set.rules[at]
+        if touched and not _touched(rule):
+            continue
+        text = None if rule.origin == "manual" else mined.get(rule.id)
+        text = text or _text(rule, edited_set)
+        if words:
+            searched = f"{' '.join(text)} {edited_set.name_of(rule)}".lower()
+            if not all(word in searched for word in words):
+                continue
+        texts[at] = text
+    return Rows(
+        list(texts),
+        pa.table(
+            {
+                "Action": [[does] for does, _ in texts.values()],
+                "When": [when for _, when in texts.values()],
+            }
+        ),
     )
 
 
-def _with_numbers(written: Any, order: list[int], verdicts: Verdicts) -> Any:
+def _with_numbers(rows: Rows, verdicts: Verdicts) -> Any:
     """The table with what edits change."""
     import pyarrow as pa
 
+    order = rows.order
     rules = [verdicts.rule_set.rules[at] for at in order]
     decided = verdicts.decided[order]
     kinds = [state_text(rule).split(",")[0] if _touched(rule) else "mined" for rule in rules]
     table = (
-        written.add_column(0, "On", pa.array([rule.enabled for rule in rules]))
+        rows.texts.add_column(0, "On", pa.array([rule.enabled for rule in rules]))
         .add_column(1, "Kind", pa.array(kinds))
         .add_column(2, "Rule", pa.array(list(map(verdicts.rule_set.name_of, rules))))
         .append_column("Decides", pa.array(decided))

@@ -28,10 +28,8 @@ AT_ONCE = 50_000  # pairs up to which contradictions are looked for without bein
 
 
 @cached(show_spinner="Comparing every state with those near it …")
-def _contradictions(
-    digest: str, divider: int, reach: float, _demonstrations: Demonstrations
-) -> Contradictions:
-    return find_contradictions(_demonstrations, divider=divider, reach=reach)
+def _contradictions(demonstrations: Demonstrations, divider: int, reach: float) -> Contradictions:
+    return find_contradictions(demonstrations, divider=divider, reach=reach)
 
 
 def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
@@ -63,7 +61,7 @@ def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
     if len(remaining) > AT_ONCE:
         worked_out(
             "contradictions",
-            ("contradictions", remaining.digest, divider, reach),
+            (remaining, divider, reach),
             lambda executor, progress: executor.submit(
                 find_contradictions, remaining, divider=divider, reach=reach
             ).result(),
@@ -71,7 +69,7 @@ def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
             partial(_show, remaining, rule_set),
         )
         return
-    _show(remaining, rule_set, _contradictions(remaining.digest, divider, reach, remaining))
+    _show(remaining, rule_set, _contradictions(remaining, divider, reach))
 
 
 def _show(remaining: Demonstrations, rule_set: RuleSet, contradictions: Contradictions) -> None:

@@ -54,7 +54,7 @@ def show_curve(evidence: Evidence) -> None:
 
     worked_out(
         "curve",
-        ("curve", evidence.key),
+        (evidence,),
         work,
         f"Mines up to {8 * ORDERS} rule sets.",
         _show_curve,

@@ -10,18 +10,22 @@ from sarl_core.explaining.html.evidence import enough_plot
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.tables.evidence import enough_columns
 from sarl_core.explaining.words.evidence import never_text
-from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
-from sarl_dashboard.views.evidence.evidence import Evidence, Findings
+from sarl_dashboard.views.evidence.evidence import Evidence
 
 
 @cached()
-def _enough(key: tuple[object, ...], _findings: Findings, _rule_set: RuleSet) -> Any:
+def _enough(evidence: Evidence) -> Any:
     import pandas as pd
 
+    findings = evidence.findings
     columns = enough_columns(
-        _findings.rules, _rule_set, _findings.missing, _findings.threshold, _findings.influences
+        findings.rules,
+        evidence.rule_set,
+        findings.missing,
+        findings.threshold,
+        findings.influences,
     )
     # A list of one, which the table shows in the action's colour.
     columns["Action"] = [[action] for action in columns["Action"]]
@@ -57,7 +61,7 @@ def show_enough(evidence: Evidence) -> None:
     with table:
         column = st.column_config
         st.dataframe(
-            _enough(evidence.key, findings, evidence.rule_set),
+            _enough(evidence),
             hide_index=True,
             height=table_height(len(findings.rules), 6),
             key="enough_table",

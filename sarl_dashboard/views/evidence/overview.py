@@ -17,11 +17,10 @@ from sarl_core.explaining.words.evidence import (
     verdict_counts,
 )
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.evidence import FEWEST_EPISODES
 from sarl_core.mining.validation.holding_out import Verdict, shortfall
 from sarl_dashboard.cache import cached
-from sarl_dashboard.views.evidence.evidence import Evidence, Findings
+from sarl_dashboard.views.evidence.evidence import Evidence
 
 MOST_DRAWN = 600
 MEANINGS: tuple[tuple[Verdict, str], ...] = (
@@ -33,13 +32,15 @@ MEANINGS: tuple[tuple[Verdict, str], ...] = (
 
 
 @cached()
-def _overview(key: tuple[object, ...], _findings: Findings, _rule_set: RuleSet) -> str:
-    return overview_plot(_findings.rules[:MOST_DRAWN], _rule_set, _findings.threshold)
+def _overview(evidence: Evidence) -> str:
+    findings = evidence.findings
+    return overview_plot(findings.rules[:MOST_DRAWN], evidence.rule_set, findings.threshold)
 
 
 def show_overview(evidence: Evidence) -> None:
     """All rules with what is known of them, and how many reach the minimum confidence."""
-    findings, judged = evidence.findings, evidence.findings.judged
+    findings = evidence.findings
+    judged = findings.judged
     numbers = [Number("Rules", f"{len(findings.rules):,}")]
     sentences = []
     if judged is not None:
@@ -79,7 +80,7 @@ def show_overview(evidence: Evidence) -> None:
     with st.container(key="overview"):  # one piece: each element of its own takes its time
         st.html(
             f"{number_cards(numbers)}<div style='height:1.2rem'></div>"
-            + _overview(evidence.key, findings, evidence.rule_set)
+            + _overview(evidence)
             + f"<div style='font-size:0.85rem;opacity:0.9;margin:0.6rem 0 0.9rem'>{words}</div>"
             + "".join(map(note, sentences))
         )

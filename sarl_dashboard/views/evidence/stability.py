@@ -57,7 +57,7 @@ def show_stability(evidence: Evidence) -> None:
 
     worked_out(
         "stability",
-        ("stability", evidence.key, rounds),
+        (evidence, rounds),
         work,
         f"Mines {rounds} rule sets.",
         partial(_show_stability, rule_set),

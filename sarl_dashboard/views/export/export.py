@@ -26,10 +26,9 @@ def show_export(demonstrations: Demonstrations) -> None:
     chosen = settings()
     everything = all_demonstrations()
     assert everything is not None
-    key = repr((chosen.digest, everything.digest if chosen.rounded else "", chosen.merged))
     try:
         prepared = prepared_for(
-            key, chosen.rule_set, everything if chosen.rounded else None, merged=chosen.merged
+            chosen.rule_set, everything if chosen.rounded else None, merged=chosen.merged
         )
     except SarlError as error:
         more = " Or switch rounding off." if chosen.rounded and chosen.rule_set.rules else ""
@@ -46,6 +45,6 @@ def show_export(demonstrations: Demonstrations) -> None:
         label_visibility="collapsed",
     )
     if view == MATRIX:
-        show_matrix(prepared.rule_set, key, chosen.stem, demonstrations)
+        show_matrix(prepared.rule_set, chosen.stem, demonstrations)
     else:
-        show_file(prepared, key, chosen)
+        show_file(prepared.rule_set, chosen)

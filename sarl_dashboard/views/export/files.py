@@ -27,14 +27,13 @@ LINES = 120
 
 @cached(show_spinner="Rounding, and counting what changes …")
 def prepared_for(
-    key: str, _rule_set: RuleSet, _demonstrations: Demonstrations | None, *, merged: bool
+    rule_set: RuleSet, demonstrations: Demonstrations | None, *, merged: bool
 ) -> Prepared:
     """Rules rounded and merged as was asked.
 
     Args:
-        key: Tells the rules and the demonstrations from all others.
-        _rule_set: To carry away.
-        _demonstrations: On which no decision may change; None for no rounding.
+        rule_set: To carry away.
+        demonstrations: On which no decision may change; None for no rounding.
         merged: Whether conditions on one feature become one interval.
 
     Returns:
@@ -43,32 +42,31 @@ def prepared_for(
     Raises:
         SarlError: If there is nothing to export, or the demonstrations are for other rules.
     """
-    return prepare(_rule_set, merged=merged, demonstrations=_demonstrations)
+    return prepare(rule_set, merged=merged, demonstrations=demonstrations)
 
 
 @cached(show_spinner="Writing …")
-def content_of(key: str, suffix: str, projection: Projection, _rule_set: RuleSet) -> bytes:
+def content_of(rule_set: RuleSet, suffix: str, projection: Projection) -> bytes:
     """The file."""
-    return export_content(_rule_set, suffix, projection)
+    return export_content(rule_set, suffix, projection)
 
 
 @cached()
-def vectors_of(key: str, projection: Projection, _rule_set: RuleSet) -> bytes:
+def vectors_of(rule_set: RuleSet, projection: Projection) -> bytes:
     """Its test vectors, made when asked for."""
-    return export_vectors(_rule_set, projection)
+    return export_vectors(rule_set, projection)
 
 
-def show_file(prepared: Prepared, key: str, settings: Settings) -> None:
+def show_file(rule_set: RuleSet, settings: Settings) -> None:
     """The file: its beginning, and the downloads.
 
     Args:
-        prepared: The rules as they are exported.
-        key: Tells them from all others.
+        rule_set: As it is exported.
         settings: What was asked for.
     """
     form, projection = settings.form, settings.projection
     try:
-        content = content_of(key, form.suffix, projection, prepared.rule_set)
+        content = content_of(rule_set, form.suffix, projection)
     except SarlError as error:
         refuse(error)
         return
@@ -77,7 +75,7 @@ def show_file(prepared: Prepared, key: str, settings: Settings) -> None:
         download(f"Download {form.suffix}", content, name, key="carry_download", look="primary")
         download(
             "Test vectors",
-            partial(vectors_of, key, projection, prepared.rule_set),
+            partial(vectors_of, rule_set, projection),
             vectors_name(name),
             key="carry_vectors",
             icon="fact_check",
@@ -86,10 +84,10 @@ def show_file(prepared: Prepared, key: str, settings: Settings) -> None:
         )
         st.caption(f"{form.meaning} {len(content) / 1024:,.1f} kB.")
     if form.suffix == ".onnx":
-        kind = "int64" if not prepared.rule_set.actions[0].is_interval else "float32"
+        kind = "int64" if not rule_set.actions[0].is_interval else "float32"
         st.markdown(
-            f"Inputs: `state` (B, {len(prepared.rule_set.source.features)}) float32 and `proposed` "
-            f"(B, {len(prepared.rule_set.actions)}) {kind}. Outputs: `executed`, alike, `rule` "
+            f"Inputs: `state` (B, {len(rule_set.source.features)}) float32 and `proposed` "
+            f"(B, {len(rule_set.actions)}) {kind}. Outputs: `executed`, alike, `rule` "
             "int64, the index of the rule in force or -1, and `invalid` (B, 1), whether the state "
             "or the action is none that the rules can be asked about."
         )

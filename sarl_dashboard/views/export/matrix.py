@@ -21,30 +21,27 @@ from sarl_dashboard.components.downloads import download
 
 
 @cached()
-def matrix_of(
-    key: tuple[str, ...], _rule_set: RuleSet, _demonstrations: Demonstrations
-) -> RuleMatrix:
+def matrix_of(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleMatrix:
     """The rules by features."""
-    return rule_matrix(_rule_set, _demonstrations)
+    return rule_matrix(rule_set, demonstrations)
 
 
 @cached()
-def picture_of(key: tuple[str, ...], page: int, _matrix: RuleMatrix) -> bytes:
+def picture_of(rule_set: RuleSet, demonstrations: Demonstrations, page: int) -> bytes:
     """One page of them as a picture."""
-    return matrix_png(_matrix, _matrix.page(page))
+    matrix = matrix_of(rule_set, demonstrations)
+    return matrix_png(matrix, matrix.page(page))
 
 
-def show_matrix(rule_set: RuleSet, key: str, stem: str, demonstrations: Demonstrations) -> None:
+def show_matrix(rule_set: RuleSet, stem: str, demonstrations: Demonstrations) -> None:
     """Rules by features, a page at a time.
 
     Args:
         rule_set: As it is exported.
-        key: Tells it from all others.
         stem: How the names of its files begin.
         demonstrations: Whose values are drawn behind the rules.
     """
-    both = (key, demonstrations.digest)
-    matrix = matrix_of(both, rule_set, demonstrations)
+    matrix = matrix_of(rule_set, demonstrations)
     page = 1
     if st.session_state.get("matrix_page", 1) > matrix.pages:
         st.session_state["matrix_page"] = matrix.pages  # of other rules there were more
@@ -68,7 +65,7 @@ def show_matrix(rule_set: RuleSet, key: str, stem: str, demonstrations: Demonstr
         )
         download(
             "PNG, this page",
-            partial(picture_of, both, page, matrix),
+            partial(picture_of, rule_set, demonstrations, page),
             f"{stem}-matrix-{page}.png",
             key="matrix_png",
             icon="image",

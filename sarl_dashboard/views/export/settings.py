@@ -49,7 +49,6 @@ class Settings:
 
     Attributes:
         rule_set: As it was chosen.
-        digest: Tells it from others.
         form: Of the file.
         projection: What a continuous action becomes.
         rounded: Whether thresholds are rounded.
@@ -57,7 +56,6 @@ class Settings:
     """
 
     rule_set: RuleSet
-    digest: str
     form: Format
     projection: Projection
     rounded: bool
@@ -69,7 +67,7 @@ class Settings:
         return f"rules-{file_name(self.rule_set.source.env_id)}"
 
 
-def chosen_rules() -> tuple[RuleSet, str]:
+def chosen_rules() -> RuleSet:
     """The rules to carry away; where there are none to be had, say why and stop."""
     choices = offered_rule_sets([CHOSEN, COMPACT, EDITED, OWN_FILE])
     default = COMPACT if compact_set.in_force() and COMPACT in choices else CHOSEN
@@ -89,12 +87,12 @@ def chosen_rules() -> tuple[RuleSet, str]:
             st.info("Upload a rule file to export its rules.", icon=":material/upload_file:")
             st.stop()
     try:
-        rule_set, digest = rules_for(choice, uploaded)
+        rule_set = rules_for(choice, uploaded)
     except SarlError as error:
         refuse(error)
         st.stop()
     assert rule_set is not None
-    return rule_set, digest
+    return rule_set
 
 
 def settings() -> Settings:
@@ -102,7 +100,7 @@ def settings() -> Settings:
     with st.container(border=True):
         left, middle, right = st.columns([4, 5, 3], gap="medium")
         with left:
-            rule_set, digest = chosen_rules()
+            rule_set = chosen_rules()
         with middle:
             name = st.pills(
                 "Format",
@@ -132,4 +130,4 @@ def settings() -> Settings:
                 help="Several conditions on one feature become one interval, and each rule stands "
                 "by itself: easier to read, slower to execute",
             )
-    return Settings(rule_set, digest, form, projection, rounded, merged)
+    return Settings(rule_set, form, projection, rounded, merged)

@@ -15,7 +15,7 @@ from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.improving import Order
 from sarl_dashboard.state.agents import agent_for, has_expert
-from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, upload_name
+from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, data_parts, upload_name
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.mined import grown_trees, mined_rules
 from sarl_dashboard.state.rule_files import OWN_FILE
@@ -44,14 +44,14 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
     if choices.expert == OWN_FILE:
         if choices.policy_file is None:
             raise InputError("no policy has been uploaded; upload one, or choose another expert")
-        make, digest = agent_for(OWN_FILE, choices.policy_file, env_id, choices.seed)
+        expert = agent_for(OWN_FILE, choices.policy_file, env_id, choices.seed)
     else:
         if not has_expert(env_id):
             raise InputError(
                 f"no expert is shipped for {env_id}; give a policy of your own, or choose nobody "
                 "to see which states need a demonstration"
             )
-        make, digest = agent_for("expert", None, env_id, choices.seed)
+        expert = agent_for("expert", None, env_id, choices.seed)
     thresholds = None
     if choices.cut == AT_THRESHOLDS:
         in_force = chosen_thresholds()
@@ -66,14 +66,15 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         validation=choices.validation,
         seed=choices.seed,
     )
-    key = digest_of(repr((demonstrations.digest, env_id, plan, digest)).encode())
+    key = digest_of(repr((demonstrations.digest, env_id, plan, expert.digest)).encode())
     command = command_for(choices, demonstrations, env_id, thresholds)
-    return Order(key, demonstrations, env_id, plan, make, None, command)
+    return Order(key, demonstrations, env_id, plan, expert, None, command)
 
 
 def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) -> Order:
     """Which states need a demonstration, at the thresholds in force."""
-    rules = mined_rules(grown_trees(demonstrations, choices.divider))
+    trees = grown_trees(demonstrations, choices.divider)
+    rules = mined_rules(trees, chosen_thresholds(), data_parts())
     plan = Plan(
         MIN_RULES,
         rounds=1,

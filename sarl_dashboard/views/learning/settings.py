@@ -95,7 +95,7 @@ def settings() -> Order | None:
         )
     try:
         env_id = registered(environment_of(None))
-        rule_set, digest = rules_for(rules, file)
+        rule_set = rules_for(rules, file)
         chosen = tuple(arm for arm in ARMS.values() if arm.name in names)
         if not chosen:
             raise InputError("no way to learn is chosen; choose at least one above")
@@ -106,7 +106,7 @@ def settings() -> Order | None:
     except SarlError as error:
         refuse(error)
         return None
-    return Order(env_id, rule_set, digest, chosen, int(steps), int(seeds), projection)
+    return Order(env_id, rule_set, chosen, int(steps), int(seeds), projection)
 
 
 def is_discrete() -> bool:

@@ -24,7 +24,7 @@ FOLDER = DATA / "paper"
 COMMAND = "python -m sarl_core reproduce --out data/paper"
 
 
-def stamp(path: Path) -> str:
+def stamp_of(path: Path) -> str:
     """What tells the content of a file from another's; "" where it cannot be read."""
     try:
         return hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
@@ -33,7 +33,7 @@ def stamp(path: Path) -> str:
 
 
 @cached()
-def _report(folder: Path, digest: str) -> PaperReport | None:
+def _report(folder: Path, stamp: str) -> PaperReport | None:
     return read_report(folder)
 
 
@@ -43,7 +43,7 @@ def report() -> PaperReport | None:
     Raises:
         InputError: If it cannot be used.
     """
-    return _report(FOLDER, stamp(FOLDER / REPORT))
+    return _report(FOLDER, stamp_of(FOLDER / REPORT))
 
 
 def require_report() -> PaperReport:
@@ -67,7 +67,7 @@ def require_report() -> PaperReport:
 
 
 @cached()
-def _table(name: str, path: Path, digest: str) -> pd.DataFrame:
+def _table(name: str, path: Path, stamp: str) -> pd.DataFrame:
     return read_table(STUDIES[name], path)
 
 
@@ -78,14 +78,12 @@ def table(name: str, entry: Entry) -> pd.DataFrame:
         InputError: If it is missing or damaged.
     """
     path = FOLDER / entry.files["table"]
-    return _table(name, path, stamp(path))
+    return _table(name, path, stamp_of(path))
 
 
 @cached(show_spinner="Drawing …")
-def _drawings(
-    name: str, digest: str, part: str, dark: bool, _frame: pd.DataFrame
-) -> tuple[Drawing, ...]:
-    return STUDIES[name].draw(_frame, part, dark)
+def _drawings(name: str, path: Path, stamp: str, part: str, dark: bool) -> tuple[Drawing, ...]:
+    return STUDIES[name].draw(_table(name, path, stamp), part, dark)
 
 
 def drawings(name: str, entry: Entry, part: str, *, dark: bool) -> tuple[Drawing, ...]:
@@ -100,8 +98,8 @@ def drawings(name: str, entry: Entry, part: str, *, dark: bool) -> tuple[Drawing
     Returns:
         Shared between sessions; nobody may change them.
     """
-    frame = table(name, entry)
-    return _drawings(name, stamp(FOLDER / entry.files["table"]), part, dark, frame)
+    path = FOLDER / entry.files["table"]
+    return _drawings(name, path, stamp_of(path), part, dark)
 
 
 def whole_page(entry: Entry) -> str:

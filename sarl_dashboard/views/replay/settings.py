@@ -57,17 +57,18 @@ class Settings:
             SarlError: If it cannot be had.
         """
         env_id = environment_of(self.env)
-        rule_set, rules_digest = rules_for(self.rules, self.rule_file)
+        rule_set = rules_for(self.rules, self.rule_file)
+        rules_digest = rule_set.digest if rule_set is not None else ""
         if rule_set is not None:
             rule_set = shield_for(env_id, Shield(rule_set)).rule_set
-        make, digest = agent_for(self.agent, self.policy_file, env_id, self.seed)
+        agent = agent_for(self.agent, self.policy_file, env_id, self.seed)
         described = named_description(
             describe_environment(env_id), rule_set, chosen_demonstrations()
         )
         request = Request(
             env_id,
             self.agent,
-            digest,
+            agent.digest,
             self.rules,
             rules_digest,
             self.projection,
@@ -75,7 +76,7 @@ class Settings:
             self.outside,
             digest_of(repr(described).encode()),
         )
-        return Order(request, make, rule_set, described)
+        return Order(request, agent, rule_set, described)
 
     def ask_for(self, request: Request) -> bool:
         """Whether they still ask for what is on screen."""

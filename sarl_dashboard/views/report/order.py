@@ -16,7 +16,6 @@ from sarl_dashboard.jobs.report import Order, as_results, comparison_of_session,
 from sarl_dashboard.state.data import (
     UPLOAD,
     chosen_dataset,
-    data_key,
     raw_demonstrations,
     upload_name,
 )
@@ -45,7 +44,7 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
     Raises:
         InputError: If it cannot be had.
     """
-    rule_set, digest = rules_for(choices.rules, choices.rule_file)
+    rule_set = rules_for(choices.rules, choices.rule_file)
     if rule_set is None:
         raise InputError("there are no rules to report; choose some")
     report_rules(rule_set, demonstrations)
@@ -58,13 +57,13 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         rules_name=named.rules.rsplit("/", 1)[-1],
         demonstrations_name=named.demonstrations.rsplit("/", 1)[-1],
     )
-    grown = None
+    trees = None
     if rule_set.cut == "thresholds":
-        grown = grown_trees(demonstrations, rule_set.divider)
+        trees = grown_trees(demonstrations, rule_set.divider)
     # The card of the shipped compact rules says how they came about.
     card = read_card(compact_file()) if choices.rules == COMPACT else None
-    key = order_key(f"{digest} {data_key()}", demonstrations, wishes, results)
-    return Order(key, rule_set, demonstrations, wishes, card, results, grown)
+    key = order_key(rule_set, demonstrations, wishes, results)
+    return Order(key, rule_set, demonstrations, wishes, card, results, trees)
 
 
 def results_of_choices(

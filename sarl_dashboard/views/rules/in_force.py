@@ -12,7 +12,7 @@ from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact
-from sarl_dashboard.state.data import held_out_digest
+from sarl_dashboard.state.data import data_parts
 from sarl_dashboard.state.mined import grown_trees, mined_rules
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
 
@@ -35,19 +35,6 @@ class InForce:
     compact: Compact | None
     rule_set: RuleSet
 
-    @property
-    def compact_digest(self) -> str:
-        """What tells a compact set from others; "" for mined rules."""
-        return self.compact.digest if self.compact is not None else ""
-
-    @property
-    def key(self) -> tuple[object, ...]:
-        """What tells the rules, and what is known of them, from all others."""
-        if self.compact is not None:
-            return (self.compact.digest,)
-        rule_set = self.rule_set
-        return rule_set.source.digest, rule_set.divider, self.thresholds, held_out_digest()
-
     def tree(self, rule: Rule) -> PolicyTree:
         """The tree of a rule's action dimension."""
         return self.trees[rule.dimension]
@@ -63,5 +50,7 @@ def rules_in_force(demonstrations: Demonstrations) -> InForce:
     thresholds = chosen_thresholds()
     trees = grown_trees(demonstrations, chosen_divider()) if compact is None else compact.trees
     with st.spinner("Mining the rules …"):
-        rule_set = mined_rules(trees, thresholds) if compact is None else compact.counted
+        rule_set = (
+            mined_rules(trees, thresholds, data_parts()) if compact is None else compact.counted
+        )
     return InForce(demonstrations, trees, thresholds, compact, rule_set)

@@ -18,7 +18,7 @@ from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.tables import frame
-from sarl_dashboard.state.data import data_parts, held_out_digest
+from sarl_dashboard.state.data import data_parts, held_out_demonstrations
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.rules.in_force import InForce
 
@@ -43,16 +43,16 @@ class Listed:
 
 
 @cached(show_spinner="Writing the rules in plain language …")
-def listed_rules(key: tuple[object, ...], _rule_set: RuleSet) -> Listed:
+def listed_rules(rule_set: RuleSet) -> Listed:
     """All rules, ready to be filtered."""
     import pyarrow as pa
 
-    rules = tuple(sorted(_rule_set.rules, key=lambda rule: -rule.samples))
-    table = frame(rules, _rule_set, list(map(_rule_set.name_of, rules)))
+    rules = tuple(sorted(rule_set.rules, key=lambda rule: -rule.samples))
+    table = frame(rules, rule_set, list(map(rule_set.name_of, rules)))
     return Listed(
         rules,
         pa.Table.from_pandas(table, preserve_index=False),
-        tuple(action_text(rule.action, _rule_set.actions[rule.dimension]) for rule in rules),
+        tuple(action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules),
         tuple(map(lower_bound, rules)),
     )
 
@@ -85,7 +85,8 @@ def matching(listed: Listed, in_force: InForce) -> list[int]:
             width=220,
             label_visibility="collapsed",
         )
-        least = lower_bound_choice() if compact is None and held_out_digest() else 0.0
+        tried = compact is None and held_out_demonstrations() is not None
+        least = lower_bound_choice() if tried else 0.0
         sure = [place for place, bound in enumerate(listed.lower) if bound >= least]
         stem = f"rules-{in_force.demonstrations.env_id.replace('/', '-') or 'unnamed'}"
         if compact is not None:

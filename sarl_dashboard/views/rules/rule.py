@@ -64,20 +64,14 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
         )
     with right:
         place(rule, in_force)
-    st.html(features_of(key_of(rule, in_force), tree, rule, in_force.demonstrations))
+    st.html(features_of(tree, rule, in_force.demonstrations))
 
 
 def make_ready(rule: Rule, in_force: InForce) -> None:
     """Make what takes longest to make of a rule that may be looked at next."""
     tree = in_force.tree(rule)
-    features_of(key_of(rule, in_force), tree, rule, in_force.demonstrations)
+    features_of(tree, rule, in_force.demonstrations)
     tree_picture.make_ready(path_of(rule, in_force))
-
-
-def key_of(rule: Rule, in_force: InForce) -> tuple[object, ...]:
-    """What tells a rule from all others, those of other data included."""
-    tree = in_force.tree(rule)
-    return tree.source.digest, tree.divider, in_force.compact_digest, rule.id
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
@@ -102,10 +96,8 @@ def path_of(rule: Rule, in_force: InForce) -> tree_picture.PathInTree:
     """The path to a rule."""
     tree = in_force.tree(rule)
     return tree_picture.PathInTree(
-        key=in_force.compact_digest,
         tree=tree,
-        thresholds=in_force.thresholds,
-        leaves=in_force.compact is not None,
+        cut_at=in_force.thresholds if in_force.compact is None else None,
         node=node_of(rule),
         note=note_of(tree, in_force),
     )
@@ -121,16 +113,14 @@ def note_of(tree: PolicyTree, in_force: InForce) -> str:
 
 
 @cached()
-def features_of(
-    key: tuple[object, ...], _tree: PolicyTree, _rule: Rule, _demonstrations: Demonstrations
-) -> str:
+def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) -> str:
     """The interval on each feature against its distribution, and some states of the rule."""
     parts = []
-    if _rule.conditions:
-        evidence = feature_evidence(_demonstrations, _tree, _rule)
-        figures = features_html(evidence, _tree.source.features, label_colour(_rule.action))
+    if rule.conditions:
+        evidence = feature_evidence(demonstrations, tree, rule)
+        figures = features_html(evidence, tree.source.features, label_colour(rule.action))
         parts.append(heading("What it asks, feature by feature") + figures)
-    if _rule.samples:
-        title = "Example states" if _rule.samples > 1 else "The one state it applies to"
-        parts.append(heading(title) + examples_html(_demonstrations, _tree, _rule))
+    if rule.samples:
+        title = "Example states" if rule.samples > 1 else "The one state it applies to"
+        parts.append(heading(title) + examples_html(demonstrations, tree, rule))
     return "".join(parts)

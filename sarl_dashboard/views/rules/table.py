@@ -29,7 +29,7 @@ def nothing_in_force(thresholds: Thresholds) -> None:
 @st.fragment
 def search_and_rules(in_force: InForce) -> None:
     """What is searched for, and the rules that match."""
-    listed = listed_rules(in_force.key, in_force.rule_set)
+    listed = listed_rules(in_force.rule_set)
     places = matching(listed, in_force)
     if places:
         table_and_rule(listed, places, in_force)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sarl_core.agents.agent import Agent
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.comparison import ArmStyle, arm_style
 from sarl_core.mining.rule_set import RuleSet
@@ -13,7 +12,7 @@ from sarl_core.shielding.shield import Outside, Shield
 from sarl_core.studies.comparison import Arm
 from sarl_dashboard.components.settings import no_boxes_notice
 from sarl_dashboard.jobs.episodes import Row, row_key
-from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, agent_for
+from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, ChosenAgent, agent_for
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
 from sarl_dashboard.text import refuse
@@ -45,22 +44,20 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """An agent: its name, its place among the colours, how to make it, and what tells it."""
+    """An agent: its name, and its place among the colours."""
 
     name: str
     place: int
-    make: Callable[[], Agent]
-    digest: str
+    agent: ChosenAgent
 
 
 @dataclass(frozen=True, eq=False)
 class Guard:
-    """A shield: its name, its place among the colours, its rules, and what tells them."""
+    """A shield: its name, its place among the colours, and its rules."""
 
     name: str
     place: int | None
     rules: RuleSet | None
-    digest: str
 
 
 def free_name(name: str, taken: Sequence[str]) -> str:
@@ -79,16 +76,16 @@ def pilots(choices: Choices, env_id: str) -> list[Pilot]:
     for choice in choices.agents:
         place = AGENT_PLACES.index(choice)
         if choice != OWN_FILE:
-            make, digest = agent_for(choice, None, env_id, choices.seed)
-            chosen.append(Pilot(choice, place, make, digest))
+            agent = agent_for(choice, None, env_id, choices.seed)
+            chosen.append(Pilot(choice, place, agent))
         for number, file in enumerate(choices.policy_files if choice == OWN_FILE else ()):
-            make, digest = agent_for(choice, file, env_id, choices.seed)
-            if any(pilot.digest == f"own {digest}" for pilot in chosen):
+            agent = agent_for(choice, file, env_id, choices.seed)
+            if any(pilot.agent.digest == agent.digest for pilot in chosen):
                 continue  # a file uploaded twice is one
             name = free_name(
                 file.name.rsplit(".", 1)[0], (*AGENTS, *(pilot.name for pilot in chosen))
             )
-            chosen.append(Pilot(name, place + number, make, f"own {digest}"))
+            chosen.append(Pilot(name, place + number, agent))
     return chosen
 
 
@@ -98,16 +95,16 @@ def guards(choices: Choices) -> list[Guard]:
     problems: list[str] = []
     for choice in choices.shields:
         if choice == NO_SHIELD:
-            chosen.append(Guard(choice, None, None, ""))
+            chosen.append(Guard(choice, None, None))
         elif choice == OWN_FILE and choices.rule_file is None:
             continue  # an empty place to put a file says enough
         else:
             try:
-                rules, digest = rules_for(choice, choices.rule_file)
+                rules = rules_for(choice, choices.rule_file)
             except SarlError as error:
                 problems.append(str(error))
             else:
-                chosen.append(Guard(choice, RULES_PLACES.index(choice), rules, digest))
+                chosen.append(Guard(choice, RULES_PLACES.index(choice), rules))
     no_boxes_notice([guard.rules for guard in chosen if guard.rules is not None], choices.outside)
     for problem in problems:
         refuse(problem)
@@ -121,7 +118,8 @@ def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     name = f"{pilot.name}, {guard.name}"
     # Acting everywhere is what other pages ask for, under the same key.
     way = projection if outside == "act" else f"{projection}, {outside}"
-    key = row_key(env_id, pilot.digest, guard.digest, way, choices.seed)
+    rules = guard.rules.digest if guard.rules is not None else ""
+    key = row_key(env_id, pilot.agent.digest, rules, way, choices.seed)
 
     def shield() -> Shield | None:
         if guard.rules is None:
@@ -129,7 +127,7 @@ def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
         return Shield(guard.rules, projection=projection, outside=outside)
 
     return Line(
-        Row(key, name, env_id, choices.seed, pilot.make, shield),
+        Row(key, name, env_id, choices.seed, pilot.agent, shield),
         Arm(name, pilot.name, guard.rules, projection, outside=outside),
         arm_style(pilot.place, guard.place),
         pilot.name,

@@ -77,7 +77,12 @@ class Display:
         self, supports: tuple[float, ...], confidences: tuple[float, ...], limits: Thresholds
     ) -> Landscape:
         whole = mined_landscape(
-            self.trees, supports, confidences, lift=limits.lift, depth=limits.max_depth
+            self.trees,
+            supports,
+            confidences,
+            lift=limits.lift,
+            depth=limits.max_depth,
+            held_out=held_out_demonstrations(),
         )
         return whole if self.dimension is None else whole.dimensions[self.dimension]
 

@@ -22,7 +22,7 @@ from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import Batch, Row, known, row_key
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.session import is_dark
-from sarl_dashboard.state.agents import FRESH_SEED, agent_for, has_expert, named_agent
+from sarl_dashboard.state.agents import FRESH_SEED, agent_for, has_expert
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.text import escaped, in_full
 
@@ -34,8 +34,8 @@ Combination = tuple[int, Snapping]
 
 
 @cached(show_spinner="Dividing the actions …")
-def _quantised(digest: str, _demonstrations: Demonstrations) -> Divided:
-    return quantise(_demonstrations)
+def _quantised(demonstrations: Demonstrations) -> Divided:
+    return quantise(demonstrations)
 
 
 def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
@@ -45,7 +45,7 @@ def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
         demonstrations: With continuous actions.
         dimension: Which action dimension is looked at; None for all.
     """
-    divided = _quantised(demonstrations.digest, demonstrations)
+    divided = _quantised(demonstrations)
     some = divided if dimension is None else (divided[dimension],)
     dark = is_dark()
     st.caption(
@@ -147,11 +147,12 @@ def snapped_rows(
     demonstrations: Demonstrations, env_id: str, divided: Divided
 ) -> dict[Combination, Row]:
     """What is run, by divider and way to snap; the expert as it is first."""
-    make, _ = agent_for("expert", None, env_id, FRESH_SEED)
-    expert = named_agent("expert", env_id)
-    key = row_key(env_id, expert, "", "centre", FRESH_SEED)
+    expert = agent_for("expert", None, env_id, FRESH_SEED)
+    key = row_key(env_id, expert.digest, "", "centre", FRESH_SEED)
     rows = {
-        unchanged_as(0, "clip"): Row(key, "expert as it is", env_id, FRESH_SEED, make, lambda: None)
+        unchanged_as(0, "clip"): Row(
+            key, "expert as it is", env_id, FRESH_SEED, expert, lambda: None
+        )
     }
     for column, divider in enumerate(STUDIED_DIVIDERS):
         for snapping in SNAPPINGS:
@@ -160,9 +161,9 @@ def snapped_rows(
 
             def snapped(column: int = column, snapping: Snapping = snapping) -> Agent:
                 own = [(each[column],) for each in divided]
-                return snapped_agents(env_id, make(), own, (snapping,))[0]
+                return snapped_agents(env_id, expert(), own, (snapping,))[0]
 
-            agent = f"{expert}, {demonstrations.digest}, {divider} intervals, {snapping}"
+            agent = f"{expert.digest}, {demonstrations.digest}, {divider} intervals, {snapping}"
             rows[divider, snapping] = Row(
                 row_key(env_id, agent, "", "centre", FRESH_SEED),
                 f"{divider} intervals, {snapping}",

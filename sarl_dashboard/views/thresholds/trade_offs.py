@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.explaining.figures.pareto_front import front_figure, thin_front
 from sarl_dashboard.session import is_dark
-from sarl_dashboard.state.mined import mined_front
+from sarl_dashboard.state.mined import best_trade_offs
 from sarl_dashboard.state.thresholds import chosen_thresholds
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.maps import BARE
@@ -24,7 +24,7 @@ def show_trade_offs(display: Display) -> None:
     point = display.point(thresholds)
     trees = display.trees if dimension is None else (display.trees[dimension],)
     with st.spinner("Looking for the best trade-offs …"):
-        front = mined_front(trees, lift=thresholds.lift, depth=thresholds.max_depth)
+        front = best_trade_offs(trees, lift=thresholds.lift, depth=thresholds.max_depth)
     if not front:
         st.info(
             "There is no rule at any thresholds; lower the minimum lift under More.",

@@ -144,10 +144,8 @@ def way_through(rules: RulesOnTrees, dimension: int, rule: Rule | None, node: in
     placed = f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""
     st.html(heading("Its way through the tree") + placed)
     path = PathInTree(
-        key=rules.key,
         tree=rules.trees[dimension],
-        thresholds=rules.rule_set.thresholds,
-        leaves=rules.leaves,
+        cut_at=None if rules.leaves else rules.rule_set.thresholds,
         node=node,
         note="The lit path is the state's: it ends at the rule that applies."
         if rule is not None and rule.origin == "mined"

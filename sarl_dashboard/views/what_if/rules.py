@@ -12,8 +12,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.state import compact_set, edits
-from sarl_dashboard.state.data import data_key
-from sarl_dashboard.state.mined import grown_trees, mined_rules
+from sarl_dashboard.state.mined import grown_trees, rules_at
 from sarl_dashboard.state.thresholds import chosen_divider
 
 IN_FORCE, EDITED = "as mined", "edited"
@@ -25,13 +24,11 @@ class RulesOnTrees:
 
     Attributes:
         rule_set: The rules.
-        key: Tells them from all others.
         trees: Of each action dimension, grown from the chosen data.
         leaves: Whether every leaf of them is a rule.
     """
 
     rule_set: RuleSet
-    key: str
     trees: tuple[PolicyTree, ...]
     leaves: bool
 
@@ -40,12 +37,10 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
     """The set in force, or the same with the edits."""
     compact = compact_set.chosen_compact(demonstrations)
     if compact is not None:
-        in_force = RulesOnTrees(compact.counted, compact.digest, compact.trees, True)
+        in_force = RulesOnTrees(compact.counted, compact.trees, True)
     else:
         trees = grown_trees(demonstrations, chosen_divider())
-        mined = mined_rules(trees)
-        key = repr((data_key(), mined.source.digest, mined.thresholds, mined.divider))
-        in_force = RulesOnTrees(mined, key, trees, False)
+        in_force = RulesOnTrees(rules_at(), trees, False)
     if (
         not edits.offered()
         or st.segmented_control(
@@ -59,11 +54,11 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
         != EDITED
     ):
         return in_force
-    edited, digest = edits.edited_rules()
+    edited = edits.edited_rules()
     if fits(edited, demonstrations):
         edited, notes = rules_for(edited, demonstrations)
         notes_notice(notes)
-        return RulesOnTrees(edited, f"edited {digest}", in_force.trees, in_force.leaves)
+        return RulesOnTrees(edited, in_force.trees, in_force.leaves)
     st.info(
         "The edited rules speak of other features or actions than the chosen demonstrations, "
         "so the rules in force are shown instead; choose the demonstrations of their "

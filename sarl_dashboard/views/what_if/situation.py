@@ -39,43 +39,39 @@ class Situation:
     @property
     def order(self) -> tuple[int, ...]:
         """The features, those first that most rules ask about."""
-        return _order(self.rules.key, self.rules.rule_set)
+        return _order(self.rules.rule_set)
 
     @property
     def finder(self) -> PathFinder:
         """Follows a state through rules that are of no tree at hand."""
-        return _finder(self.rules.key, self.rules.rule_set)
+        return _finder(self.rules.rule_set)
 
 
 def situation_of(
     demonstrations: Demonstrations, rules: RulesOnTrees, projection: Projection, outside: Outside
 ) -> Situation:
     """Rules in force; they are laid out once."""
-    neighbourhood = _neighbourhood(rules.key, projection, outside, rules.rule_set)
-    spans, spreads = _spans(demonstrations.digest, demonstrations)
+    neighbourhood = _neighbourhood(rules.rule_set, projection, outside)
+    spans, spreads = _spans(demonstrations)
     return Situation(demonstrations, rules, neighbourhood, spans, spreads)
 
 
 @cached(show_spinner="Laying out the rules …")
-def _neighbourhood(
-    key: str, projection: Projection, outside: Outside, _rule_set: RuleSet
-) -> Neighbourhood:
-    return Neighbourhood(Shield(_rule_set, projection=projection, outside=outside))
+def _neighbourhood(rule_set: RuleSet, projection: Projection, outside: Outside) -> Neighbourhood:
+    return Neighbourhood(Shield(rule_set, projection=projection, outside=outside))
 
 
 @cached()
-def _spans(
-    digest: str, _demonstrations: Demonstrations
-) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
-    observations = _demonstrations.observations
+def _spans(demonstrations: Demonstrations) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
+    observations = demonstrations.observations
     return feature_spans(observations), feature_spreads(observations)
 
 
 @cached()
-def _order(key: str, _rule_set: RuleSet) -> tuple[int, ...]:
-    return by_use(_rule_set)
+def _order(rule_set: RuleSet) -> tuple[int, ...]:
+    return by_use(rule_set)
 
 
 @cached()
-def _finder(key: str, _rule_set: RuleSet) -> PathFinder:
-    return PathFinder(_rule_set)
+def _finder(rule_set: RuleSet) -> PathFinder:
+    return PathFinder(rule_set)
