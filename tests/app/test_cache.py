@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import sys
 import threading
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_dashboard.cache import cached
+from sarl_core import Demonstrations, RuleSet, grow_policy_trees, mine_rules
+from sarl_core.mining.editing.edits import Add, Pin, Switch
+from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
+from sarl_dashboard.cache import cached, key_of
 from sarl_dashboard.memory_cache import BoundedCache, size_of
+from sarl_dashboard.state.mined import grown_trees
 from tests.app.screens import open_page
 from tests.app.test_demonstrations_page import upload
 from tests.bad_inputs import ROWS, csv_bytes
@@ -70,16 +75,14 @@ def test_a_function_works_once_for_all_who_ask_at_once() -> None:
     begun, go_on = threading.Event(), threading.Event()
 
     @cached()
-    def slow(number: int, _rest: object) -> np.ndarray:
+    def slow(number: int) -> np.ndarray:
         made.append(number)
         begun.set()
         assert go_on.wait(30)
         return megabytes(0.001)
 
     found: list[object] = []
-    threads = [
-        threading.Thread(target=lambda rest=rest: found.append(slow(1, rest))) for rest in range(4)
-    ]
+    threads = [threading.Thread(target=lambda: found.append(slow(1))) for _ in range(4)]
     for thread in threads:
         thread.start()
     assert begun.wait(30)
@@ -104,6 +107,124 @@ def test_what_fails_is_not_kept_and_none_is() -> None:
     assert odd(1) is None
     assert odd(number=1) is None
     assert calls == [1, 1]
+
+
+# --- by what results are found again -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Settings:
+    thresholds: Thresholds
+    parts: tuple[Demonstrations, ...]
+    content: bytes = b"policy"
+
+
+def a_recording() -> Demonstrations:
+    """The same content at every call, in other objects."""
+    rng = np.random.default_rng(3)
+    states = rng.normal(size=(60, 2)).astype(np.float32)
+    return Demonstrations(states, (states[:, 0] > 0).astype(np.int64), np.arange(60) // 20)
+
+
+def rules_of(demonstrations: Demonstrations) -> RuleSet:
+    return mine_rules(demonstrations, supp_min=0.0, conf_min=0.9)
+
+
+def switched_off(rules: RuleSet) -> RuleSet:
+    return replace(rules, rules=(replace(rules[0], enabled=False), *rules[1:]))
+
+
+NAMED = replace(a_recording(), feature_units=("m", ""))
+OTHER_ACTION = replace(a_recording(), actions=np.ones(60, dtype=np.int64))
+CHANGES: dict[str, tuple[Callable[[], object], Callable[[], object]]] = {
+    "a unit": (a_recording, lambda: NAMED),
+    "an action": (a_recording, lambda: OTHER_ACTION),
+    "an episode left out": (a_recording, lambda: a_recording().select([0, 1])),
+    "a rule switched off": (
+        lambda: rules_of(a_recording()),
+        lambda: switched_off(rules_of(a_recording())),
+    ),
+    "a tree under another unit": (
+        lambda: grow_policy_trees(a_recording()),
+        lambda: grow_policy_trees(NAMED),
+    ),
+    "a threshold": (
+        lambda: Settings(FILTERED, (a_recording(),)),
+        lambda: Settings(UNFILTERED, (a_recording(),)),
+    ),
+    "deep inside": (
+        lambda: Settings(FILTERED, (a_recording(), a_recording())),
+        lambda: Settings(FILTERED, (a_recording(), OTHER_ACTION)),
+    ),
+    "bytes": (
+        lambda: Settings(FILTERED, (), b"\0" * 9),
+        lambda: Settings(FILTERED, (), b"\0" * 8 + b"1"),
+    ),
+    "an edit": (lambda: (Switch("0.1", True),), lambda: (Switch("0.1", False),)),
+    "another kind of edit": (lambda: Pin(rules_of(NAMED)[0]), lambda: Add(rules_of(NAMED)[0])),
+    "a number that is no truth": (lambda: True, lambda: 1),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_equal_content_is_found_again_and_changed_content_is_not(change: str) -> None:
+    before, after = CHANGES[change]
+
+    @cached()
+    def work(_: object) -> object:
+        return object()
+
+    assert work(before()) is work(before())
+    assert work(after()) is work(after())
+    assert work(after()) is not work(before())
+
+
+def test_one_changed_value_among_a_million_is_seen() -> None:
+    states = np.zeros((500_000, 2), dtype=np.float32)
+    actions = np.arange(500_000) % 2
+    one = Demonstrations(states.copy(), actions, np.zeros(500_000, dtype=np.int64))
+    states[250_001, 1] = 1
+    other = Demonstrations(states, actions, np.zeros(500_000, dtype=np.int64))
+    assert key_of(one) != key_of(other)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [megabytes(0.001), [1], {"a": 1}, Pair(megabytes(0.001), 1), (1, (2, object())), print],
+)
+def test_what_has_no_hash_function_is_refused_at_once(value: object) -> None:
+    calls = []
+
+    @cached()
+    def work(value: object) -> None:
+        calls.append(value)
+
+    with pytest.raises(TypeError, match=r"cannot be part of a key; pass what it was made from"):
+        work(value)
+    assert not calls
+
+
+def test_a_function_may_have_a_hash_function_of_its_own() -> None:
+    @cached(hash_funcs={np.ndarray: np.ndarray.tobytes, Demonstrations: lambda _: ""})
+    def shape(values: np.ndarray, _: Demonstrations) -> tuple[int, ...]:
+        return values.shape
+
+    assert shape(np.zeros(3), NAMED) is shape(np.zeros(3), OTHER_ACTION)
+    assert shape(np.zeros(4), NAMED) == (4,)
+
+
+def test_other_names_grow_no_other_tree() -> None:
+    with_names = replace(a_recording(), feature_names=("speed", "height"))
+    (first,), (second,) = grown_trees(a_recording(), 2), grown_trees(with_names, 2)
+    assert [feature.name for feature in second.source.features] == ["speed", "height"]
+    assert [feature.name for feature in first.source.features] == ["feature 0", "feature 1"]
+    assert first.threshold is second.threshold  # grown once
+    assert first.source.digest != second.source.digest
+    (other,) = grown_trees(OTHER_ACTION, 2)
+    assert other.threshold is not first.threshold
+
+
+# --- what a visitor brought --------------------------------------------------------------------
 
 
 def owners() -> set[str]:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import WorkError, load_demonstrations, mine_rules
+from sarl_core import RuleSet, WorkError, load_demonstrations, mine_rules
 from sarl_core.learning.arms import ARMS, arms_named
 from sarl_core.learning.curves import LearningEpisodes, Trial
 from sarl_core.learning.study import LearningPlan
@@ -28,6 +28,7 @@ from sarl_core.learning.study_files import (
     save_tables,
     write_json,
 )
+from sarl_core.shipped import DATA
 from sarl_dashboard.jobs import learning
 from tests.app.screens import errors, open_page, texts
 
@@ -264,8 +265,11 @@ def waiting_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     return
 
 
+OTHER_RULES = RuleSet.load(DATA / "rules" / "cartpole_compact.json")
+
+
 def an_order(steps: int = 1000) -> learning.Order:
-    return learning.Order("CartPole-v1", None, "", (ARMS["none"],), steps, 1, "centre")
+    return learning.Order("CartPole-v1", None, (ARMS["none"],), steps, 1, "centre")
 
 
 @pytest.mark.usefixtures("waiting_process")
@@ -324,7 +328,7 @@ def test_finished_runs_under_the_same_conditions_are_taken_over() -> None:
     save_run(before.folder, a_run("none"))
     policy_path(before.folder, ARMS["none"], 0).write_bytes(b"learned")
     more = replace(before, arms=(ARMS["none"], ARMS["none-replay"]))
-    others = [replace(more, steps=2000), replace(more, rules_digest="other")]
+    others = [replace(more, steps=2000), replace(more, rules=OTHER_RULES)]
     everyone = learning.Trainings()
     for order in (more, *others):
         everyone.leave(everyone.join(order))
@@ -350,7 +354,7 @@ def test_orders_differ_in_their_folders_by_all_that_changes_the_numbers() -> Non
         replace(order, env_id="LunarLander-v3"),
         replace(order, steps=2000),
         replace(order, seeds=2),
-        replace(order, rules_digest="other"),
+        replace(order, rules=OTHER_RULES),
         replace(order, arms=(ARMS["none-replay"],)),
         replace(order, projection="clip"),
     ]
