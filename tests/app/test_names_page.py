@@ -110,7 +110,7 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
         replayed = kept(app)
         assert replayed.features[2] == Feature("lean", "turns")
         assert replayed.dimensions[0].label_names == ("west", "east")
-            assert replayed.film.panels[0].dimensions[0].label_names == ("west", "east")
+        assert replayed.film.panels[0].dimensions[0].label_names == ("west", "east")
         if rules != "none":
             assert replayed.rule_set.source.features[2].name == "lean"
             assert replayed.rule_set.actions[0].label_names == ("west", "east")
