@@ -127,4 +127,5 @@ def _wait(address: str, page: Page) -> None:
 
 if __name__ == "__main__":
     replay()
+    walker()
     screenshots()
