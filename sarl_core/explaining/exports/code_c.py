@@ -236,7 +236,7 @@ def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str
     """The functions that find the rule of one action dimension, called ones first."""
     always = any(not rule.conditions for _, rule in order.scanned)
     parts = [[]] if always else parts_of(order.nodes)
-    found = []
+    finders = []
     for number in reversed(range(len(parts))):
         lines = [
             f"/* {comment(order.dimension.name)}: the rule in force. */"
@@ -252,8 +252,8 @@ def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str
                 line for place, rule in order.scanned for line in _scan(place, rule, rule_set)
             ]
         lines += [_line(step, index, rule_set) for step in parts[number]]
-        found.append("\n".join([*lines, "}", ""]))
-    return found
+        finders.append("\n".join([*lines, "}", ""]))
+    return finders
 
 
 def _finder(index: int, number: int) -> str:
@@ -261,16 +261,16 @@ def _finder(index: int, number: int) -> str:
 
 
 def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
-    told = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
+    text = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
     if not rule.conditions:
-        return [f"    {told}"]
+        return [f"    {text}"]
     asked = [
         _query(feature, threshold, negated=op == ">") for feature, op, threshold in rule.conditions
     ]
     return [
         f"    /* {comment(conditions_text(rule, rule_set))} */",
         f"    if ({' && '.join(asked)})",
-        f"        {told}",
+        f"        {text}",
     ]
 
 

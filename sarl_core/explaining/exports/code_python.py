@@ -234,7 +234,7 @@ def _row(outcome: Replacement, *, continuous: bool) -> str:
 def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
     """The functions that find the rule of one action dimension."""
     always = any(not rule.conditions for _, rule in order.scanned)
-    found = []
+    finders = []
     for number, part in enumerate([[]] if always else parts_of(order.nodes)):
         lines = ["", f"def {_finder(index, number)}(x):"]
         if number == 0:
@@ -242,8 +242,8 @@ def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str
             for place, rule in order.scanned:
                 lines += _scan(place, rule, rule_set)
         lines += [line for step in part if (line := _line(step, index, rule_set)) is not None]
-        found.append("\n".join([*lines, ""]))
-    return found
+        finders.append("\n".join([*lines, ""]))
+    return finders
 
 
 def _finder(index: int, number: int) -> str:
@@ -251,9 +251,9 @@ def _finder(index: int, number: int) -> str:
 
 
 def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
-    told = f"return {place}  # {_rule_comment(rule, rule_set)}"
+    text = f"return {place}  # {_rule_comment(rule, rule_set)}"
     if not rule.conditions:
-        return [f"    {told}"]
+        return [f"    {text}"]
     asked = [
         f"{'not ' if op == '>' else ''}x[{feature}] <= {_number(threshold)}"
         for feature, op, threshold in rule.conditions
@@ -261,7 +261,7 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     return [
         f"    # {one_line(conditions_text(rule, rule_set))}",
         f"    if {' and '.join(asked)}:",
-        f"        {told}",
+        f"        {text}",
     ]
 
 

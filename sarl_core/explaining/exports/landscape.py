@@ -202,5 +202,5 @@ def _lacking(error: Exception) -> str:
     if isinstance(error, (BrowserClosedError, BrowserFailedError, OSError)):
         return f"{which} could not be started; {do}"
     # Some put several sentences in one error, and some none.
-    told = error.args[0] if error.args and isinstance(error.args[0], str) else type(error).__name__
-    return f"{which} failed ({quoted(told.split('. ')[0].strip(), 120)}); {do}"
+    text = error.args[0] if error.args and isinstance(error.args[0], str) else type(error).__name__
+    return f"{which} failed ({quoted(text.split('. ')[0].strip(), 120)}); {do}"

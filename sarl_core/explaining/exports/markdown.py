@@ -97,9 +97,9 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
         f"{rule.samples:,}",
     ]
     if held_out:
-        found = rule.held_out
-        told = "–" if found is None or not found.samples else held_out_text(found)
-        cells.append(f"{told} ({interval_text(found)})" if found and found.episodes else told)
+        counts = rule.held_out
+        text = "–" if counts is None or not counts.samples else held_out_text(counts)
+        cells.append(f"{text} ({interval_text(counts)})" if counts and counts.episodes else text)
     return cells
 
 

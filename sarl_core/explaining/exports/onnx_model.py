@@ -65,8 +65,8 @@ def rules_to_onnx(
     graph = _Graph(helper)
     for index, order in enumerate(program.orders):
         _find(graph, index, order)
-    found = [f"rule_of_{i}" for i in range(len(program.orders))]
-    graph.add("Concat", found, "rule_found", axis=1)
+    outputs = [f"rule_of_{i}" for i in range(len(program.orders))]
+    graph.add("Concat", outputs, "rule_found", axis=1)
     graph.add("Not", [_valid(graph, program)], "invalid")
     nothing = graph.table("no_rule", np.array([NO_RULE], dtype=np.int64))
     graph.add("Where", ["valid", "rule_found", nothing], "rule")

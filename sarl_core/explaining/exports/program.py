@@ -245,15 +245,15 @@ def _order(rule_set: RuleSet, index: int) -> DimensionProgram:
 
 
 def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Replacement, ...]:
-    found = replacements(rule_set, projection)
-    settled = np.clip(found.target, found.low, found.high)
+    actions = replacements(rule_set, projection)
+    settled = np.clip(actions.target, actions.low, actions.high)
     return tuple(
         _outcome(rule, rule_set.actions[rule.dimension], value, low, high)
         for rule, value, low, high in zip(
             rule_set.rules,
             settled.tolist(),
-            found.low.tolist(),
-            found.high.tolist(),
+            actions.low.tolist(),
+            actions.high.tolist(),
             strict=True,
         )
     )

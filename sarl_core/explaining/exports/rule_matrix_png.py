@@ -68,12 +68,12 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         colour = label_colour(rule.action)
         dimension = matrix.rule_set.actions[rule.dimension]
         box(_MARGIN, top + 6, _MARGIN + 9, top + 15, colour)
-        told = label_text(rule.action, dimension)
+        label = label_text(rule.action, dimension)
         if len(matrix.rule_set.actions) > 1 or dimension.is_interval:
-            told = f"{dimension.name}: {told}"
-        told = f"{PLACED_MARK}{told}" if rule.placed else told
-        told += "" if rule.enabled else ", off"
-        write(_MARGIN + 14, top + 4, told, _ACTION - 22)
+            label = f"{dimension.name}: {label}"
+        label = f"{PLACED_MARK}{label}" if rule.placed else label
+        label += "" if rule.enabled else ", off"
+        write(_MARGIN + 14, top + 4, label, _ACTION - 22)
         write(_MARGIN + _ACTION, top + 4, f"{rule.samples:,}", _STATES - 8, right=True)
         share = share_text(rule.confidence) if rule.samples else "-"  # its font has no dash
         write(_MARGIN + _ACTION + _STATES, top + 4, share, _AGREES - 8, right=True)

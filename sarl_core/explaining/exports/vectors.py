@@ -244,14 +244,14 @@ def _at(
             low.get(asked, -np.inf), high.get(asked, np.inf), float(typical[asked]), rng
         )
     at = largest_float32(threshold)
-    found = []
+    places = []
     with np.errstate(over="ignore"):  # above the largest number is infinity
         numbers = (np.nextafter(at, -_INFINITY), at, np.nextafter(at, _INFINITY))
     for number in numbers:
         copy = state.copy()
         copy[feature] = number
-        found.append(copy)
-    return found
+        places.append(copy)
+    return places
 
 
 def _between(low: float, high: float, typical: float, rng: np.random.Generator) -> np.float32:

@@ -134,7 +134,7 @@ def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint
         InputError: If the document is of another form.
     """
     try:
-        found = [
+        points = [
             BudgetPoint(
                 rules=int(one["rules"]),
                 mean=float(one["mean"]),
@@ -150,7 +150,7 @@ def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint
             f"the returns by number of rules are not of the expected form ({error!r}); write them "
             "again"
         ) from error
-    return tuple(sorted(found, key=lambda point: point.rules))
+    return tuple(sorted(points, key=lambda point: point.rules))
 
 
 def rounds_figure(

@@ -158,27 +158,27 @@ def typical_figure(
     """
     figure = go.Figure()
     for row, (arm, episodes, style) in enumerate(_drawn(comparison, styles)):
-        found = episodes.statistics
+        typical = episodes.statistics
         figure.add_scatter(
-            x=[found.iqm],
+            x=[typical.iqm],
             y=[row],
             mode="markers+text",
-            text=[f"{found.iqm:,.1f}{_crashing(episodes)}"],
+            text=[f"{typical.iqm:,.1f}{_crashing(episodes)}"],
             textposition="top center",
             cliponaxis=False,
             marker={"color": style.colour, "size": 11, "symbol": style.symbol},
             error_x={
                 "type": "data",
                 "symmetric": False,
-                "array": [found.high - found.iqm],
-                "arrayminus": [found.iqm - found.low],
+                "array": [typical.high - typical.iqm],
+                "arrayminus": [typical.iqm - typical.low],
                 "thickness": 3,
                 "width": 7,
                 "color": style.colour,
             },
             hovertemplate=(
-                f"{plain(arm.name)}: <b>{found.iqm:,.1f}</b><br>95 % interval {found.low:,.1f} to "
-                f"{found.high:,.1f}<br>mean {found.mean:,.1f}, {len(episodes)} episodes"
+                f"{plain(arm.name)}: <b>{typical.iqm:,.1f}</b><br>95 % interval "
+                f"{typical.low:,.1f} to {typical.high:,.1f}<br>mean {typical.mean:,.1f}, {len(episodes)} episodes"
                 "<extra></extra>"
             ),
         )
@@ -204,10 +204,10 @@ def typical_figure(
 
 def _crashing(episodes: Episodes) -> str:
     """How many episodes crash, beside a number that leaves out the worst ones."""
-    found = episodes.failures
-    if found is None or found.unknown == found.of:
+    rate = episodes.failures
+    if rate is None or rate.unknown == rate.of:
         return ""
-    return f" ({at_least_text(found.rate, found.unknown)} crash)"
+    return f" ({at_least_text(rate.rate, rate.unknown)} crash)"
 
 
 def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any]:

@@ -140,7 +140,7 @@ def error_figure(
 
 def snapped_figure(
     dividers: Sequence[int],
-    found: Mapping[tuple[int, Snapping], Episodes],
+    by_cell: Mapping[tuple[int, Snapping], Episodes],
     *,
     projections: Sequence[Snapping] = SNAPPINGS,
     dark: bool = False,
@@ -149,7 +149,7 @@ def snapped_figure(
 
     Args:
         dividers: Columns.
-        found: Episodes by divider and way to snap; cells without any stay empty.
+        by_cell: Episodes by divider and way to snap; cells without any stay empty.
         projections: Rows, from top to bottom.
         dark: Whether it stands on dark ground.
 
@@ -157,7 +157,7 @@ def snapped_figure(
         In each cell the interquartile mean, its 95 % interval, and how many of the episodes failed.
     """
     cells = {}
-    for key, episodes in found.items():
+    for key, episodes in by_cell.items():
         known = episodes.failures
         typical = MeanInterval(
             episodes.statistics.iqm, episodes.statistics.low, episodes.statistics.high
@@ -181,7 +181,7 @@ class TypicalReturn:
 
 def typical_cells_figure(
     dividers: Sequence[int],
-    found: Mapping[tuple[int, Snapping], TypicalReturn],
+    by_cell: Mapping[tuple[int, Snapping], TypicalReturn],
     *,
     projections: Sequence[Snapping] = SNAPPINGS,
     dark: bool = False,
@@ -190,7 +190,7 @@ def typical_cells_figure(
 
     Args:
         dividers: Columns.
-        found: By divider and way to snap; cells without any stay empty.
+        by_cell: By divider and way to snap; cells without any stay empty.
         projections: Rows, from top to bottom.
         dark: Whether it stands on dark ground.
 
@@ -200,7 +200,7 @@ def typical_cells_figure(
     values: list[list[float | None]] = []
     texts: list[list[str]] = []
     for projection in projections:
-        each = [found.get((divider, projection)) for divider in dividers]
+        each = [by_cell.get((divider, projection)) for divider in dividers]
         values.append([None if one is None else one.typical.mean for one in each])
         texts.append(["" if one is None else _typical_text(one) for one in each])
     columns = [_intervals(divider) for divider in dividers]

@@ -54,7 +54,7 @@ def gap_histograms(
     Returns:
         One entry a feature, the one in which they differ most first.
     """
-    found = []
+    histograms = []
     for index in range(gaps.observations.shape[1]):
         shown, missing = demonstrations.observations[:, index], gaps.observations[:, index]
         ends = [np.quantile(values, [_TAIL, 1 - _TAIL]) for values in (shown, missing)]
@@ -62,12 +62,12 @@ def gap_histograms(
         if not low < high:
             low, high = low - 0.5, high + 0.5
         edges = np.linspace(low, high, bins + 1)
-        found.append(
+        histograms.append(
             GapHistogram(
                 index, edges, *(_shares(values, low, high, bins) for values in (shown, missing))
             )
         )
-    return tuple(sorted(found, key=lambda one: -one.difference))
+    return tuple(sorted(histograms, key=lambda one: -one.difference))
 
 
 def _shares(values: NDArray[np.float32], low: float, high: float, bins: int) -> NDArray[np.float64]:

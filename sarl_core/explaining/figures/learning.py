@@ -218,9 +218,9 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
         ):
             if trials is None:
                 continue
-            found, colour = trials.returns, arm_colour(one.arm)
+            returns, colour = trials.returns, arm_colour(one.arm)
             figure.add_scatter(
-                x=[found.iqm],
+                x=[returns.iqm],
                 y=[row + shift],
                 mode="markers",
                 marker={
@@ -232,8 +232,8 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
                 error_x={
                     "type": "data",
                     "symmetric": False,
-                    "array": [found.high - found.iqm],
-                    "arrayminus": [found.iqm - found.low],
+                    "array": [returns.high - returns.iqm],
+                    "arrayminus": [returns.iqm - returns.low],
                     "thickness": 2.5,
                     "width": 6,
                     "color": colour,
@@ -242,9 +242,9 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
                 legendgroup=words,
                 showlegend=row == 0,
                 hovertemplate=(
-                    f"{one.arm.title}, {words}: <b>{value_text(found.iqm)}</b><br>95 % interval "
-                    f"{value_text(found.low)} to {value_text(found.high)}<br>mean "
-                    f"{value_text(found.mean)}<extra></extra>"
+                    f"{one.arm.title}, {words}: <b>{value_text(returns.iqm)}</b><br>95 % interval "
+                    f"{value_text(returns.low)} to {value_text(returns.high)}<br>mean "
+                    f"{value_text(returns.mean)}<extra></extra>"
                 ),
             )
     rows = len(summaries)

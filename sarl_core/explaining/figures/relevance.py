@@ -21,11 +21,11 @@ _DASHES = ("solid", "dash", "dot", "dashdot")
 Floats = NDArray[np.float64]
 
 
-def kept_figure(found: Relevance, *, confidence: float | None = None) -> go.Figure:
+def kept_figure(relevance: Relevance, *, confidence: float | None = None) -> go.Figure:
     """How often the rule that applied was kept and how often it was broken (Figure 4).
 
     Args:
-        found: R rule sets, K learners, P + 1 tests.
+        relevance: R rule sets, K learners, P + 1 tests.
         confidence: A level to mark, as the rules' minimum confidence.
 
     Returns:
@@ -33,14 +33,19 @@ def kept_figure(found: Relevance, *, confidence: float | None = None) -> go.Figu
         the steps with a rule.
     """
     figure = go.Figure()
-    for number, name in enumerate(found.names):
-        kept = found.kept_share[number]
+    for number, name in enumerate(relevance.names):
+        kept = relevance.kept_share[number]
         for word, shares, colour in (
             ("kept", kept, KEPT_COLOUR),
             ("broken", 1.0 - kept, BROKEN_COLOUR),
         ):
             _add_line(
-                figure, found.learned_steps, shares, f"{word}, {name}", colour, _DASHES[number % 4]
+                figure,
+                relevance.learned_steps,
+                shares,
+                f"{word}, {name}",
+                colour,
+                _DASHES[number % 4],
             )
     if confidence is not None:
         figure.add_hline(
@@ -53,21 +58,21 @@ def kept_figure(found: Relevance, *, confidence: float | None = None) -> go.Figu
     return figure
 
 
-def applied_figure(found: Relevance) -> go.Figure:
+def applied_figure(relevance: Relevance) -> go.Figure:
     """At which share of the test steps a rule applied.
 
     Args:
-        found: R rule sets, K learners, P + 1 tests.
+        relevance: R rule sets, K learners, P + 1 tests.
 
     Returns:
         A line a rule set, with its 95 % interval.
     """
     figure = go.Figure()
-    for number, name in enumerate(found.names):
+    for number, name in enumerate(relevance.names):
         _add_line(
             figure,
-            found.learned_steps,
-            found.applied_share[number],
+            relevance.learned_steps,
+            relevance.applied_share[number],
             name,
             MUTED_COLOUR,
             _DASHES[number % 4],
@@ -76,11 +81,11 @@ def applied_figure(found: Relevance) -> go.Figure:
     return figure
 
 
-def learner_figure(found: Relevance) -> go.Figure:
+def learner_figure(relevance: Relevance) -> go.Figure:
     """How good the learners are.
 
     Args:
-        found: K learners, P + 1 tests.
+        relevance: K learners, P + 1 tests.
 
     Returns:
         The mean return of the test episodes, with its 95 % interval.
@@ -88,8 +93,8 @@ def learner_figure(found: Relevance) -> go.Figure:
     figure = go.Figure()
     _add_line(
         figure,
-        found.learned_steps,
-        found.returns,
+        relevance.learned_steps,
+        relevance.returns,
         "mean return",
         LABEL_COLOURS[0],
         "solid",

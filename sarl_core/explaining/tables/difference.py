@@ -19,26 +19,31 @@ KINDS = ("added", "removed", "changed")
 NO_ID = "–"
 
 
-def rule_rows(found: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, list[Any]]:
+def rule_rows(disagreement: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, list[Any]]:
     """Rules that were added, removed or changed.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         kinds: Which of them.
 
     Returns:
         Column name to one value a rule; of each kind the largest rules first.
     """
-    difference = found.difference
+    difference = disagreement.difference
     entries: list[tuple[str, Rule, RuleSet, str]] = []
     if "changed" in kinds:
         entries += [
-            ("changed", change.after, found.second, what_text(change, found, beside=True))
+            (
+                "changed",
+                change.after,
+                disagreement.second,
+                what_text(change, disagreement, beside=True),
+            )
             for change in difference.changed
         ]
     for kind, rules, rule_set in (
-        ("added", difference.added, found.second),
-        ("removed", difference.removed, found.first),
+        ("added", difference.added, disagreement.second),
+        ("removed", difference.removed, disagreement.first),
     ):
         if kind in kinds:
             entries += [
@@ -52,13 +57,13 @@ def rule_rows(found: Disagreement, kinds: tuple[str, ...] = KINDS) -> dict[str, 
             for _, rule, rule_set, _ in entries
         ],
         "When": [conditions_text(rule, rule_set) for _, rule, rule_set, _ in entries],
-        "Change": [told for *_, told in entries],
+        "Change": [text for *_, text in entries],
         "States": [rule.samples for _, rule, _, _ in entries],
     }
 
 
 def example_rows(
-    found: Disagreement,
+    disagreement: Disagreement,
     dimension: int,
     states: NDArray[np.float32],
     *,
@@ -69,7 +74,7 @@ def example_rows(
     """Some states of which the two say different things.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         dimension: Action dimension.
         states: What was compared, (B, d).
         names: What the two sets are called.
@@ -79,7 +84,7 @@ def example_rows(
     Returns:
         Column name to one value a state.
     """
-    rows = np.flatnonzero(found.differs[:, dimension])
+    rows = np.flatnonzero(disagreement.differs[:, dimension])
     if len(rows) > most:
         rows = rows[np.linspace(0, len(rows) - 1, most).astype(np.int64)]
     columns: dict[str, list[Any]] = {}
@@ -88,7 +93,11 @@ def example_rows(
         columns["Episode"] = demonstrations.episodes[rows].tolist()
         columns["Step"] = demonstrations.steps[rows].tolist()
     for name, rule_set, rules, labels in zip(
-        names, (found.first, found.second), found.rules, found.labels, strict=True
+        names,
+        (disagreement.first, disagreement.second),
+        disagreement.rules,
+        disagreement.labels,
+        strict=True,
     ):
         action = rule_set.actions[dimension]
         says = [said_text(label, action) for label in labels[rows, dimension].tolist()]
@@ -98,12 +107,12 @@ def example_rows(
             for index in rules[rows, dimension].tolist()
         ]
     if demonstrations is not None:
-        action = found.first.actions[dimension]
+        action = disagreement.first.actions[dimension]
         did = action.labels_of(demonstrations.action_columns[rows, dimension]).tolist()
         columns["Expert did"] = [
             label_text(label, action) if 0 <= label < action.n_labels else NO_ID for label in did
         ]
-    for at, feature in enumerate(found.first.source.features):
+    for at, feature in enumerate(disagreement.first.source.features):
         columns[feature.name] = states[rows, at].tolist()
     return columns
 

@@ -129,7 +129,7 @@ def episode_columns(episodes: Sequence[EpisodeContradictions]) -> Columns:
 
 def pair_columns(
     demonstrations: Demonstrations,
-    found: Contradictions,
+    contradictions: Contradictions,
     *,
     divider: int = 2,
     dimension: int = 0,
@@ -139,7 +139,7 @@ def pair_columns(
 
     Args:
         demonstrations: N pairs.
-        found: What `find_contradictions` found in them.
+        contradictions: What `find_contradictions` found in them.
         divider: Number of intervals of continuous dimensions.
         dimension: Of the action.
         most: How many at most.
@@ -147,14 +147,14 @@ def pair_columns(
     Returns:
         Column name to one value a pair of states, the nearest first.
     """
-    rows = np.flatnonzero(found.near[:, dimension])
+    rows = np.flatnonzero(contradictions.near[:, dimension])
     # Where two states are each other's nearest, the pair is told once.
-    twice = found.near[found.neighbour[rows], dimension] & (
-        found.neighbour[found.neighbour[rows]] == rows
+    twice = contradictions.near[contradictions.neighbour[rows], dimension] & (
+        contradictions.neighbour[contradictions.neighbour[rows]] == rows
     )
-    rows = rows[~twice | (rows < found.neighbour[rows])]
-    rows = rows[np.argsort(found.distance[rows], kind="stable")][:most]
-    others = found.neighbour[rows]
+    rows = rows[~twice | (rows < contradictions.neighbour[rows])]
+    rows = rows[np.argsort(contradictions.distance[rows], kind="stable")][:most]
+    others = contradictions.neighbour[rows]
     named = label_dimensions(demonstrations, divider)[dimension]
     labels = named.labels_of(demonstrations.action_columns[:, dimension])
     assert demonstrations.steps is not None
@@ -169,5 +169,5 @@ def pair_columns(
         "Other episode": demonstrations.episodes[others].tolist(),
         "Other step": demonstrations.steps[others].tolist(),
         "Did there": did(others),
-        "Distance": found.distance[rows].tolist(),
+        "Distance": contradictions.distance[rows].tolist(),
     }

@@ -38,7 +38,7 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
     Returns:
         A part of what `mine_rules` gives, the most support first.
     """
-    found: list[tuple[Rule, str]] = []
+    top: list[tuple[Rule, str]] = []
     before = 0
     for tree in trees:
         nodes = cut_nodes(
@@ -50,17 +50,17 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
         )
         first = np.argsort(-tree.samples[nodes], kind="stable")[:most]
         names = [name_at(before + place) for place in first.tolist()]
-        found += zip(rules_at(tree, nodes[first]), names, strict=True)
+        top += zip(rules_at(tree, nodes[first]), names, strict=True)
         before += len(nodes)
-    found.sort(key=lambda one: -one[0].samples)
+    top.sort(key=lambda one: -one[0].samples)
     part = RuleSet(
-        rules=tuple(rule for rule, _ in found),
+        rules=tuple(rule for rule, _ in top),
         actions=tuple(tree.dimension for tree in trees),
         source=source_of(trees),
         thresholds=thresholds,
         divider=trees[0].divider,
     )
-    return TopRules(part, tuple(name for _, name in found))
+    return TopRules(part, tuple(name for _, name in top))
 
 
 def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[object]]:

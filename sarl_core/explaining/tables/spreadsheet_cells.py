@@ -39,10 +39,10 @@ def safe_cells(frame: pd.DataFrame) -> pd.DataFrame:
     """
     import pandas as pd
 
-    found = frame.rename(columns=lambda name: safe_cell(str(name)))
-    for name in found.columns:
-        if not pd.api.types.is_numeric_dtype(found[name]):
-            found[name] = [
-                safe_cell(one) if isinstance(one, str) else one for one in found[name].tolist()
+    safe = frame.rename(columns=lambda name: safe_cell(str(name)))
+    for name in safe.columns:
+        if not pd.api.types.is_numeric_dtype(safe[name]):
+            safe[name] = [
+                safe_cell(one) if isinstance(one, str) else one for one in safe[name].tolist()
             ]
-    return found
+    return safe

@@ -30,24 +30,24 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
         mean from 271 to 168, a difference of −103, 95 % interval −186 to −21), and 25 % instead
         of 0 % of its episodes end in a crash: these rules harm it."
     """
-    found = shield_effect(alone, shielded)
+    effect = shield_effect(alone, shielded)
     before, after = (_whole(episodes.statistics.iqm) for episodes in (alone, shielded))
-    mean = found.returns.mean
-    if not _told(found):
+    mean = effect.returns.mean
+    if not _is_shown(effect):
         change = (
             f"does not clearly change ({after}, without them {before}; "
-            f"{_difference(found, alone, shielded)})"
+            f"{_difference(effect, alone, shielded)})"
         )
     elif mean * (shielded.statistics.iqm - alone.statistics.iqm) > 0:
         word = "rises" if mean > 0 else "falls"
-        change = f"{word} from {before} to {after} ({_difference(found, alone, shielded)})"
+        change = f"{word} from {before} to {after} ({_difference(effect, alone, shielded)})"
     else:  # what moved lies among the worst or the best episodes
         change = (
             f"hides what changes ({after}, without them {before}): its mean "
-            f"{'rises' if mean > 0 else 'falls'} ({_difference(found, alone, shielded)})"
+            f"{'rises' if mean > 0 else 'falls'} ({_difference(effect, alone, shielded)})"
         )
-    harm = ": these rules harm it" if found.effect == "harms" else ""
-    crashes = _crashes(found, alone, shielded)
+    harm = ": these rules harm it" if effect.effect == "harms" else ""
+    crashes = _crashes(effect, alone, shielded)
     return f"With {shield} the typical return of the {agent} {change}{crashes}{harm}."
 
 
@@ -69,20 +69,20 @@ def verdict_on_all(agent: str, alone: Episodes, shielded: Sequence[tuple[str, Ep
     return "; ".join([first, *(_clause(name, alone, episodes) for name, episodes in others)]) + "."
 
 
-def _told(found: ShieldEffect) -> bool:
+def _is_shown(effect: ShieldEffect) -> bool:
     """Whether a difference in return is said to be one; of few episodes with a caution."""
-    return found.return_p < ERROR_RATE or (found.too_few and found.returns.mean != 0.0)
+    return effect.return_p < ERROR_RATE or (effect.too_few and effect.returns.mean != 0.0)
 
 
-def _difference(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
+def _difference(effect: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
     """The means with their paired difference, its interval, and whether it may be chance."""
-    if found.returns.low == found.returns.high == 0.0:
+    if effect.returns.low == effect.returns.high == 0.0:
         return "every episode has the same return with them and without"
     before, after = (_whole(episodes.statistics.mean) for episodes in (alone, shielded))
-    ends = [_whole(end) for end in (found.returns.low, found.returns.high)]
-    few = f"; {found.episodes} episodes are too few to rule out chance" if found.too_few else ""
+    ends = [_whole(end) for end in (effect.returns.low, effect.returns.high)]
+    few = f"; {effect.episodes} episodes are too few to rule out chance" if effect.too_few else ""
     return (
-        f"its mean from {before} to {after}, a difference of {_whole(found.returns.mean)}, 95 % "
+        f"its mean from {before} to {after}, a difference of {_whole(effect.returns.mean)}, 95 % "
         f"interval {ends[0]} to {ends[1]}{few}"
     )
 
@@ -94,26 +94,26 @@ def _whole(number: float) -> str:
 
 def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     """The same of one more shield, in a few words."""
-    found = shield_effect(alone, shielded)
+    effect = shield_effect(alone, shielded)
     after = _whole(shielded.statistics.iqm)
-    notes = [_difference(found, alone, shielded)]
+    notes = [_difference(effect, alone, shielded)]
     if alone.failures is not None and shielded.failures is not None:
         some = alone.failures.count or shielded.failures.count
         notes += [f"{_share(shielded.failures)} of its episodes crash"] if some else []
-    if found.effect == "harms":
+    if effect.effect == "harms":
         notes.append("these rules harm it")
-    told = "; ".join(notes)
-    if not _told(found):
-        return f"with {shield} it does not clearly change ({after}; {told})"
+    text = "; ".join(notes)
+    if not _is_shown(effect):
+        return f"with {shield} it does not clearly change ({after}; {text})"
     word = "rises" if shielded.statistics.iqm > alone.statistics.iqm else "falls"
-    return f"with {shield} it {word} to {after} ({told})"
+    return f"with {shield} it {word} to {after} ({text})"
 
 
 def _share(failures: Rate) -> str:
     return at_least_text(failures.rate, failures.unknown)
 
 
-def _crashes(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
+def _crashes(effect: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
     """What to say of the failures; nothing where it is not known which ends are some."""
     if alone.failures is None or shielded.failures is None:
         return ""
@@ -121,8 +121,8 @@ def _crashes(found: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
     if alone.failures.rate == shielded.failures.rate:
         none = not alone.failures.count
         return "" if none else f", and {after} of its episodes end in a crash, as without"
-    chance = "" if found.failure_p < ERROR_RATE else ", which alone may still be chance"
+    chance = "" if effect.failure_p < ERROR_RATE else ", which alone may still be chance"
     return (
         f", and {after} instead of {before} of its episodes end in a crash"
-        f"{'' if found.too_few else chance}"
+        f"{'' if effect.too_few else chance}"
     )

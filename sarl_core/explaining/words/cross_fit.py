@@ -8,19 +8,19 @@ from sarl_core.mining.validation.cross_fitting import Judged, parts
 from sarl_core.mining.validation.evidence import HeldOut
 
 
-def elsewhere_text(found: HeldOut) -> str:
+def elsewhere_text(held_out: HeldOut) -> str:
     """A share on other episodes, with what that can tell.
 
     Args:
-        found: Of a whole rule set.
+        held_out: Of a whole rule set.
 
     Returns:
         As "91 % (78 to 99 %)".
     """
-    if found.share is None:
+    if held_out.share is None:
         return "no state"
-    told = share_text(found.share)
-    return told if found.interval is None else f"{told} ({range_text(found.interval)})"
+    text = share_text(held_out.share)
+    return text if held_out.interval is None else f"{text} ({range_text(held_out.interval)})"
 
 
 def judged_sentence(judged: Judged) -> str:
@@ -49,17 +49,17 @@ def judged_sentence(judged: Judged) -> str:
         )
     if fidelity.share is None:
         return f"{where} apply in no state."
-    told = share_text(fidelity.share)
+    text = share_text(fidelity.share)
     if fidelity.interval is not None:
-        told += f" of their states on average ({what_tells(fidelity.interval)})"
+        text += f" of their states on average ({what_tells(fidelity.interval)})"
     else:
-        told += " of their states on average"
+        text += " of their states on average"
         if judged.whole_episodes:
-            told += " (too few episodes to say more)"
+            text += " (too few episodes to say more)"
     reach = "" if coverage.interval is None else f" ({range_text(coverage.interval)})"
     one = "an episode" if judged.whole_episodes else "one"
     return (
-        f"{where} are right in {told}, and {share_text(coverage.share or 0.0)} of the states of "
+        f"{where} are right in {text}, and {share_text(coverage.share or 0.0)} of the states of "
         f"{one} have a rule{reach}."
     )
 
@@ -95,15 +95,15 @@ def influence_sentences(judged: Judged) -> list[str]:
     Returns:
         None, one or two sentences.
     """
-    found = []
+    sentences = []
     once = influence_text(judged.influence)
     if once:
-        found.append(f"One episode alone moves this: {once}.")
+        sentences.append(f"One episode alone moves this: {once}.")
     by_states = judged.influence_by_states
-    told = influence_text(by_states)
-    if told and by_states is not None:
-        found.append(
+    text = influence_text(by_states)
+    if text and by_states is not None:
+        sentences.append(
             f"If every state counted for itself, the rules would be right in "
-            f"{share_text(by_states.share)}, and {told}. Therefore each episode counts once."
+            f"{share_text(by_states.share)}, and {text}. Therefore each episode counts once."
         )
-    return found
+    return sentences

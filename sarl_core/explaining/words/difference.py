@@ -87,56 +87,57 @@ def exact_text(rule: Rule, rule_set: RuleSet) -> str:
     return " and ".join(exact_condition(one, features) for one in rule.conditions) or "always"
 
 
-def rows_text(found: Disagreement) -> str:
+def rows_text(disagreement: Disagreement) -> str:
     """How the rules of two sets differ, in a sentence.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
 
     Returns:
         As "2 rules added, 1 rule removed, none changed, 12 rules the same."
     """
-    difference = found.difference
+    difference = disagreement.difference
     counts = (
         (len(difference.added), "added"),
         (len(difference.removed), "removed"),
         (len(difference.changed), "changed"),
         (difference.same, "the same"),
     )
-    told = ", ".join(
+    text = ", ".join(
         f"{counted(count, 'rule') if count else 'none'} {what}" for count, what in counts
     )
-    return f"{told[:1].upper()}{told[1:]}."
+    return f"{text[:1].upper()}{text[1:]}."
 
 
-def decided_text(found: Disagreement, *, states: str) -> str:
+def decided_text(disagreement: Disagreement, *, states: str) -> str:
     """On how many states two sets decide differently, in a sentence.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         states: What the states are, as "demonstrated state".
 
     Returns:
         As "The two decide 12 of 500 demonstrated states (2.4 %) differently."
     """
-    of_all = f"of {counted(found.states, states)}"
-    if not found.different:
+    of_all = f"of {counted(disagreement.states, states)}"
+    if not disagreement.different:
         return f"The two decide none {of_all} differently."
-    return f"The two decide {found.different:,} {of_all} ({share_text(found.share)}) differently."
+    share = share_text(disagreement.share)
+    return f"The two decide {disagreement.different:,} {of_all} ({share}) differently."
 
 
-def kinds_text(found: Disagreement, dimension: int, names: tuple[str, str]) -> str:
+def kinds_text(disagreement: Disagreement, dimension: int, names: tuple[str, str]) -> str:
     """In what way they do, in one action dimension.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         dimension: Which one.
         names: What the two sets are called.
 
     Returns:
         As "3 where both have a rule, 5 where only the first has one".
     """
-    contradicting, only_first, only_second = found.kinds(dimension)
+    contradicting, only_first, only_second = disagreement.kinds(dimension)
     parts = [
         f"{count:,} where {where}"
         for count, where in (
@@ -150,49 +151,49 @@ def kinds_text(found: Disagreement, dimension: int, names: tuple[str, str]) -> s
 
 
 def difference_document(
-    found: Disagreement, *, names: tuple[str, str], states_from: str
+    disagreement: Disagreement, *, names: tuple[str, str], states_from: str
 ) -> dict[str, Any]:
     """Everything that differs, for JSON.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         names: What the two sets are called, as their files.
         states_from: Where the states are from.
 
     Returns:
         A document; labels are numbers with their names beside them.
     """
-    difference = found.difference
+    difference = disagreement.difference
     return {
         "first": names[0],
         "second": names[1],
-        "added": [_rule(rule, found.second) for rule in difference.added],
-        "removed": [_rule(rule, found.first) for rule in difference.removed],
+        "added": [_rule(rule, disagreement.second) for rule in difference.added],
+        "removed": [_rule(rule, disagreement.first) for rule in difference.removed],
         "changed": [
             {
                 "what": list(change.what),
-                "text": what_text(change, found),
-                "before": _rule(change.before, found.first),
-                "after": _rule(change.after, found.second),
+                "text": what_text(change, disagreement),
+                "before": _rule(change.before, disagreement.first),
+                "after": _rule(change.after, disagreement.second),
             }
             for change in difference.changed
         ],
         "same": difference.same,
         "states": {
             "from": states_from,
-            "count": found.states,
-            "different": found.different,
-            "share": found.share,
+            "count": disagreement.states,
+            "different": disagreement.different,
+            "share": disagreement.share,
         },
         "dimensions": [
             {
                 "name": action.name,
-                "different": int(found.differs[:, at].sum()),
-                **found.kinds(at)._asdict(),
+                "different": int(disagreement.differs[:, at].sum()),
+                **disagreement.kinds(at)._asdict(),
                 "says": [*(label_text(one, action) for one in range(action.n_labels)), None],
-                "confusion": found.confusion(at).tolist(),
+                "confusion": disagreement.confusion(at).tolist(),
             }
-            for at, action in enumerate(found.first.actions)
+            for at, action in enumerate(disagreement.first.actions)
         ],
     }
 
@@ -210,32 +211,34 @@ def _rule(rule: Rule, rule_set: RuleSet) -> dict[str, Any]:
     }
 
 
-def difference_lines(found: Disagreement, *, names: tuple[str, str], states_from: str) -> list[str]:
+def difference_lines(
+    disagreement: Disagreement, *, names: tuple[str, str], states_from: str
+) -> list[str]:
     """The same for reading.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         names: What the two sets are called, as their files.
         states_from: Where the states are from, as a sentence.
 
     Returns:
         Lines; of each kind the first few rules.
     """
-    difference = found.difference
+    difference = disagreement.difference
     lines = [
-        f"From {names[0]} ({counted(len(found.first), 'rule')}) to {names[1]} "
-        f"({counted(len(found.second), 'rule')}): {_lower(rows_text(found))}",
-        decided_text(found, states="state"),
+        f"From {names[0]} ({counted(len(disagreement.first), 'rule')}) to {names[1]} "
+        f"({counted(len(disagreement.second), 'rule')}): {_lower(rows_text(disagreement))}",
+        decided_text(disagreement, states="state"),
         states_from,
     ]
-    if found.different:
-        several = len(found.first.actions) > 1
-        for at, action in enumerate(found.first.actions):
-            told = kinds_text(found, at, ("the first", "the second"))
-            lines.append(f"  {action.name}: {told}" if several else f"  {told}")
+    if disagreement.different:
+        several = len(disagreement.first.actions) > 1
+        for at, action in enumerate(disagreement.first.actions):
+            text = kinds_text(disagreement, at, ("the first", "the second"))
+            lines.append(f"  {action.name}: {text}" if several else f"  {text}")
     for title, rules, rule_set in (
-        ("Added", difference.added, found.second),
-        ("Removed", difference.removed, found.first),
+        ("Added", difference.added, disagreement.second),
+        ("Removed", difference.removed, disagreement.first),
     ):
         if rules:
             often = sorted(rules, key=lambda rule: -rule.samples)
@@ -244,10 +247,10 @@ def difference_lines(found: Disagreement, *, names: tuple[str, str], states_from
     if difference.changed:
         changes = [
             f"{before if before == after else f'{before} (now {after})'}: "
-            f"{what_text(change, found)}"
+            f"{what_text(change, disagreement)}"
             for change in difference.changed
-            for before in (found.first.name_of(change.before),)
-            for after in (found.second.name_of(change.after),)
+            for before in (disagreement.first.name_of(change.before),)
+            for after in (disagreement.second.name_of(change.after),)
         ]
         lines += ["", "Changed:", *_first_few(changes)]
     return lines

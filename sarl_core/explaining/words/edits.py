@@ -37,9 +37,9 @@ def edit_text(edit: Edit, rule_set: RuleSet) -> str:
         return f"move {rule} {'up' if edit.up else 'down'}"
     if isinstance(edit, Remove):
         return f"remove {rule}"
-    told = sentence(edit.rule, rule_set, evidence=False).rstrip(".")
-    told = told[:1].lower() + told[1:]
-    return f"add a rule ({told})" if isinstance(edit, Add) else f"change {rule} ({told})"
+    text = sentence(edit.rule, rule_set, evidence=False).rstrip(".")
+    text = text[:1].lower() + text[1:]
+    return f"add a rule ({text})" if isinstance(edit, Add) else f"change {rule} ({text})"
 
 
 def state_text(rule: Rule) -> str:
@@ -55,11 +55,11 @@ def state_text(rule: Rule) -> str:
     return kind if rule.enabled else f"{kind}, off"
 
 
-def change_text(found: EditEffect, before: Verdicts, after: Verdicts, *, states: str) -> str:
+def change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, states: str) -> str:
     """What edits change at once, as a sentence.
 
     Args:
-        found: Of the two verdicts.
+        effect: Of the two verdicts.
         before: Of the set without them.
         after: Of the set with them.
         states: What the states are, as "demonstrated state".
@@ -67,20 +67,20 @@ def change_text(found: EditEffect, before: Verdicts, after: Verdicts, *, states:
     Returns:
         As "3 of 15,000 demonstrated states are decided differently: ...".
     """
-    of_all = f"of {counted(found.states, states)}"
-    if not found.different:
+    of_all = f"of {counted(effect.states, states)}"
+    if not effect.different:
         return f"None {of_all} is decided differently."
-    verb = "is" if found.different == 1 else "are"
-    text = f"{found.different:,} {of_all} {verb} decided differently"
+    verb = "is" if effect.different == 1 else "are"
+    text = f"{effect.different:,} {of_all} {verb} decided differently"
     parts = []
-    if found.newly_covered:
-        parts.append(f"{found.newly_covered:,} had no rule and now have one")
-    if found.newly_uncovered:
-        parts.append(f"{found.newly_uncovered:,} had a rule and now have none")
-    if len(found.by_dimension) > 1:
+    if effect.newly_covered:
+        parts.append(f"{effect.newly_covered:,} had no rule and now have one")
+    if effect.newly_uncovered:
+        parts.append(f"{effect.newly_uncovered:,} had a rule and now have none")
+    if len(effect.by_dimension) > 1:
         names = [
             f"{action.name} {count:,}"
-            for action, count in zip(after.rule_set.actions, found.by_dimension, strict=True)
+            for action, count in zip(after.rule_set.actions, effect.by_dimension, strict=True)
             if count
         ]
         parts.append(f"by action: {', '.join(names)}")
@@ -95,8 +95,8 @@ def change_text(found: EditEffect, before: Verdicts, after: Verdicts, *, states:
         for verb in ["rises" if new > old else "falls"]
     ]
     if moved:
-        told = " and ".join(moved)
-        text += f" {told[:1].upper()}{told[1:]}."
+        numbers = " and ".join(moved)
+        text += f" {numbers[:1].upper()}{numbers[1:]}."
     return text
 
 

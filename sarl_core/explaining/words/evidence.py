@@ -120,8 +120,8 @@ def interval_text(held_out: HeldOut | None) -> str:
     """
     if held_out is None:
         return ""
-    found = held_out.interval
-    return "too few episodes" if found is None else range_text(found)
+    interval = held_out.interval
+    return "too few episodes" if interval is None else range_text(interval)
 
 
 def told_by_episodes(held_out: HeldOut, *, what: str) -> str:
@@ -152,29 +152,29 @@ def told_by_episodes(held_out: HeldOut, *, what: str) -> str:
     return f"{text}, and {what_tells(held_out.interval)}."
 
 
-def influence_text(found: Influence | None) -> str:
+def influence_text(influence: Influence | None) -> str:
     """The episode that alone moves a share.
 
     Args:
-        found: The one that moves it most; None where there are fewer than two.
+        influence: The one that moves it most; None where there are fewer than two.
 
     Returns:
         As "without episode 41 (1,000 steps) it would be 71 % instead of 97 %"; "" where none moves
         it by `MOVES`.
     """
-    if found is None or found.moves < MOVES:
+    if influence is None or influence.moves < MOVES:
         return ""
     return (
-        f"without episode {found.episode} ({counted(found.steps, 'step')}) it would be "
-        f"{share_text(found.without)} instead of {share_text(found.share)}"
+        f"without episode {influence.episode} ({counted(influence.steps, 'step')}) it would be "
+        f"{share_text(influence.without)} instead of {share_text(influence.share)}"
     )
 
 
-def moved_text(found: Influence | None) -> str:
+def moved_text(influence: Influence | None) -> str:
     """The same for a table, as "episode 41: 71 % without it"."""
-    if found is None or found.moves < MOVES:
+    if influence is None or influence.moves < MOVES:
         return ""
-    return f"episode {found.episode}: {share_text(found.without)} without it"
+    return f"episode {influence.episode}: {share_text(influence.without)} without it"
 
 
 def more_text(more: float) -> str:
@@ -195,31 +195,31 @@ def more_text(more: float) -> str:
     return f"{int(more):,} more {'episode' if more == 1 else 'episodes'}"
 
 
-def shortfall_text(found: Shortfall) -> str:
+def shortfall_text(short: Shortfall) -> str:
     """How many rules reach a lower bound, and why the others do not.
 
     Args:
-        found: Of some rules.
+        short: Of some rules.
 
     Returns:
         As "2 of 9 rules reach 80 %; 4 were met in too few held-out episodes to show that even if
         never wrong, and 3 were not right often enough".
     """
-    reach = "reaches" if found.reached == 1 else "reach"
-    told = f"{found.reached:,} of {counted(found.rules, 'rule')} {reach} {share_text(found.least)}"
-    if found.reached == found.rules:
-        return told
-    were = "was" if found.too_few == 1 else "were"
-    few = f"{found.too_few:,} {were} met in too few held-out episodes to show that even if never"
-    were = "was" if found.wrong == 1 else "were"
-    return f"{told}; {few} wrong, and {found.wrong:,} {were} not right often enough"
+    reach = "reaches" if short.reached == 1 else "reach"
+    text = f"{short.reached:,} of {counted(short.rules, 'rule')} {reach} {share_text(short.least)}"
+    if short.reached == short.rules:
+        return text
+    were = "was" if short.too_few == 1 else "were"
+    few = f"{short.too_few:,} {were} met in too few held-out episodes to show that even if never"
+    were = "was" if short.wrong == 1 else "were"
+    return f"{text}; {few} wrong, and {short.wrong:,} {were} not right often enough"
 
 
-def remedy_text(found: Shortfall, there: int, *, in_command: bool = False) -> str:
+def remedy_text(short: Shortfall, there: int, *, in_command: bool = False) -> str:
     """Why no rule reaches a lower bound, and what to do.
 
     Args:
-        found: Of some rules.
+        short: Of some rules.
         there: Episodes in all, the held-out ones among them.
         in_command: Whether what to do is written as options of `mine`.
 
@@ -228,35 +228,35 @@ def remedy_text(found: Shortfall, there: int, *, in_command: bool = False) -> st
         out at least 16 of the 62 (26 %), or ask for less: the best of these rules shows 78.1 %";
         "" where some rule reaches it, or there is no rule.
     """
-    if found.reached or not found.rules:
+    if short.reached or not short.rules:
         return ""
-    least = f" (--lower-bound {math.floor(100 * found.best) / 100:g})" if in_command else ""
-    shows = f"the best of these rules shows {share_text(found.best, decimals=1)}"
-    most = most_shown(found.episodes)
-    if most >= found.least:
-        more = "hold out" if 2 * found.episodes < there else "demonstrate"
+    least = f" (--lower-bound {math.floor(100 * short.best) / 100:g})" if in_command else ""
+    shows = f"the best of these rules shows {share_text(short.best, decimals=1)}"
+    most = most_shown(short.episodes)
+    if most >= short.least:
+        more = "hold out" if 2 * short.episodes < there else "demonstrate"
         more = f"{more} more episodes, so that each rule is met in more of those held out"
-        return f"{shows}; ask for less{least}, or {more}" if found.best else more
-    best = f"ask for less: {shows}{least}" if found.best else ""
-    wanted = share_text(found.least)
-    told = (
-        f"{counted(found.episodes, 'held-out episode')} can show at most "
+        return f"{shows}; ask for less{least}, or {more}" if short.best else more
+    best = f"ask for less: {shows}{least}" if short.best else ""
+    wanted = share_text(short.least)
+    text = (
+        f"{counted(short.episodes, 'held-out episode')} can show at most "
         f"{share_text(most, decimals=1)}, even of a rule that is never wrong"
         if most
-        else f"{counted(found.episodes, 'held-out episode')} can show nothing of a rule"
+        else f"{counted(short.episodes, 'held-out episode')} can show nothing of a rule"
     )
     or_best = f", or {best}" if best else ""
-    (needed,) = episodes_needed(np.ones(1), np.zeros(1), found.least).tolist()
+    (needed,) = episodes_needed(np.ones(1), np.zeros(1), short.least).tolist()
     if math.isinf(needed):
-        return f"{told}, and no number of them can show {wanted}" + (best and f"; {best}")
+        return f"{text}, and no number of them can show {wanted}" + (best and f"; {best}")
     if 2 * needed > there:  # the other half has to be mined from
         return (
-            f"{told}, and {wanted} takes at least {needed:,.0f}: too many of the {there:,} there "
+            f"{text}, and {wanted} takes at least {needed:,.0f}: too many of the {there:,} there "
             f"are; demonstrate more{or_best}"
         )
     percent = math.ceil(100 * needed / there)
     share = f"--hold-out {percent / 100:g}" if in_command else f"{percent} %"
-    return f"{told}; hold out at least {needed:,.0f} of the {there:,} ({share}){or_best}"
+    return f"{text}; hold out at least {needed:,.0f} of the {there:,} ({share}){or_best}"
 
 
 def never_text(missing: Sequence[float]) -> str:

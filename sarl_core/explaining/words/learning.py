@@ -150,26 +150,26 @@ def _answer(
             "Whether a way to learn is safe and good shows only beside the same learner without a "
             "shield: run it too."
         )
-    found = best(judged)
-    if found is None:
+    safest = best(judged)
+    if safest is None:
         return (
             "No way to learn was both safe while learning and good afterwards without the shield."
         )
-    alone = reference(summaries, found.arm)
+    alone = reference(summaries, safest.arm)
     assert alone is not None  # else it were not judged
-    after = value_text(found.alone.halves[1])
+    after = value_text(safest.alone.halves[1])
     return (
-        f"Safe while learning and good afterwards: “{found.arm.title}”. While learning it crashed "
-        f"{_times(found.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
+        f"Safe while learning and good afterwards: “{safest.arm.title}”. While learning it crashed "
+        f"{_times(safest.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
-        f"crashes in {_crash_share(found.alone)} of the episodes; the same learner "
+        f"crashes in {_crash_share(safest.alone)} of the episodes; the same learner "
         f"that never had a shield returns {value_text(alone.alone.halves[1])} and crashes in "
         f"{_crash_share(alone.alone)}. (It was chosen by the first half of the episodes "
         "afterwards; these returns are of the second.)"
     )
 
 
-def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]:
+def _others(judged: Sequence[ArmSummary], safest: ArmSummary | None) -> list[str]:
     """The other arms by what they are."""
 
     def listed(safe: bool, good: bool) -> str:
@@ -178,7 +178,7 @@ def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]
                 f"“{summary.arm.title}” ({_times(summary.mean_crashes)}; afterwards "
                 f"{value_text(summary.alone.mean)})"
                 for summary in judged
-                if (summary.safe, summary.good) == (safe, good) and summary is not found
+                if (summary.safe, summary.good) == (safe, good) and summary is not safest
             ]
         )
 
@@ -197,11 +197,11 @@ def _others(judged: Sequence[ArmSummary], found: ArmSummary | None) -> list[str]
     return sentences
 
 
-def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
+def _alone(summaries: Sequence[ArmSummary], safest: ArmSummary | None) -> str:
     alone = [summary for summary in summaries if not summary.arm.shielded]
     if not alone:
         return ""
-    told = "Without any shield: " + _listed(
+    text = "Without any shield: " + _listed(
         [
             f"“{summary.arm.title}” {_crashed(summary)}returns "
             f"{_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
@@ -211,16 +211,16 @@ def _alone(summaries: Sequence[ArmSummary], found: ArmSummary | None) -> str:
     rivals = [
         summary
         for summary in alone
-        if found is not None and summary.mean_crashes <= found.mean_crashes
+        if safest is not None and summary.mean_crashes <= safest.mean_crashes
     ]
-    if not rivals or found is None:
-        return f"{told}."
+    if not rivals or safest is None:
+        return f"{text}."
     names = _listed([f"“{summary.arm.title}”" for summary in rivals])
-    fewer = all(sum(summary.episodes) < sum(found.episodes) for summary in rivals)
-    share = share_text(sum(found.crashes) / max(sum(found.episodes), 1))
+    fewer = all(sum(summary.episodes) < sum(safest.episodes) for summary in rivals)
+    share = share_text(sum(safest.crashes) / max(sum(safest.episodes), 1))
     return (
-        f"{told}. Mind that {names} crashed no more often than the best shielded way to learn"
-        f"{', in fewer and longer episodes' if fewer else ''}; of those of “{found.arm.title}” "
+        f"{text}. Mind that {names} crashed no more often than the best shielded way to learn"
+        f"{', in fewer and longer episodes' if fewer else ''}; of those of “{safest.arm.title}” "
         f"{share} crashed."
     )
 
@@ -266,14 +266,14 @@ def _cut(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     count, of = sum(one.cut for one in trials), sum(one.episodes for one in trials)
     if not count:
         return ""
-    told = cut_text(
+    text = cut_text(
         study.env_id,
         count,
         of,
         study.settings.get("trial_max_steps") or MAX_STEPS,
         episodes="episodes after learning",
     )
-    return f"{told[0].upper()}{told[1:]}."
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _conditions(study: LearningStudy) -> str:
