@@ -178,7 +178,8 @@ def typical_figure(
             },
             hovertemplate=(
                 f"{plain(arm.name)}: <b>{typical.iqm:,.1f}</b><br>95 % interval "
-                f"{typical.low:,.1f} to {typical.high:,.1f}<br>mean {typical.mean:,.1f}, {len(episodes)} episodes"
+                f"{typical.low:,.1f} to {typical.high:,.1f}<br>"
+                f"mean {typical.mean:,.1f}, {len(episodes)} episodes"
                 "<extra></extra>"
             ),
         )
