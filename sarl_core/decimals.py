@@ -56,8 +56,8 @@ def decimal_within(value: float, error: float) -> float:
         Of the numbers with as few digits, the nearest.
     """
     most = float(np.nextafter(value + error, math.inf))
-    found = short_decimal(value, value - error, most, fewest=3)
-    return value if found is None else found
+    decimal = short_decimal(value, value - error, most, fewest=3)
+    return value if decimal is None else decimal
 
 
 def float32_decimal(value: float) -> float:

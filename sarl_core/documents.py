@@ -173,13 +173,13 @@ def _either(kind: inspect.Type) -> list[Any]:
 def _within(kind: inspect.Type, step: str | int) -> list[Any]:
     """The types of what stands there under a key or in a place."""
     if isinstance(kind, inspect.StructType):
-        found: list[inspect.Type] = [
+        types: list[inspect.Type] = [
             field.type for field in kind.fields if field.encode_name == step
         ]
         if kind.tag_field == step:
-            found.append(inspect.LiteralType((kind.tag,)))
+            types.append(inspect.LiteralType((kind.tag,)))
     elif isinstance(kind, inspect.TupleType):
-        found = [kind.item_types[int(step)]]
+        types = [kind.item_types[int(step)]]
     else:
-        found = [kind.item_type] if isinstance(kind, inspect.CollectionType) else []
-    return [one for inner in found for one in _either(inner)]
+        types = [kind.item_type] if isinstance(kind, inspect.CollectionType) else []
+    return [one for inner in types for one in _either(inner)]

@@ -59,7 +59,7 @@ def temporary_folder() -> Iterator[None]:
     shared = shared_temporary_folder()
     _remove_abandoned(shared)
     folder = shared / f"{_TEMPORARY}.{_mark()}"
-    kept = tempfile.tempdir, os.environ.get("TMPDIR")
+    before = tempfile.tempdir, os.environ.get("TMPDIR")
     try:
         folder.mkdir(mode=0o700)
     except OSError:  # nothing can be put aside there; most work needs nothing of the kind
@@ -69,7 +69,7 @@ def temporary_folder() -> Iterator[None]:
     try:
         yield
     finally:
-        tempfile.tempdir, variable = kept
+        tempfile.tempdir, variable = before
         if variable is None:
             del os.environ["TMPDIR"]
         else:

@@ -19,7 +19,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_core.mining.validation.episode_counts import Influence
 from sarl_core.mining.validation.evidence import HeldOut
-from sarl_core.mining.validation.holding_out import Shortfall, Split, most_shown
+from sarl_core.mining.validation.holding_out import Shortfall, Split, best_lower_bound
 
 
 class Tried(NamedTuple):
@@ -83,7 +83,7 @@ def _described_short(tried: Tried) -> dict[str, Any]:
     remedy = remedy_text(short, tried.there, in_command=True)
     return {
         "least": short.least,
-        "most_possible": most_shown(short.episodes),
+        "most_possible": best_lower_bound(short.episodes),
         "rules": short.rules,
         "kept": short.reached,
         "too_few_episodes": short.too_few,

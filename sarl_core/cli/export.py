@@ -112,7 +112,7 @@ def _document(prepared: Prepared, out: Path, vectors: Path) -> dict[str, Any]:
                     "rules": list(kept.rules),
                     "why": kept.why,
                 }
-                for kept in rounding.kept
+                for kept in rounding.unrounded
             ],
         },
     }
@@ -132,11 +132,11 @@ def _lines(prepared: Prepared, out: Path, vectors: Path) -> list[str]:
         f"{counted(rounding.rounded, 'threshold')} became shorter; on the demonstrations "
         f"{counted(prepared.changed, 'decision')} changed."
     )
-    if rounding.kept:
-        lines.append(f"{counted(len(rounding.kept), 'threshold')} stayed:")
-        lines += [f"  {_unrounded(one, prepared.rule_set)}" for one in rounding.kept[:_SHOWN]]
-        if len(rounding.kept) > _SHOWN:
-            lines.append(f"  and {len(rounding.kept) - _SHOWN:,} more; --json lists them all.")
+    if rounding.unrounded:
+        lines.append(f"{counted(len(rounding.unrounded), 'threshold')} stayed:")
+        lines += [f"  {_unrounded(one, prepared.rule_set)}" for one in rounding.unrounded[:_SHOWN]]
+        if len(rounding.unrounded) > _SHOWN:
+            lines.append(f"  and {len(rounding.unrounded) - _SHOWN:,} more; --json lists them all.")
     return lines
 
 

@@ -130,17 +130,17 @@ def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
 
 
 def _action_warnings(demonstrations: Demonstrations) -> list[str]:
-    found: list[str] = []
+    warnings: list[str] = []
     columns = demonstrations.action_columns.T
     for dimension, column in zip(demonstrations.action_dimensions, columns, strict=True):
         if np.all(column == column[0]):
-            found.append(
+            warnings.append(
                 f"action {dimension.name!r} is {decimal_text(column[0])} in every step, so the "
                 "only rule is to do that always"
             )
         elif dimension.kind == "discrete":
             counts = np.bincount(column - dimension.first, minlength=len(dimension.labels))
-            found += _shortened(
+            warnings += _shortened(
                 [
                     f"label {label!r} of action {dimension.name!r} never occurs"
                     for label, count in zip(dimension.labels, counts, strict=True)
@@ -148,7 +148,7 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
                 ],
                 f"labels of action {dimension.name!r} never occur",
             )
-    return found
+    return warnings
 
 
 def _shortened(sentences: list[str], rest: str) -> list[str]:

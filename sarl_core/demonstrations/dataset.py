@@ -171,13 +171,13 @@ class Demonstrations:
     def __repr__(self) -> str:
         """Shapes and dtypes, as `Demonstrations(env_id='CartPole-v1', observations=...)`."""
         arrays = ("observations", "actions", "episodes", "rewards", "terminated", "truncated")
-        shown = [
+        fields = [
             f"{name}={value.dtype}{list(value.shape)}"
             for name in arrays
             if (value := getattr(self, name)) is not None
         ]
         return (
-            f"Demonstrations(env_id={self.env_id!r}, {', '.join(shown)}, "
+            f"Demonstrations(env_id={self.env_id!r}, {', '.join(fields)}, "
             f"n_episodes={self.n_episodes}, digest='{self.digest[:12]}')"
         )
 
@@ -335,18 +335,18 @@ class Demonstrations:
             raise InputError(f"{which}; choose from the {self.n_episodes} episodes there are")
         rows = np.isin(self.episodes, wanted)
 
-        def kept(value: ArrayLike | None) -> Any:
+        def chosen(value: ArrayLike | None) -> Any:
             return None if value is None else np.asarray(value)[rows]
 
         return replace(
             self,
-            observations=kept(self.observations),
-            actions=kept(self.actions),
-            episodes=kept(self.episodes),
-            rewards=kept(self.rewards),
-            terminated=kept(self.terminated),
-            truncated=kept(self.truncated),
-            steps=kept(self.steps),
+            observations=chosen(self.observations),
+            actions=chosen(self.actions),
+            episodes=chosen(self.episodes),
+            rewards=chosen(self.rewards),
+            terminated=chosen(self.terminated),
+            truncated=chosen(self.truncated),
+            steps=chosen(self.steps),
         )
 
     def summary(self) -> Summary:

@@ -43,13 +43,13 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
         return []
     together = np.diff(demonstrations.episodes) == 0
     names = [feature.name for feature in demonstrations.features]
-    found = []
+    sentences = []
     for name, values in zip(names, demonstrations.observations.T, strict=True):
         if values.min() == values.max():
             continue
         moves = _clockwork(values, together)
         if moves is not None:
-            found.append(
+            sentences.append(
                 f"feature {name!r} {moves}, as a counter or a clock does; if it is one, leave it "
                 "out, since a rule about it holds in no other episode"
             )
@@ -58,12 +58,12 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
             share = _share_given(values, demonstrations.action_columns[:, index], dimension.kind)
             if share is not None:
                 steps = "every step" if share == 1 else f"{100 * share:.1f} % of the steps"
-                found.append(
+                sentences.append(
                     f"feature {name!r} alone gives action {dimension.name!r} in {steps}; if it is "
                     "recorded from the action (a copy of it, a lamp that follows it), leave it "
                     "out, since a rule about it explains nothing"
                 )
-    return found + _next_states(demonstrations.observations, names, together)
+    return sentences + _next_states(demonstrations.observations, names, together)
 
 
 def _share_given(values: NDArray[np.float32], actions: NDArray[Any], kind: str) -> float | None:
@@ -143,7 +143,7 @@ def _next_states(
     few = together[:_LOOKED_AT]  # some rows tell nearly all pairs of features apart
     start = observations[: len(few) + 1]
     later = {values[1:][few].tobytes(): index for index, values in enumerate(start.T)}
-    found = []
+    sentences = []
     for index, values in enumerate(start.T):
         base = later.get(values[:-1][few].tobytes())
         if base is None or base == index or _EARLIER.search(names[base]):
@@ -153,9 +153,9 @@ def _next_states(
             np.array_equal(held, observations[1:, base][together])
             and np.count_nonzero(np.diff(held)) >= _LEAST_CHANGES
         ):
-            found.append(
+            sentences.append(
                 f"feature {names[index]!r} holds in each step what feature {names[base]!r} holds "
                 "in the next one; if it is the next state, leave it out, since nobody knows it "
                 "before acting"
             )
-    return found
+    return sentences

@@ -236,24 +236,24 @@ def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def coarse_columns(
-    given: Any, kept: NDArray[np.float32], columns: Sequence[str]
+    given: Any, rounded: NDArray[np.float32], columns: Sequence[str]
 ) -> tuple[str, ...]:
     """Sentences on columns whose values differ and are equal as float32, as seconds since 1970.
 
     Args:
         given: Shape (N, d), of any type.
-        kept: The same in float32, in which rules compare.
+        rounded: The same in float32, in which rules compare.
         columns: What the d columns are called.
 
     Returns:
         One sentence for each column in which that hides what differs.
     """
     exact = np.asarray(given)
-    if exact.dtype == np.float32 or exact.shape != kept.shape or not exact.size:
+    if exact.dtype == np.float32 or exact.shape != rounded.shape or not exact.size:
         return ()
     notes = []
-    for index in np.flatnonzero(crowded(kept)).tolist():
-        different, left = len(np.unique(exact[:, index])), len(np.unique(kept[:, index]))
+    for index in np.flatnonzero(crowded(rounded)).tolist():
+        different, left = len(np.unique(exact[:, index])), len(np.unique(rounded[:, index]))
         if left < different:
             least = exact[:, index].min()
             notes.append(
@@ -264,7 +264,7 @@ def coarse_columns(
     return tuple(notes)
 
 
-def told_of_whole_numbers(
+def whole_numbers_note(
     values: NDArray[Any], column: str, rows: NDArray[np.int64] | None = None
 ) -> str | None:
     """A sentence on actions that are labels nearly as well as amounts.

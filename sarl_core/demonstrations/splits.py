@@ -57,13 +57,13 @@ class Splits:
         Returns:
             The thresholds with their neighbours.
         """
-        asked = np.unique(thresholds)
+        distinct = np.unique(thresholds)
         ordered = np.sort(values).astype(np.float64)
-        at = np.searchsorted(ordered, asked, side="right")
+        at = np.searchsorted(ordered, distinct, side="right")
         framed = np.concatenate([[-np.inf], ordered, [np.inf]])
         inner = ordered[np.searchsorted(ordered, 0.0, "right") : np.searchsorted(ordered, 1.0)]
         within = len(ordered) > 0 and ordered[0] >= 0.0 and ordered[-1] <= 1.0
-        return cls(asked, framed[at], framed[at + 1], bool(within and not len(inner)))
+        return cls(distinct, framed[at], framed[at + 1], bool(within and not len(inner)))
 
     @classmethod
     def together(cls, several: Sequence[Splits]) -> Splits:
@@ -77,14 +77,14 @@ class Splits:
         """
         if len(several) == 1:
             return several[0]
-        asked, first = np.unique(
+        distinct, first = np.unique(
             np.concatenate([one.thresholds for one in several]), return_index=True
         )
         below, above = (
             np.concatenate([getattr(one, side) for one in several])[first]
             for side in ("below", "above")
         )
-        return cls(asked, below, above, all(one.binary for one in several))
+        return cls(distinct, below, above, all(one.binary for one in several))
 
     def only(self, thresholds: Iterable[float]) -> Splits:
         """Some of the thresholds.
@@ -95,8 +95,8 @@ class Splits:
         Returns:
             With their neighbours.
         """
-        kept = np.isin(self.thresholds, np.fromiter(thresholds, dtype=np.float64))
-        return Splits(self.thresholds[kept], self.below[kept], self.above[kept], self.binary)
+        wanted = np.isin(self.thresholds, np.fromiter(thresholds, dtype=np.float64))
+        return Splits(self.thresholds[wanted], self.below[wanted], self.above[wanted], self.binary)
 
     def around(self, threshold: float) -> tuple[float, float] | None:
         """The demonstrated values on either side of a threshold.
@@ -142,8 +142,8 @@ def written_threshold(
     above = min([above, threshold + room, *(value for value in beside if value > threshold)])
     if below <= 0.0 < above and abs(threshold) < _NOTHING * (above - below):
         return 0.0
-    found = short_decimal(threshold, below, above, fewest=FEWEST_DIGITS)
-    return threshold if found is None else found
+    decimal = short_decimal(threshold, below, above, fewest=FEWEST_DIGITS)
+    return threshold if decimal is None else decimal
 
 
 def written_value(
@@ -172,7 +172,7 @@ def written_value(
     least = value - room
     for low, high in (within, (-math.inf, math.inf)):
         above = float(np.nextafter(min(most, high), math.inf))
-        found = short_decimal(value, max(least, low), above, fewest=fewest)
-        if found is not None:
-            return found
+        decimal = short_decimal(value, max(least, low), above, fewest=fewest)
+        if decimal is not None:
+            return decimal
     return value

@@ -144,11 +144,11 @@ def only_counts(names: Sequence[str]) -> bool:
     if not names:
         return True
     matches = [_COUNTED.fullmatch(name.strip()) for name in names]
-    found = [match for match in matches if match is not None]
-    if len(found) < len(names) or len({match[1].casefold() for match in found}) > 1:
+    counted = [match for match in matches if match is not None]
+    if len(counted) < len(names) or len({match[1].casefold() for match in counted}) > 1:
         return False
-    word = found[0][1].strip().casefold()
-    numbers = [int(match[2]) for match in found]
+    word = counted[0][1].strip().casefold()
+    numbers = [int(match[2]) for match in counted]
     return (
         (len(word) <= _SHORT or word in _OBSERVATION)
         and numbers[0] in (0, 1)

@@ -39,7 +39,7 @@ def applications(rule_set: RuleSet, observations: NDArray[np.float32]) -> Applic
     Returns:
         At most one entry a state and action dimension, and those of placed rules.
     """
-    found: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+    parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     for dimension in range(len(rule_set.actions)):
         numbered = [entry for entry in enumerate(rule_set.rules) if entry[1].dimension == dimension]
         mined = [entry for entry in numbered if not entry[1].placed]
@@ -48,10 +48,10 @@ def applications(rule_set: RuleSet, observations: NDArray[np.float32]) -> Applic
         if nodes is not None:
             rule = _rule_of_each(nodes, observations)
             rows = np.flatnonzero(rule != NO_RULE)
-            found.append((rule[rows], rows))
-        found += [_states_of(entry, observations) for entry in alone]
-    rule = np.concatenate([entry[0] for entry in found])
-    row = np.concatenate([entry[1] for entry in found])
+            parts.append((rule[rows], rows))
+        parts += [_states_of(entry, observations) for entry in alone]
+    rule = np.concatenate([entry[0] for entry in parts])
+    row = np.concatenate([entry[1] for entry in parts])
     order = np.lexsort((row, rule))
     return Applications(rule[order], row[order])
 

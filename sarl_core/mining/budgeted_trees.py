@@ -154,17 +154,20 @@ def without_idle_queries(structure: TreeStructure) -> TreeStructure:
             alike[node] = int(said[node])
         elif alike.get(int(left[node]), -1) == alike.get(int(right[node]), -2):
             alike[node] = alike[int(left[node])]
-    kept = [0]
-    for node in kept:
+    nodes = [0]
+    for node in nodes:
         if node not in alike:
-            kept += [int(left[node]), int(right[node])]
-    place = {node: number for number, node in enumerate(kept)}
-    ends = np.array([node in alike for node in kept])
-    old = np.array(kept)
+            nodes += [int(left[node]), int(right[node])]
+    place = {node: number for number, node in enumerate(nodes)}
+    ends = np.array([node in alike for node in nodes])
+    old = np.array(nodes)
 
     def child(side: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.array(
-            [LEAF if end else place[int(side[node])] for node, end in zip(kept, ends, strict=True)],
+            [
+                LEAF if end else place[int(side[node])]
+                for node, end in zip(nodes, ends, strict=True)
+            ],
             dtype=np.int64,
         )
 
@@ -173,7 +176,7 @@ def without_idle_queries(structure: TreeStructure) -> TreeStructure:
         threshold=structure.threshold[old],
         children_left=child(left),
         children_right=child(right),
-        label=np.array([alike.get(node, int(said[node])) for node in kept], dtype=np.int64),
+        label=np.array([alike.get(node, int(said[node])) for node in nodes], dtype=np.int64),
     )
 
 

@@ -34,8 +34,8 @@ def with_boxes(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
         InputError: If the rules are for other features or actions.
     """
     rule_set = rules_for(rule_set, demonstrations).rule_set
-    found = applications(rule_set, demonstrations.observations)
-    boxes = _boxes(found, demonstrations.observations, len(rule_set.rules))
+    applied = applications(rule_set, demonstrations.observations)
+    boxes = _boxes(applied, demonstrations.observations, len(rule_set.rules))
     return replace(
         rule_set,
         rules=tuple(
@@ -58,17 +58,17 @@ def with_splits(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
         InputError: If the rules are for other features or actions.
     """
     rule_set = rules_for(rule_set, demonstrations).rule_set
-    asked = [condition for rule in rule_set.rules for condition in rule.conditions]
-    found = splits_of(
-        np.array([feature for feature, _, _ in asked], dtype=np.int64),
-        np.array([threshold for _, _, threshold in asked], dtype=np.float64),
+    conditions = [condition for rule in rule_set.rules for condition in rule.conditions]
+    splits = splits_of(
+        np.array([feature for feature, _, _ in conditions], dtype=np.int64),
+        np.array([threshold for _, _, threshold in conditions], dtype=np.float64),
         demonstrations,
     )
     known = [feature.splits for feature in rule_set.source.features]
     return replace(
         rule_set,
         source=rule_set.source.with_splits(
-            [new if old is None else old for old, new in zip(known, found, strict=True)]
+            [new if old is None else old for old, new in zip(known, splits, strict=True)]
         ),
     )
 
@@ -84,24 +84,24 @@ def box_of(rule: Rule, observations: NDArray[np.float32]) -> DataBox | None:
         None where it applies to none of them.
     """
     rows = np.flatnonzero(rule.applies(observations))
-    found = Applications(rule=np.zeros(len(rows), dtype=np.int64), row=rows)
-    (box,) = _boxes(found, observations, 1)
+    applied = Applications(rule=np.zeros(len(rows), dtype=np.int64), row=rows)
+    (box,) = _boxes(applied, observations, 1)
     return box
 
 
 def _boxes(
-    found: Applications, observations: NDArray[np.float32], n_rules: int
+    applied: Applications, observations: NDArray[np.float32], n_rules: int
 ) -> list[DataBox | None]:
     """One sort a feature; the quantiles of all rules are then picked at once."""
-    count = np.bincount(found.rule, minlength=n_rules)
+    count = np.bincount(applied.rule, minlength=n_rules)
     there = np.flatnonzero(count)
     count = count[there]
     start = np.cumsum(count) - count
     d = observations.shape[1]
     corners: Floats = np.empty((4, len(there), d))
     for feature in range(d):
-        values = observations[found.row, feature]
-        ordered = values[np.lexsort((values, found.rule))].astype(np.float64)
+        values = observations[applied.row, feature]
+        ordered = values[np.lexsort((values, applied.rule))].astype(np.float64)
         corners[0, :, feature] = ordered[start]
         corners[1, :, feature] = _quantile(ordered, start, count, LOW_QUANTILE)
         corners[2, :, feature] = _quantile(ordered, start, count, HIGH_QUANTILE)

@@ -133,8 +133,8 @@ class LabelledDimension:
             Shape (N,).
         """
         if self.edges:
-            found = np.searchsorted(self.inner_edges, values.astype(np.float64), side="right")
-            return found.astype(np.int64)
+            intervals = np.searchsorted(self.inner_edges, values.astype(np.float64), side="right")
+            return intervals.astype(np.int64)
         return values.astype(np.int64) - self.first
 
 
@@ -155,8 +155,8 @@ def _edge_texts(edges: Sequence[float]) -> list[str]:
         if abs(edge) < _ROUNDING * width and least <= 0.0 <= most:
             texts.append("0")
             continue
-        found = short_decimal(edge, least, float(np.nextafter(most, math.inf)), fewest=3)
-        texts.append(decimal_text(edge if found is None else found))
+        decimal = short_decimal(edge, least, float(np.nextafter(most, math.inf)), fewest=3)
+        texts.append(decimal_text(edge if decimal is None else decimal))
     return texts
 
 

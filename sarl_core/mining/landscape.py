@@ -119,11 +119,11 @@ class Landscape:
             np.unique(np.linspace(0, len(axis) - 1, _MOST_IN_NOTEBOOK).astype(np.int64))
             for axis in (self.supports, self.confidences)
         )
-        shown = self.rule_count[np.ix_(rows, columns)]
+        cells = self.rule_count[np.ix_(rows, columns)]
         caption = "Number of rules, by minimum support and, across, minimum confidence"
-        if shown.size < self.rule_count.size:
-            caption += f" ({shown.size:,} of {self.rule_count.size:,} cells)"
-        lines = zip(self.supports[rows].tolist(), shown.tolist(), strict=True)
+        if cells.size < self.rule_count.size:
+            caption += f" ({cells.size:,} of {self.rule_count.size:,} cells)"
+        lines = zip(self.supports[rows].tolist(), cells.tolist(), strict=True)
         return table_html(
             caption,
             ["", *(f"{value:g}" for value in self.confidences[columns])],
@@ -295,19 +295,19 @@ def _tried(
     for tree, one, counts in zip(trees, places, held_out, strict=True):
         place = np.full(tree.n_nodes, -1)
         place[one.node] = np.arange(len(one.node))
-        found = place[counts.thing]
-        by_episode = np.flatnonzero(found >= 0)
+        cut_place = place[counts.thing]
+        by_episode = np.flatnonzero(cut_place >= 0)
         by_episode = by_episode[np.argsort(counts.episode[by_episode], kind="stable")]
-        entries.append((counts, by_episode, found))
+        entries.append((counts, by_episode, cut_place))
     count = len(held_out[0].numbers)
     at_once = max(_CELLS_AT_ONCE // (shape[0] * (shape[1] + 1)), 1)
     for start, end in pairwise([*range(0, count, at_once), count]):
         together = np.zeros((2, end - start, *shape), dtype=np.int64)
-        for number, (one, (counts, rows, found)) in enumerate(
+        for number, (one, (counts, rows, cut_place)) in enumerate(
             zip(places, entries, strict=True), start=1
         ):
             first, last = np.searchsorted(counts.episode[rows], [start, end])
-            planes = _planes(one, counts, rows[first:last], found, start, together.shape)
+            planes = _planes(one, counts, rows[first:last], cut_place, start, together.shape)
             _add(layers[number], planes)
             together += planes
         _add(layers[0], together)
@@ -318,14 +318,14 @@ def _planes(
     places: _Places,
     counts: EpisodeCounts,
     rows: NDArray[np.int64],
-    found: NDArray[np.int64],
+    cut_place: NDArray[np.int64],
     start: int,
     shape: tuple[int, ...],
 ) -> NDArray[np.int64]:
     """Pairs covered and right in some episodes, (2, episodes, S, C)."""
     planes = np.zeros((*shape[:3], shape[3] + 1), dtype=np.int64)
     first = (counts.episode[rows] - start) * (shape[2] * (shape[3] + 1))
-    node = found[rows]
+    node = cut_place[rows]
     for plane, weight in zip(
         planes.reshape(2, -1), (counts.samples[rows], counts.correct[rows]), strict=True
     ):

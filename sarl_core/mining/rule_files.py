@@ -142,15 +142,15 @@ def _value(value: Any, depth: int, indented: bool) -> str:
 def _document(rule_set: RuleSet) -> dict[str, Any]:
     """What stands under each key: a value of JSON, or what makes those of a list one by one."""
     source, thresholds = rule_set.source, rule_set.thresholds
-    asked: list[set[float]] = [set() for _ in source.features]
+    by_feature: list[set[float]] = [set() for _ in source.features]
     for rule in rule_set.rules:
         for feature, _, threshold in rule.conditions:
-            asked[feature].add(threshold)
+            by_feature[feature].add(threshold)
     return {
         "format": FORMAT,
         "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
         "env_id": source.env_id,
-        "features": map(_feature, source.features, asked),
+        "features": map(_feature, source.features, by_feature),
         "actions": map(_action, rule_set.actions),
         "thresholds": {
             "support": _number(thresholds.support),
@@ -175,10 +175,10 @@ def _number(value: float) -> float:
     return float(value) + 0.0
 
 
-def _feature(feature: Feature, asked: set[float]) -> dict[str, Any]:
+def _feature(feature: Feature, thresholds: set[float]) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": feature.name, "unit": feature.unit}
     if feature.splits is not None:
-        splits = feature.splits.only(asked)
+        splits = feature.splits.only(thresholds)
         columns = (splits.thresholds, splits.below, splits.above)
         entry["splits"] = [
             [value if math.isfinite(value) else None for value in row]
@@ -339,12 +339,12 @@ class _HeldOutPairs(_Part):
     def read(self) -> HeldOut:
         return self._checked(HeldOut(self.samples, self.correct, 0, None, None, None))
 
-    def _checked(self, found: HeldOut) -> HeldOut:
+    def _checked(self, held_out: HeldOut) -> HeldOut:
         for name in ("correct", "episodes"):
-            if (value := getattr(found, name)) > found.samples:
-                most = f"not a whole number from 0 to {found.samples}"
+            if (value := getattr(held_out, name)) > held_out.samples:
+                most = f"not a whole number from 0 to {held_out.samples}"
                 raise MisfitError(f"{name!r} is {value}, {most}", "held_out")
-        return found
+        return held_out
 
 
 class _HeldOut(_HeldOutPairs):
@@ -408,13 +408,13 @@ class _Rule(_Part, Generic[_Held]):
 
 def _each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T, ...]:
     """What is made of the parts of a list; an error says of which."""
-    found = []
+    made = []
     for number, part in enumerate(parts, start=1):
         try:
-            found.append(read(part))
+            made.append(read(part))
         except MisfitError as error:
             raise MisfitError(error.what, f"{place} {number}", *error.place) from error
-    return tuple(found)
+    return tuple(made)
 
 
 class _Document(_Part, Generic[_Held]):

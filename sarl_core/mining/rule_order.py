@@ -46,19 +46,19 @@ def fitted_rules(
     """
     env_id = rule_set.source.env_id
     names = tuple(feature.name for feature in rule_set.source.features)
-    found = [line_up(NamedFeatures(rules, names, env_id), features)]
+    orders = [line_up(NamedFeatures(rules, names, env_id), features)]
     if len(actions) > 1 or len(rule_set.actions) > 1:  # a single one needs no name
-        found.append(
+        orders.append(
             line_up(
                 NamedFeatures(rules, tuple(action.name for action in rule_set.actions), env_id),
                 features._replace(names=tuple(actions)),
                 what="action dimensions",
             )
         )
-    notes = tuple(order.note for order in found if order.note)
-    if all(order.how != "permuted" for order in found):
+    notes = tuple(order.note for order in orders if order.note)
+    if all(order.how != "permuted" for order in orders):
         return Fitted(rule_set, notes)
-    return Fitted(_reordered(rule_set, found[0], found[1] if len(found) > 1 else None), notes)
+    return Fitted(_reordered(rule_set, orders[0], orders[1] if len(orders) > 1 else None), notes)
 
 
 def rules_for(
@@ -111,8 +111,8 @@ def fits(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
 
 def _check_actions(actions: tuple[LabelledDimension, ...], demonstrations: Demonstrations) -> None:
     advice = "choose demonstrations of the rules' environment"
-    for rules, shown in zip(actions, demonstrations.action_dimensions, strict=True):
-        if rules.is_interval != (shown.kind == "interval"):
+    for rules, demonstrated in zip(actions, demonstrations.action_dimensions, strict=True):
+        if rules.is_interval != (demonstrated.kind == "interval"):
             kinds = ("continuous", "discrete") if rules.is_interval else ("discrete", "continuous")
             raise InputError(
                 f"the action {rules.name!r} is {kinds[0]} in the rules and {kinds[1]} in the "

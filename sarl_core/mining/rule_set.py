@@ -101,7 +101,7 @@ class RuleSet(Sequence[Rule]):
 
     def _repr_html_(self) -> str:
         """The first rules as a table, for a notebook."""
-        shown = self.rules[:MOST_ROWS]
+        first = self.rules[:MOST_ROWS]
         rows = (
             (
                 self.name_of(rule),
@@ -111,10 +111,10 @@ class RuleSet(Sequence[Rule]):
                 share_text(rule.confidence),
                 f"{rule.samples:,}",
             )
-            for rule in shown
+            for rule in first
         )
         header = ("rule", "when", "then", "support", "confidence", "states")
-        return table_html(repr(self), header, rows, more=len(self) - len(shown))
+        return table_html(repr(self), header, rows, more=len(self) - len(first))
 
     @property
     def rule_count(self) -> int:

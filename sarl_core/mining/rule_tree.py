@@ -73,8 +73,8 @@ def tree_of(rules: Sequence[Numbered]) -> list[RuleNode] | None:
             conditions = entry[1].conditions
             if len(conditions) == depth:
                 return None
-            asked, op, at = conditions[depth]
-            if asked != feature or at != threshold:
+            own_feature, op, at = conditions[depth]
+            if own_feature != feature or at != threshold:
                 return None
             (below if op == "<=" else above).append(entry)
         left, right = len(nodes), len(nodes) + 1

@@ -104,15 +104,15 @@ class Rule:
     @cached_property
     def bounds(self) -> tuple[Bounds, ...]:
         """The conditions with several bounds on one feature made one interval."""
-        found: dict[int, Bounds] = {}
+        by_feature: dict[int, Bounds] = {}
         for feature, op, threshold in self.conditions:
-            before = found.get(feature, Bounds(feature, -np.inf, np.inf))
-            found[feature] = (
+            before = by_feature.get(feature, Bounds(feature, -np.inf, np.inf))
+            by_feature[feature] = (
                 before._replace(high=min(before.high, threshold))
                 if op == "<="
                 else before._replace(low=max(before.low, threshold))
             )
-        return tuple(found.values())
+        return tuple(by_feature.values())
 
     @property
     def merged_length(self) -> int:

@@ -201,10 +201,10 @@ class PolicyTree:
         Returns:
             The root first.
         """
-        found = [int(node)]
-        while (above := int(self.parent[found[-1]])) >= 0:
-            found.append(above)
-        return tuple(reversed(found))
+        nodes = [int(node)]
+        while (above := int(self.parent[nodes[-1]])) >= 0:
+            nodes.append(above)
+        return tuple(reversed(nodes))
 
     def rows(self, node: int) -> NDArray[np.int64]:
         """Rows of the demonstrations that reach a node.
@@ -260,9 +260,9 @@ def splits_of(
         One entry a feature; None where it is not asked.
     """
     states = demonstrations.observations
-    asked = np.isin(np.arange(states.shape[1]), feature)
+    is_used = np.isin(np.arange(states.shape[1]), feature)
     return [
-        Splits.of(states[:, index], threshold[feature == index]) if asked[index] else None
+        Splits.of(states[:, index], threshold[feature == index]) if is_used[index] else None
         for index in range(states.shape[1])
     ]
 
@@ -407,8 +407,8 @@ def fitted(
     left = np.asarray(tree.children_left, dtype=np.int64)
     feature = np.where(left == LEAF, LEAF, tree.feature).astype(np.int64)
     threshold = np.array(tree.threshold, dtype=np.float64)
-    asked = feature != LEAF
-    threshold[asked] = np.ldexp(threshold[asked], -exponents[feature[asked]])
+    inner = feature != LEAF
+    threshold[inner] = np.ldexp(threshold[inner], -exponents[feature[inner]])
     return TreeStructure(
         feature=feature,
         threshold=threshold,

@@ -43,13 +43,13 @@ def limit_texts(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = (
     return texts if len(set(texts)) == len(set(ends)) else list(map(decimal_text, ends))
 
 
-def value_text(value: float, feature: Feature, shown: Iterable[Bounds]) -> str:
+def value_text(value: float, feature: Feature, bounds: Iterable[Bounds]) -> str:
     """A value of a feature where bounds on the feature may be shown, too.
 
     Args:
         value: Of a state; any number, or none.
         feature: Its own.
-        shown: Bounds on the feature, shown with the value `beside` them.
+        bounds: On the feature, shown with the value `beside` them.
 
     Returns:
         As "293.4": three significant digits, more where it takes them to stay on its side of
@@ -58,7 +58,7 @@ def value_text(value: float, feature: Feature, shown: Iterable[Bounds]) -> str:
     if not math.isfinite(value):
         return _no_number(value)
     limits = [
-        float(limit) for bounds in shown for limit in limit_texts(bounds, feature, beside=(value,))
+        float(limit) for one in bounds for limit in limit_texts(one, feature, beside=(value,))
     ]
     return decimal_text(written_value(value, limits))
 

@@ -170,7 +170,7 @@ def test_contradictions_are_counted_and_an_episode_is_left_out_everywhere() -> N
     app = open_page("evidence", data="cartpole", about="Contradictions")
     whole = load_demonstrations(CART)
     found = find_contradictions(whole)
-    assert f"**{found.found().sum():,} of 15,000 states** contradict another" in texts(app)
+    assert f"**{found.contradicting().sum():,} of 15,000 states** contradict another" in texts(app)
     worst = by_episode(whole, found)
     assert app.dataframe[0].value["Episode"].tolist() == [one.episode for one in worst]
     app = open_page("evidence", data="cartpole", about="Leave episodes out")

@@ -41,7 +41,7 @@ from sarl_core.mining.validation.holding_out import (
     more_episodes,
     with_held_out,
 )
-from sarl_core.mining.validation.learning_curve import LearningCurve
+from sarl_core.mining.validation.learning_curve import MiningCurve
 from sarl_core.mining.validation.stability import Band, RuleStability, Stability
 
 
@@ -303,14 +303,14 @@ def test_pairs_of_states_differ_and_the_nearest_come_first(lander_like):
 
 def test_the_curve_draws_mean_and_range():
     values = np.array([[1.0, 2.0, np.nan], [3.0, 2.0, np.nan]])
-    curve = LearningCurve(np.array([1, 5, 9]), values, values, values, values, "not yet used")
+    curve = MiningCurve(np.array([1, 5, 9]), values, values, values, values, "not yet used")
     for layer in figures.CURVE_TITLES:
         band, line = figures.curve_figure(curve, layer).data
         assert list(line.x) == [1, 5]
         assert list(line.y) == [2.0, 2.0]
         assert list(band.y) == [3.0, 2.0, 2.0, 1.0]
     nothing = np.full((2, 3), np.nan)
-    empty = LearningCurve(np.array([1, 5, 9]), values, values, values, nothing, "not yet used")
+    empty = MiningCurve(np.array([1, 5, 9]), values, values, values, nothing, "not yet used")
     assert len(figures.curve_figure(empty, "fidelity").data[1].x) == 0
 
 

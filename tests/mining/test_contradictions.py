@@ -78,7 +78,7 @@ def test_counts_an_episode_are_sums_of_the_flags():
     for dimension in (None, 0, 1):
         for one in by_episode(shown, found, dimension):
             rows = shown.episodes == one.episode
-            assert one.contradicting == found.found(dimension)[rows].sum()
+            assert one.contradicting == found.contradicting(dimension)[rows].sum()
     assert [one.share for one in by_episode(shown, found)] == sorted(
         (one.share for one in by_episode(shown, found)), reverse=True
     )

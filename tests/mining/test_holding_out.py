@@ -17,12 +17,12 @@ from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.validation.episode_counts import count_rules
 from sarl_core.mining.validation.evidence import HeldOut, held_out_of
 from sarl_core.mining.validation.holding_out import (
+    best_lower_bound,
     count_held_out,
     episodes_needed,
     hold_out,
     lower_bound,
     more_episodes,
-    most_shown,
     shortfall,
     verdict,
     with_held_out,
@@ -266,15 +266,15 @@ def test_a_rule_set_is_filtered_by_the_lower_bound(lander_like):
 
 @given(st.integers(5, 400))
 def test_no_rule_shows_more_than_one_that_is_never_wrong(episodes):
-    most = most_shown(episodes)
+    most = best_lower_bound(episodes)
     assert most == pytest.approx(t_interval(np.ones(episodes))[0])
-    assert most_shown(episodes + 1) > most
+    assert best_lower_bound(episodes + 1) > most
     wrong_once = np.append(np.ones(episodes - 1), 0.9)
     assert lower_bound(rule_of(100, 98, wrong_once)) < most
 
 
 def test_few_episodes_show_nothing_at_all():
-    assert [most_shown(episodes) for episodes in range(5)] == [0.0] * 5
+    assert [best_lower_bound(episodes) for episodes in range(5)] == [0.0] * 5
 
 
 def test_what_is_met_too_rarely_is_told_from_what_is_too_often_wrong():

@@ -159,7 +159,7 @@ def test_stability_is_what_sets_of_rows_say(steps_of_two):
                 if b.feature == band.feature
             ]
             values = [value for value in values if np.isfinite(value)]
-            assert band.found == len(values)
+            assert band.rounds == len(values)
             if values:
                 expected = np.quantile(values, [0.05, 0.95])
                 assert (band.low, band.high) == pytest.approx(tuple(expected))

@@ -68,7 +68,7 @@ def test_the_nearest_of_the_shortest(
     assert digits_of(found) == digits_of(short)
     assert abs(found - threshold) <= abs(short - threshold)
     assert rounding.rounded == 1
-    assert rounding.kept == ()
+    assert rounding.unrounded == ()
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6), st.floats(0, 1))
@@ -123,7 +123,7 @@ def test_rules_that_share_a_query_count_once_and_go_on_sharing_it() -> None:
     nodes = tree_of(list(enumerate(rounding.rule_set.rules)))
     assert nodes is not None
     inner = [node for node in nodes if node.feature >= 0]
-    assert rounding.rounded + len(rounding.kept) == len(inner) == 2
+    assert rounding.rounded + len(rounding.unrounded) == len(inner) == 2
 
 
 def test_what_no_state_proves_stays_and_is_listed(lander_like: Demonstrations) -> None:
@@ -131,7 +131,7 @@ def test_what_no_state_proves_stays_and_is_listed(lander_like: Demonstrations) -
     rounding = rounded_rules(rules, lander_like)
     assert rounding.rule_set == rules
     assert rounding.rounded == 0
-    (kept,) = rounding.kept
+    (kept,) = rounding.unrounded
     assert (kept.feature, kept.threshold, kept.rules, kept.why) == (
         0,
         1234.5678901,
@@ -148,7 +148,7 @@ def test_what_has_no_shorter_neighbour_stays_and_is_listed() -> None:
     once = rounded_rules(rules, demonstrations).rule_set
     again = rounded_rules(once, demonstrations)
     assert again.rounded == 0
-    assert [kept.why for kept in again.kept] == [SHORTEST]
+    assert [kept.why for kept in again.unrounded] == [SHORTEST]
     assert again.rule_set == once
 
 
@@ -208,10 +208,10 @@ def test_a_narrow_rule_by_hand_is_not_rounded_away() -> None:
     assert found.rule_set.rules[0].conditions == path
     assert found.rule_set.rules[1].conditions == path[:1]
     assert hand.applies(np.float32([[0.47]])).all()
-    listed = {(one.threshold, one.why) for one in found.kept}
+    listed = {(one.threshold, one.why) for one in found.unrounded}
     assert (0.4621, EMPTIED) in listed
     assert {threshold for threshold, _ in listed} >= {0.4621, 0.4867}
-    for one in found.kept:
+    for one in found.unrounded:
         if one.why == EMPTIED:
             assert set(one.rules) == {"hand", "other"}
     # Without it the other rule is rounded as ever.

@@ -188,8 +188,8 @@ def _require_action(guess: Guess, values: Values) -> None:
             f"it is unclear which column is the action, {letter!r} or {listed(rivals)}; call it "
             "'action', or map the columns"
         )
-    told = columns.reward or columns.terminated or columns.truncated or columns.last
-    if not (labels or told or all(map(vocabulary.is_state_word, columns.observations))):
+    roles = columns.reward or columns.terminated or columns.truncated or columns.last
+    if not (labels or roles or all(map(vocabulary.is_state_word, columns.observations))):
         raise InputError(
             f"it is unclear whether the column {letter!r} is the action or a feature; call the "
             "action 'action', or map the columns"
@@ -219,7 +219,7 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
     """Features that hold what another one holds a step later."""
     features = guess.columns.observations
     follows = _followers(features, values, together)
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     if guess.prefixed:
         named = vocabulary.next_states(features)
         return {
@@ -234,9 +234,9 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
     written = complete and (len(bases) > 1 or all(map(vocabulary.is_state_word, bases)))
     for name, base in vocabulary.perhaps_next_states(features, numbered=True).items():
         if written or follows.get(name) == base:
-            found[name] = f"it holds the next {base!r}"
+            reasons[name] = f"it holds the next {base!r}"
     for name, base in follows.items():
-        if name in found or base in found or vocabulary.says_before(base):
+        if name in reasons or base in reasons or vocabulary.says_before(base):
             continue
         if vocabulary.says_before(name) or name in vocabulary.next_states(features):
             continue
@@ -245,7 +245,7 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
             f"state does not know the next; take {name!r} out, call it 'next_{base}', or call "
             f"{base!r} 'previous_{name}' if it is the earlier one, or map the columns"
         )
-    return found
+    return reasons
 
 
 def _followers(
@@ -255,13 +255,13 @@ def _followers(
     if np.count_nonzero(together) < _LEAST_ROWS:
         return {}
     later = {values[name][1:][together].tobytes(): name for name in features}
-    found = {}
+    followed = {}
     for name in features:
         held = values[name][:-1][together]
         base = later.get(held.tobytes())
         if base is not None and base != name and np.count_nonzero(np.diff(held)) >= _LEAST_CHANGES:
-            found[name] = base
-    return found
+            followed[name] = base
+    return followed
 
 
 def _counts(values: NDArray[Any], together: NDArray[np.bool_] | None) -> bool:

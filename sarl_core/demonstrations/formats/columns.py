@@ -287,18 +287,18 @@ def unclear_columns(
         An error that names them and says what to do.
     """
     one = len(columns) == 1
-    told = (
+    sentence = (
         f"it is unclear of the column {columns[0]!r} {what}"
         if one
         else f"it is unclear whether the columns {listed(columns)} are features"
     )
     return InputError(
-        f"{told}, among {listed(names)}; rename one that is a feature (by another word, or call "
-        "every feature 'obs_' and a name), take out one that is none, or map the columns"
+        f"{sentence}, among {listed(names)}; rename one that is a feature (by another word, or "
+        "call every feature 'obs_' and a name), take out one that is none, or map the columns"
     )
 
 
-def told_guess(guess: Guess) -> tuple[str, ...]:
+def guess_notes(guess: Guess) -> tuple[str, ...]:
     """Sentences on what was guessed.
 
     Args:
@@ -326,8 +326,8 @@ def told_guess(guess: Guess) -> tuple[str, ...]:
             by_reason.setdefault(why, []).append(name)
     for why, left in by_reason.items():
         one = len(left) == 1
-        told = f"the column{'' if one else 's'} {listed(left)} {'was' if one else 'were'} not used"
-        notes.append(told if why == _NO_OBSERVATION else f"{told}: {why}")
+        note = f"the column{'' if one else 's'} {listed(left)} {'was' if one else 'were'} not used"
+        notes.append(note if why == _NO_OBSERVATION else f"{note}: {why}")
     return tuple(notes)
 
 
@@ -379,8 +379,8 @@ def refuse_doubled(names: Sequence[str]) -> None:
 def listed(names: Iterable[str], limit: int = 12) -> str:
     """Names for a sentence, the first few of them."""
     names = list(names)
-    shown = ", ".join(map(quoted, names[:limit]))
-    return shown if len(names) <= limit else f"{shown} and {len(names) - limit:,} more"
+    first = ", ".join(map(quoted, names[:limit]))
+    return first if len(names) <= limit else f"{first} and {len(names) - limit:,} more"
 
 
 def _actions(names: Sequence[str]) -> tuple[str, ...]:
@@ -397,13 +397,13 @@ def _actions(names: Sequence[str]) -> tuple[str, ...]:
 
 def _singles(names: Sequence[str], actions: Sequence[str]) -> dict[str, str]:
     """The first column for each role; another one for the same role is no second."""
-    found: dict[str, str] = {}
+    by_role: dict[str, str] = {}
     for role, patterns in vocabulary.ROLES.items():
-        free = [name for name in names if name not in actions and name not in found.values()]
+        free = [name for name in names if name not in actions and name not in by_role.values()]
         name = vocabulary.first_of(free, patterns)
         if name is not None:
-            found[role] = name
-    return found
+            by_role[role] = name
+    return by_role
 
 
 def _why_unused(name: str, names: Sequence[str]) -> str | None:
@@ -485,7 +485,7 @@ def _numbers(columns: tuple[str, ...], prefixes: str) -> list[int] | None:
         counted = [rest for rest in rests if rest is not None and re.fullmatch(r"\d{1,9}", rest)]
         return [int(rest) for rest in counted] if len(counted) == len(columns) else None
     matches = [_NUMBERED.fullmatch(column) for column in columns]
-    found = [match for match in matches if match is not None]
-    if len(found) < len(columns) or len({match[1] for match in found}) != 1:
+    numbered = [match for match in matches if match is not None]
+    if len(numbered) < len(columns) or len({match[1] for match in numbered}) != 1:
         return None
-    return [int(match[2]) for match in found]
+    return [int(match[2]) for match in numbered]

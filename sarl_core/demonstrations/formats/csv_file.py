@@ -16,7 +16,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.parquet_file import column_from_arrow
-from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
+from sarl_core.demonstrations.formats.tables import TableColumn, check_names, columns_of
 from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
@@ -67,7 +67,7 @@ class CsvTable:
         """CSV carries none."""
         return Metadata()
 
-    def read(self, columns: ColumnMap) -> dict[str, Column]:
+    def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.
 
         Args:
@@ -172,15 +172,15 @@ class CsvTable:
                     strings_can_be_null=False,
                 ),
             ):
-                found: list[tuple[int, str, str]] = []
+                misfits: list[tuple[int, str, str]] = []
                 for name in suspects:
                     fields = block.column(name)
                     matches = pc.match_substring_regex(fields, pattern, ignore_case=True)
                     place = pc.index(matches, False).as_py()
                     if place >= 0:
-                        found.append((place, name, fields[place].as_py()))
-                if found:
-                    place, name, field = min(found)
+                        misfits.append((place, name, fields[place].as_py()))
+                if misfits:
+                    place, name, field = min(misfits)
                     raise InputError(
                         f"column {quoted(name)} holds {quoted(field)} in "
                         f"{self._place(row + place + 1)}, which is no number; mend that row"
@@ -201,9 +201,9 @@ class CsvTable:
         return f"row {row} (line {self.first_line - 1 + _line_of(self.body, row)})"
 
 
-def _as_float32(column: Column) -> Column:
+def _as_float32(column: TableColumn) -> TableColumn:
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
-        return Column(column.values.astype(np.float32, copy=False), column.missing)
+        return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
 
 
 class _Lines(NamedTuple):

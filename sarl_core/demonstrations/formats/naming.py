@@ -30,5 +30,5 @@ def naming_both(files: tuple[str, str]) -> Iterator[None]:
         yield
     except InputError as error:
         unnamed = [name for name in names if name not in str(error)]
-        told = f" (it was read together with {unnamed[0]!r})" if unnamed else ""
-        raise InputError(f"{error}{told}") from error.__cause__
+        note = f" (it was read together with {unnamed[0]!r})" if unnamed else ""
+        raise InputError(f"{error}{note}") from error.__cause__

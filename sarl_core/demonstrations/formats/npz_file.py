@@ -268,5 +268,5 @@ def _require_width(promises: Mapping[str, Promise], keys: Mapping[str, str]) -> 
 
 def _needed(what: str, promise: Promise) -> int:
     """Bytes of an array as it is in the file, and of what it becomes: half of the peak."""
-    kept = {"observations": 4, KEY: 0}.get(what, 8)
-    return math.prod(promise.shape) * max(promise.dtype.itemsize, kept)
+    itemsize = {"observations": 4, KEY: 0}.get(what, 8)
+    return math.prod(promise.shape) * max(promise.dtype.itemsize, itemsize)

@@ -21,26 +21,26 @@ from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
     Guess,
     action_names,
+    guess_notes,
     guess_roles,
     listed,
     require_clear,
-    told_guess,
 )
 from sarl_core.demonstrations.formats.csv_file import CsvTable, open_csv
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.tables import (
-    Column,
     Table,
+    TableColumn,
     action_block,
+    coarse_notes,
     episode_fields,
     given,
     names_of_features,
     numbers_of,
     observation_block,
     require_filled,
-    told_coarse,
 )
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
 from sarl_core.environments.description import EnvironmentDescription
@@ -173,7 +173,7 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         seen = _observations_of(table)
         features = seen.guess.columns.observations
         observed = observation_block(seen.read, features)
-        coarse = told_coarse(table, features, observed)
+        coarse = coarse_notes(table, features, observed)
     with naming(names[1]):
         taken = _actions_of(others)
         done = action_block(taken.read, taken.guess.columns.actions)
@@ -207,7 +207,7 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
     )
 
 
-def told_pair(names: tuple[str, str]) -> str:
+def pair_note(names: tuple[str, str]) -> str:
     """The note on a pair that was joined.
 
     Args:
@@ -220,7 +220,7 @@ def told_pair(names: tuple[str, str]) -> str:
     return f"the observations are those of {seen!r}, and the actions those of {done!r}"
 
 
-def told_alone(name: str, partner: str) -> str:
+def alone_note(name: str, partner: str) -> str:
     """The note on a file that was read without the one beside it.
 
     Args:
@@ -238,7 +238,7 @@ class _Half:
     """What one file of a pair holds."""
 
     guess: Guess
-    read: dict[str, Column]
+    read: dict[str, TableColumn]
     notes: tuple[str, ...]
 
 
@@ -254,7 +254,7 @@ def _observations_of(table: CsvTable) -> _Half:
     guess = settle(guess, {name: column.values for name, column in read.items()})
     read = {name: read[name] for name in guess.columns.used}
     require_filled(read)
-    return _Half(guess, read, told_guess(guess))
+    return _Half(guess, read, guess_notes(guess))
 
 
 def _actions_of(table: CsvTable) -> _Half:
@@ -294,10 +294,10 @@ def _together(
     notes = (*halves[0].notes, *halves[1].notes)
     if len(observed) != len(done) and "episode" in single[0]:
         episodes = single[0]["episode"]
-        kept = np.append(episodes[1:] == episodes[:-1], False)
-        if np.count_nonzero(kept) == len(done):
-            observed = observed[kept]
-            single[0] = {role: values[kept] for role, values in single[0].items()}
+        followed = np.append(episodes[1:] == episodes[:-1], False)
+        if np.count_nonzero(followed) == len(done):
+            observed = observed[followed]
+            single[0] = {role: values[followed] for role, values in single[0].items()}
             notes = (*notes, "the last observation of each episode has no action and was dropped")
     for role in single[0].keys() & single[1].keys():
         first, second = single[0][role], single[1][role]
@@ -320,14 +320,14 @@ def _own_actions(table: CsvTable, partner: str) -> tuple[str, ...]:
     """Columns of a file of observations that hold actions."""
     if not table.named:
         return ()
-    found = guess_roles(table.names).columns.actions
+    actions = guess_roles(table.names).columns.actions
     doubtful = [name for name in table.names if is_perhaps_action(name)]
-    if doubtful and (not found or set(found) <= set(doubtful)):
+    if doubtful and (not actions or set(actions) <= set(doubtful)):
         raise InputError(
             f"it is unclear whether {listed(doubtful)} is its action or {partner!r} beside it "
             "holds the actions; call it 'action' if it is, or 'obs_' and a name"
         )
-    return found
+    return actions
 
 
 def _own_observations(table: CsvTable) -> tuple[str, ...]:
@@ -349,14 +349,14 @@ def _require_half(table: CsvTable, half: _Half, other: _Half, partner: str, what
         for column in (column.values for column in other.read.values())
     ]
     held = [name for name in copies if name is not None]
-    told = f"{listed(held)} {'holds' if len(held) == 1 else 'hold'} what {partner!r} holds"
+    surplus = f"{listed(held)} {'holds' if len(held) == 1 else 'hold'} what {partner!r} holds"
     if len(held) < len(copies):
         held = [name for name, column in half.read.items() if numbers_episodes(column.values)]
-        told = f"{listed(held)} {'numbers' if len(held) == 1 else 'number'} the episodes"
+        surplus = f"{listed(held)} {'numbers' if len(held) == 1 else 'number'} the episodes"
     if held:
         raise InputError(
-            f"it has no header, and its {told}, so it holds more than {what}; write a header that "
-            "says what its columns are (as obs_0, ..., action, episode), or keep the "
+            f"it has no header, and its {surplus}, so it holds more than {what}; write a header "
+            "that says what its columns are (as obs_0, ..., action, episode), or keep the "
             f"{what} alone"
         )
 

@@ -23,7 +23,7 @@ from sarl_core.demonstrations.formats.parquet_pages import (
     footer_size,
     largest_chunk,
 )
-from sarl_core.demonstrations.formats.tables import Column, check_names, columns_of
+from sarl_core.demonstrations.formats.tables import TableColumn, check_names, columns_of
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import read_limit, require_memory, table_memory
 
@@ -53,7 +53,7 @@ class ParquetTable:
         """Columns of Parquet always have names."""
         return True
 
-    def read(self, columns: ColumnMap) -> dict[str, Column]:
+    def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.
 
         Args:
@@ -65,7 +65,7 @@ class ParquetTable:
         Raises:
             InputError: If a column holds lists or text, or the file is damaged.
         """
-        with _damage_told():
+        with _refusing_damage():
             schema, rows = self.file.schema_arrow, self.file.metadata.num_rows
             for name in columns.used:
                 _require_flat(name, schema.field(name).type)
@@ -109,7 +109,7 @@ def open_parquet(data: memoryview) -> ParquetTable:
         raise InputError(
             "its list of columns and row groups is far too long; save it in fewer row groups"
         )
-    with _damage_told():
+    with _refusing_damage():
         file = _opened(data)
         names = tuple(file.schema_arrow.names)
         rows = file.metadata.num_rows
@@ -124,7 +124,7 @@ def open_parquet(data: memoryview) -> ParquetTable:
 
 
 @contextmanager
-def _damage_told() -> Iterator[None]:
+def _refusing_damage() -> Iterator[None]:
     """Turn what Arrow raises on a damaged file into one sentence."""
     import pyarrow as pa
 
@@ -143,7 +143,7 @@ def _opened(data: memoryview, texts: Sequence[str] = ()) -> Any:
     return pq.ParquetFile(pa.BufferReader(pa.py_buffer(data)), read_dictionary=list(texts))
 
 
-def _column(file: Any, name: str, dtype: Any) -> Column:
+def _column(file: Any, name: str, dtype: Any) -> TableColumn:
     """One column, brought into its final form batch by batch."""
     rows = file.metadata.num_rows
     values: NDArray[Any] | None = None
@@ -165,7 +165,7 @@ def _column(file: Any, name: str, dtype: Any) -> Column:
         at = end
     if values is None or at != rows:
         raise _damaged()
-    return Column(values, missing)
+    return TableColumn(values, missing)
 
 
 def _places(file: Any) -> dict[str, int]:
@@ -212,7 +212,7 @@ def write_parquet(demonstrations: Demonstrations, out: BinaryIO) -> None:
     )
 
 
-def column_from_arrow(name: str, column: Any, start: int = 0) -> Column:
+def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
     """Numbers of an Arrow column.
 
     Args:
@@ -235,22 +235,22 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> Column:
     if pa.types.is_decimal(kind):
         column, kind = pc.cast(column, pa.float64()), pa.float64()
     if not _is_numeric(kind):
-        found = pc.index(pc.is_valid(column), True).as_py()
-        if found < 0:
+        place = pc.index(pc.is_valid(column), True).as_py()
+        if place < 0:
             raise InputError(
                 f"column {quoted(name)} is empty in row {start + 1}; fill it or leave it out"
             )
         raise InputError(
-            f"column {quoted(name)} holds {quoted(_value(column[found]))} in row "
-            f"{start + found + 1}, which is no number; mend that row"
+            f"column {quoted(name)} holds {quoted(_value(column[place]))} in row "
+            f"{start + place + 1}, which is no number; mend that row"
         )
     if column.null_count == 0:
-        return Column(_numbers(column))
+        return TableColumn(_numbers(column))
     missing = np.asarray(pc.is_null(column).to_numpy(zero_copy_only=False))
     if pa.types.is_null(kind):
-        return Column(np.full(len(column), np.nan), missing)
+        return TableColumn(np.full(len(column), np.nan), missing)
     filler = pa.scalar(float("nan") if pa.types.is_floating(kind) else 0, pa.float64()).cast(kind)
-    return Column(_numbers(pc.fill_null(column, filler)), missing)
+    return TableColumn(_numbers(pc.fill_null(column, filler)), missing)
 
 
 def _numbers(column: Any) -> NDArray[Any]:

@@ -44,11 +44,11 @@ def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
     Raises:
         InputError: If the footer and the pages do not fit, or there are far too many pages.
     """
-    largest = pages = found = 0
+    largest = pages = group_rows = 0
     try:
         footer, _ = _structure(data, len(data) - 8 - footer_size(data), 0)
         for group in footer.get(_GROUPS) or ():
-            found += group[_ROWS]
+            group_rows += group[_ROWS]
             for column in columns:
                 size, count = _chunk(data, group[_CHUNKS][column][_SAID], group[_ROWS])
                 largest, pages = max(largest, size), pages + count
@@ -58,7 +58,7 @@ def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
                     )
     except (IndexError, KeyError, TypeError, AttributeError) as error:
         raise _damaged() from error
-    if found != rows:
+    if group_rows != rows:
         raise _damaged()
     return largest
 
@@ -133,14 +133,14 @@ def _list(data: memoryview, at: int, depth: int) -> tuple[list[Any], int]:
     size = head >> 4
     if size == 15:
         size, at = _varint(data, at)
-    found = []
+    structures = []
     for _ in range(size):
         value, at = _value(data, at, head & 15, depth + 1)
         if at > len(data):
             raise IndexError
         if isinstance(value, dict):
-            found.append(value)
-    return found, at
+            structures.append(value)
+    return structures, at
 
 
 def _whole(data: memoryview, at: int) -> tuple[int, int]:

@@ -25,8 +25,8 @@ from sarl_core.demonstrations.requirements import (
     require_length,
     require_order,
     require_within,
-    told_of_whole_numbers,
     whole_numbers,
+    whole_numbers_note,
     without_fraction,
 )
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
@@ -216,7 +216,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
 def _checked(recording: Recording) -> Recording:
     """Number the episodes and check what else there is, under the file's own names."""
     n = len(recording.actions)
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for attribute, role, check in (
         ("episodes", "episode", whole_numbers),
         ("steps", "step", whole_numbers),
@@ -226,8 +226,8 @@ def _checked(recording: Recording) -> Recording:
     ):
         values = getattr(recording, attribute)
         if values is not None:
-            found[attribute] = check(values, n, _called(recording, role), recording.rows)
-    recording = _in_episodes(replace(recording, **found))
+            columns[attribute] = check(values, n, _called(recording, role), recording.rows)
+    recording = _in_episodes(replace(recording, **columns))
     require_order(
         _some(recording.episodes),
         recording.steps,
@@ -299,22 +299,22 @@ def _is_discrete(
     actions = recording.actions
     columns = actions.reshape(len(actions), -1).T
     if actions.dtype.kind != "f":
-        return True, _told_of_many(columns, recording.action_columns)
+        return True, _many_labels_note(columns, recording.action_columns)
     single = recording.guess_labels and len(columns) == 1
     if single and is_whole(columns[0]) and len(np.unique(columns[0])) <= FEW_VALUES:
         return True, (
             "the actions are whole numbers with a decimal point and were taken as labels; name the "
             "environment if they are continuous"
         )
-    told = (
-        told_of_whole_numbers(column, name, recording.rows)
+    notes = (
+        whole_numbers_note(column, name, recording.rows)
         for name, column in zip(recording.action_columns, columns, strict=True)
         if single or not without_fraction(column).all()
     )
-    return False, next((note for note in told if note is not None), None)
+    return False, next((note for note in notes if note is not None), None)
 
 
-def _told_of_many(columns: NDArray[Any], names: Sequence[str]) -> str | None:
+def _many_labels_note(columns: NDArray[Any], names: Sequence[str]) -> str | None:
     """A sentence on labels that are so many that they may be amounts."""
     for name, column in zip(names, columns, strict=True):
         different = len(np.unique(column))

@@ -13,14 +13,14 @@ from sarl_core.demonstrations.formats.csv_file import open_csv, write_csv
 from sarl_core.demonstrations.formats.naming import naming, naming_both
 from sarl_core.demonstrations.formats.npz_file import read_npz, write_npz
 from sarl_core.demonstrations.formats.pair import (
+    alone_note,
     fits,
     holds_actions,
     is_complete,
     pair_in_folder,
+    pair_note,
     partner_names,
     read_pair,
-    told_alone,
-    told_pair,
 )
 from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, write_parquet
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
@@ -34,7 +34,7 @@ Content = bytes | bytearray | memoryview | BinaryIO
 
 
 @dataclass(frozen=True)
-class Format:
+class FileFormat:
     """How files of one extension are read and written.
 
     Attributes:
@@ -51,9 +51,9 @@ class Format:
 
 
 _FORMATS = {
-    ".parquet": Format("Parquet", write_parquet, open_table=open_parquet),
-    ".csv": Format("CSV", write_csv, open_table=open_csv),
-    ".npz": Format("NPZ", write_npz, read=read_npz),
+    ".parquet": FileFormat("Parquet", write_parquet, open_table=open_parquet),
+    ".csv": FileFormat("CSV", write_csv, open_table=open_csv),
+    ".npz": FileFormat("NPZ", write_npz, read=read_npz),
 }
 EXTENSIONS = tuple(_FORMATS)
 
@@ -103,12 +103,12 @@ def load_demonstrations(
                 (path.with_name(name) for name in names if path.with_name(name).is_file()), None
             )
             if partner is None:
-                return _read(_content(path), path.name, description, columns, str(path))
+                return _read(_content(path), path.name, description, columns)
             content = _content(path)
             _check_signature(content, path.name)
             if is_complete(content, path.name, partner.name, description):
-                alone = _read(content, path.name, description, columns, str(path))
-                return _noted(alone, told_alone(path.name, partner.name))
+                alone = _read(content, path.name, description, columns)
+                return _noted(alone, alone_note(path.name, partner.name))
             pair = (partner, path) if holds_actions(path.name) else (path, partner)
         contents = _content(pair[0]), _content(pair[1])
     return _read_pair(contents, (str(pair[0]), str(pair[1])), description)
@@ -210,7 +210,7 @@ def _read_named(
     columns: ColumnMap | None,
 ) -> Demonstrations:
     with naming(name):
-        return _read(content, name, description, columns, name)
+        return _read(content, name, description, columns)
 
 
 def _read(
@@ -218,7 +218,6 @@ def _read(
     name: str,
     description: EnvironmentDescription | None,
     columns: ColumnMap | None,
-    shown: str,
 ) -> Demonstrations:
     form = _format(name)
     _check_signature(content, name)
@@ -256,14 +255,14 @@ def _read_pair(
                 _check_signature(content, name)
         recording = read_pair(*contents, names)
         with naming(f"{names[0]} with {names[1]}"):
-            return _noted(to_demonstrations(recording, description), told_pair(names))
+            return _noted(to_demonstrations(recording, description), pair_note(names))
 
 
 def _noted(demonstrations: Demonstrations, note: str) -> Demonstrations:
     return replace(demonstrations, notes=(*demonstrations.notes, note))
 
 
-def _format(name: str) -> Format:
+def _format(name: str) -> FileFormat:
     extension = PurePath(name).suffix.lower()
     if extension not in _FORMATS:
         says = f"ends in {extension!r}" if extension else "has no extension"
@@ -277,12 +276,14 @@ def _check_signature(content: memoryview, name: str) -> None:
     kind = _FORMATS[extension].kind
     if len(content) == 0:
         raise InputError("it is empty (0 bytes); save or download it again")
-    found = next((entry for entry in _SIGNATURES if bytes(content[:6]).startswith(entry[0])), None)
-    if found is not None and found[2] != extension:
-        _, what, right = found
+    signature = next(
+        (entry for entry in _SIGNATURES if bytes(content[:6]).startswith(entry[0])), None
+    )
+    if signature is not None and signature[2] != extension:
+        _, what, right = signature
         cure = f"name it {right}" if right is not None else f"save it as {EXTENSIONS[0]} or {kind}"
         raise InputError(f"it is named {extension}, but its content is {what}; {cure}")
-    if found is None and extension != ".csv":
+    if signature is None and extension != ".csv":
         raise InputError(
             f"it is named {extension}, but its content is not {kind}; if it is text, name it .csv"
         )

@@ -17,11 +17,11 @@ from sarl_core.demonstrations.formats.columns import (
     action_names,
     check_map,
     feature_names,
+    guess_notes,
     guess_roles,
     listed,
     refuse_doubled,
     require_clear,
-    told_guess,
     unclear_columns,
 )
 from sarl_core.demonstrations.formats.metadata import Metadata
@@ -50,12 +50,12 @@ class Table(Protocol):
     def metadata(self) -> Metadata:
         """What the file says besides."""
 
-    def read(self, columns: ColumnMap) -> dict[str, Column]:
+    def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses."""
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """Numbers of one column.
 
     Attributes:
@@ -115,18 +115,18 @@ def recording_from_table(
             guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
         require_clear(guess, table.names)
     check_map(guess.columns, table.names)
-    read, kept, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
+    read, rows, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
     if guessed:
         guess = settle(guess, {name: column.values for name, column in read.items()})
-        notes = told_guess(guess)
+        notes = guess_notes(guess)
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
-    require_filled(read, kept)
+    require_filled(read, rows)
     single = {role: read[name].values for role, name in chosen.singles.items()}
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
     observations = observation_block(read, chosen.observations)
-    coarse = told_coarse(table, chosen.observations, observations, kept)
+    coarse = coarse_notes(table, chosen.observations, observations, rows)
     return Recording(
         observations=observations,
         actions=action_block(read, chosen.actions),
@@ -136,7 +136,7 @@ def recording_from_table(
         or (names_of_features(guess, table.named) if named else None),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
         **fields,
-        rows=kept,
+        rows=rows,
         guess_labels=not _is_vector(chosen.actions),
         names={role: f"column {name!r}" for role, name in chosen.singles.items()},
         metadata=metadata,
@@ -230,7 +230,7 @@ def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     return {name: column.values for name, column in read.items()}
 
 
-def require_filled(read: Mapping[str, Column], rows: NDArray[np.int64] | None = None) -> None:
+def require_filled(read: Mapping[str, TableColumn], rows: NDArray[np.int64] | None = None) -> None:
     """Refuse an empty field.
 
     Args:
@@ -249,7 +249,7 @@ def require_filled(read: Mapping[str, Column], rows: NDArray[np.int64] | None = 
             )
 
 
-def observation_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[np.float32]:
+def observation_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArray[np.float32]:
     """Columns side by side, shape (N, d)."""
     observations = np.empty((len(read[names[0]].values), len(names)), dtype=np.float32)
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
@@ -258,7 +258,7 @@ def observation_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArr
     return observations
 
 
-def told_coarse(
+def coarse_notes(
     table: Table,
     names: Sequence[str],
     observations: NDArray[np.float32],
@@ -289,7 +289,7 @@ def told_coarse(
     return tuple(notes)
 
 
-def action_block(read: Mapping[str, Column], names: Sequence[str]) -> NDArray[Any]:
+def action_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArray[Any]:
     """Actions of shape (N,), or (N, m) where the columns' names say that they are vectors."""
     columns = [read[name].values for name in names]
     for name, values in zip(names, columns, strict=True):
@@ -388,8 +388,8 @@ def _is_vector(actions: Sequence[str]) -> bool:
 
 
 def _without_empty_ends(
-    read: dict[str, Column], chosen: ColumnMap
-) -> tuple[dict[str, Column], NDArray[np.int64] | None, tuple[str, ...]]:
+    read: dict[str, TableColumn], chosen: ColumnMap
+) -> tuple[dict[str, TableColumn], NDArray[np.int64] | None, tuple[str, ...]]:
     """Drop rows without an action at the end of each episode: an observation nobody acted on.
 
     Returns:
@@ -406,15 +406,17 @@ def _without_empty_ends(
         ends[:-1] = episodes[1:] != episodes[:-1]
     if not np.array_equal(without, ends):
         return read, None, ()
-    kept = np.flatnonzero(~ends)
+    rows = np.flatnonzero(~ends)
     shorter = {
-        name: Column(column.values[kept], None if column.missing is None else column.missing[kept])
+        name: TableColumn(
+            column.values[rows], None if column.missing is None else column.missing[rows]
+        )
         for name, column in read.items()
     }
-    return shorter, kept, ("the last row of each episode has no action and was dropped",)
+    return shorter, rows, ("the last row of each episode has no action and was dropped",)
 
 
-def _empty(column: Column) -> NDArray[np.bool_] | None:
+def _empty(column: TableColumn) -> NDArray[np.bool_] | None:
     """Where a column has no value, None if it has one everywhere."""
     empty = column.missing
     if column.values.dtype.kind == "f":

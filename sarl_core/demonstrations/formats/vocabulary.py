@@ -92,12 +92,12 @@ def next_states(names: Sequence[str]) -> dict[str, str]:
     """
     keys = {name: _words(name) for name in names}
     others = {words: name for name, words in keys.items() if not _marked(words)}
-    found = {}
+    bases = {}
     for name, words in keys.items():
         base = tuple(word for word in map(_unmarked, words) if word)
         if _marked(words) and base in others:
-            found[name] = others[base]
-    return found
+            bases[name] = others[base]
+    return bases
 
 
 def perhaps_next_states(names: Sequence[str], *, numbered: bool) -> dict[str, str]:
@@ -111,13 +111,13 @@ def perhaps_next_states(names: Sequence[str], *, numbered: bool) -> dict[str, st
         The other column for each of them.
     """
     keys = {_words(name): name for name in names}
-    found = {}
+    bases = {}
     for words, name in keys.items():
         for base in _shortened(words) + (_first_of_two(words) if numbered else []):
             if base in keys and keys[base] != name:
-                found[name] = keys[base]
+                bases[name] = keys[base]
                 break
-    return found
+    return bases
 
 
 def is_state_word(name: str) -> bool:
@@ -169,16 +169,16 @@ def _shortened(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     if not words:
         return []
     first, rest = words[0], words[1:]
-    found = [(first[1:], *rest)] if first[0] == "n" and len(first) > 1 else []
+    shorter = [(first[1:], *rest)] if first[0] == "n" and len(first) > 1 else []
     if first.startswith("new") and len(first) > len("new"):
-        found.append((first[len("new") :], *rest))
+        shorter.append((first[len("new") :], *rest))
     if first[-1] in "np" and len(first) > 1:
-        found.append((first[:-1], *rest))
+        shorter.append((first[:-1], *rest))
     if first in ("n", "p"):
-        found.append(rest)
+        shorter.append(rest)
     if rest[:1] in (("n",), ("p",)):
-        found.append((first, *rest[1:]))
-    return found
+        shorter.append((first, *rest[1:]))
+    return shorter
 
 
 def _first_of_two(words: tuple[str, ...]) -> list[tuple[str, ...]]:

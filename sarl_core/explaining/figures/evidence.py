@@ -16,7 +16,7 @@ from sarl_core.explaining.figures.colours import (
 from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.validation.contradictions import EpisodeContradictions
-from sarl_core.mining.validation.learning_curve import LearningCurve
+from sarl_core.mining.validation.learning_curve import MiningCurve
 
 CurveLayer = Literal["rules", "mean_length", "coverage", "fidelity"]
 CURVE_TITLES: dict[CurveLayer, str] = {
@@ -29,7 +29,7 @@ _LINE = LABEL_COLOURS[0]
 EPISODES_DRAWN = 60
 
 
-def curve_figure(curve: LearningCurve, layer: CurveLayer) -> go.Figure:
+def curve_figure(curve: MiningCurve, layer: CurveLayer) -> go.Figure:
     """One number of the rule sets of more and more episodes.
 
     Args:

@@ -145,7 +145,7 @@ def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
     if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
         return ""
     found = find_contradictions(demonstrations, divider=divider)
-    count = int(found.found().sum())
+    count = int(found.contradicting().sum())
     if not count:
         return (
             "None was found: wherever it came to the same state again, or nearly the same in "

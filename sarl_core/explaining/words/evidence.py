@@ -17,8 +17,8 @@ from sarl_core.mining.validation.evidence import HeldOut, Interval
 from sarl_core.mining.validation.holding_out import (
     Shortfall,
     Verdict,
+    best_lower_bound,
     episodes_needed,
-    most_shown,
     verdict,
 )
 from sarl_core.mining.validation.stability import Band
@@ -232,7 +232,7 @@ def remedy_text(short: Shortfall, there: int, *, in_command: bool = False) -> st
         return ""
     least = f" (--lower-bound {math.floor(100 * short.best) / 100:g})" if in_command else ""
     shows = f"the best of these rules shows {share_text(short.best, decimals=1)}"
-    most = most_shown(short.episodes)
+    most = best_lower_bound(short.episodes)
     if most >= short.least:
         more = "hold out" if 2 * short.episodes < there else "demonstrate"
         more = f"{more} more episodes, so that each rule is met in more of those held out"
@@ -311,7 +311,7 @@ def band_text(band: Band, feature: Feature) -> str:
     sign = "≤" if band.op == "<=" else ">"
     limit = limit_text(band.threshold, feature)
     own = f"{feature.name} {sign} {limit}{f' {feature.unit}' if feature.unit else ''}"
-    if not band.found:
+    if not band.rounds:
         return f"{own} (not asked again)"
     low = number_text(band.low, apart_from=band.high)
     high = number_text(band.high, apart_from=band.low)

@@ -195,9 +195,9 @@ class _Pairing:
         for with_action in (True, False):
             known: dict[object, list[int]] = defaultdict(list)
             for there in sorted(self.free[1], reverse=True):
-                known[_asked(self._rules[1][there], with_action)].append(there)
+                known[_region_key(self._rules[1][there], with_action)].append(there)
             for here in sorted(self.free[0]):
-                partners = known[_asked(self._rules[0][here], with_action)]
+                partners = known[_region_key(self._rules[0][here], with_action)]
                 if partners:
                     self._pair(here, partners.pop())
 
@@ -240,7 +240,7 @@ class _Pairing:
                 self._pair(ours[0], theirs[0])
 
 
-def _asked(rule: Rule, with_action: bool) -> object:
+def _region_key(rule: Rule, with_action: bool) -> object:
     return rule.dimension, region_of(rule), rule.action if with_action else None
 
 

@@ -111,7 +111,7 @@ def region_of(rule: Rule) -> tuple[Bounds, ...]:
 
 def _conditions(rule_set: RuleSet, asks: Sequence[Ask]) -> tuple[Condition, ...]:
     names = [feature.name for feature in rule_set.source.features]
-    found: dict[int, Bounds] = {}
+    intervals: dict[int, Bounds] = {}
     for name, op, threshold in asks:
         if name not in names:
             listed = ", ".join(names[:_MOST_NAMES]) + (", ..." * (len(names) > _MOST_NAMES))
@@ -125,25 +125,25 @@ def _conditions(rule_set: RuleSet, asks: Sequence[Ask]) -> tuple[Condition, ...]
                 f"the condition on {name!r} has the number {threshold}; give a finite one"
             )
         feature = names.index(name)
-        before = found.get(feature, Bounds(feature, -math.inf, math.inf))
-        found[feature] = (
+        before = intervals.get(feature, Bounds(feature, -math.inf, math.inf))
+        intervals[feature] = (
             before._replace(high=min(before.high, threshold))
             if op == "<="
             else before._replace(low=max(before.low, threshold))
         )
-    for bounds in found.values():
+    for bounds in intervals.values():
         _refuse_empty(bounds, names[bounds.feature])
-    return _queries(found.values())
+    return _queries(intervals.values())
 
 
 def _queries(bounds: Iterable[Bounds]) -> tuple[Condition, ...]:
-    found = []
+    conditions = []
     for feature, low, high in bounds:
         if math.isfinite(low):
-            found.append(Condition(feature, ">", low))
+            conditions.append(Condition(feature, ">", low))
         if math.isfinite(high):
-            found.append(Condition(feature, "<=", high))
-    return tuple(found)
+            conditions.append(Condition(feature, "<=", high))
+    return tuple(conditions)
 
 
 def _refuse_empty(bounds: Bounds, name: str) -> None:

@@ -53,12 +53,12 @@ class Rounding:
         rule_set: The rules; all but their thresholds is what it was.
         rounded: How many thresholds have become shorter. One that several rules share, because
             they share the beginning of their paths, counts once.
-        kept: Those that stayed as they were.
+        unrounded: Those that stayed as they were.
     """
 
     rule_set: RuleSet
     rounded: int
-    kept: tuple[KeptThreshold, ...]
+    unrounded: tuple[KeptThreshold, ...]
 
 
 class _Query(NamedTuple):
@@ -109,7 +109,7 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
     """Round every threshold that none of the rules asks which are to stay whole."""
     paths = [list(rule.conditions) for rule in rule_set.rules]
     rounded = 0
-    kept: list[KeptThreshold] = []
+    unrounded: list[KeptThreshold] = []
     for dimension in range(len(rule_set.actions)):
         places = [i for i, rule in enumerate(rule_set.rules) if rule.dimension == dimension]
         waiting = [(0, places, np.arange(columns.shape[1]))]
@@ -123,14 +123,16 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
                     paths[place][depth] = paths[place][depth]._replace(threshold=threshold)
                 if why:
                     ids = tuple(rule_set.rules[place].id for place in query.places)
-                    kept.append(KeptThreshold(dimension, query.feature, query.threshold, ids, why))
+                    unrounded.append(
+                        KeptThreshold(dimension, query.feature, query.threshold, ids, why)
+                    )
                 rounded += threshold != query.threshold
                 waiting += _sides(rule_set.rules, query, columns)
     rules = tuple(
         replace(rule, conditions=tuple(path))
         for rule, path in zip(rule_set.rules, paths, strict=True)
     )
-    return Rounding(replace(rule_set, rules=rules), rounded, tuple(kept))
+    return Rounding(replace(rule_set, rules=rules), rounded, tuple(unrounded))
 
 
 def _can_apply(rule: Rule) -> bool:
@@ -174,14 +176,14 @@ def _queries(
     rules: Sequence[Rule], group: list[int], depth: int, rows: NDArray[np.int64]
 ) -> list[_Query]:
     """What rules with the same beginning ask next; of rules of one tree, one query."""
-    asked: dict[tuple[int, float], list[int]] = {}
+    by_query: dict[tuple[int, float], list[int]] = {}
     for place in group:
         if rules[place].length > depth:
             condition = rules[place].conditions[depth]
-            asked.setdefault((condition.feature, condition.threshold), []).append(place)
+            by_query.setdefault((condition.feature, condition.threshold), []).append(place)
     return [
         _Query(depth, feature, threshold, tuple(places), rows)
-        for (feature, threshold), places in asked.items()
+        for (feature, threshold), places in by_query.items()
     ]
 
 

@@ -44,7 +44,7 @@ class Contradictions:
     neighbour: NDArray[np.int64]
     distance: NDArray[np.float64]
 
-    def found(self, dimension: int | None = None) -> Flags:
+    def contradicting(self, dimension: int | None = None) -> Flags:
         """Whether each pair contradicts another one, in one way or the other, (N,).
 
         Args:
@@ -125,20 +125,23 @@ def find_contradictions(
 
 
 def by_episode(
-    demonstrations: Demonstrations, found: Contradictions, dimension: int | None = None
+    demonstrations: Demonstrations, contradictions: Contradictions, dimension: int | None = None
 ) -> tuple[EpisodeContradictions, ...]:
     """Count contradictions an episode.
 
     Args:
         demonstrations: N pairs.
-        found: What `find_contradictions` found in them.
+        contradictions: What `find_contradictions` found in them.
         dimension: Of the action; None for any of them.
 
     Returns:
         The episode with the largest share of contradicting steps first.
     """
     which = slice(None) if dimension is None else slice(dimension, dimension + 1)
-    flags = [found.identical[:, which].any(axis=1), found.near[:, which].any(axis=1)]
+    flags = [
+        contradictions.identical[:, which].any(axis=1),
+        contradictions.near[:, which].any(axis=1),
+    ]
     flags.append(flags[0] | flags[1])
     starts = demonstrations.episode_starts
     counts = [np.add.reduceat(flag.astype(np.int64), starts).tolist() for flag in flags]
@@ -214,15 +217,17 @@ def _nearest_elsewhere(
         later = []
         pieces = max(-(-len(waiting) * wanted // _AT_ONCE), 1)
         for some in np.array_split(waiting, pieces):
-            found_far, found = tree.query(
+            distances, nearest = tree.query(
                 points[some], k=wanted, p=np.inf, distance_upper_bound=bound
             )
-            there = found < len(row)
-            elsewhere = there & (episode[np.minimum(found, len(row) - 1)] != episode[some][:, None])
+            there = nearest < len(row)
+            elsewhere = there & (
+                episode[np.minimum(nearest, len(row) - 1)] != episode[some][:, None]
+            )
             first, any_there = elsewhere.argmax(axis=1), elsewhere.any(axis=1)
             at = np.arange(len(some))
-            near[some] = np.where(any_there, found[at, first], -1)
-            far[some] = np.where(any_there, found_far[at, first], np.inf)
+            near[some] = np.where(any_there, nearest[at, first], -1)
+            far[some] = np.where(any_there, distances[at, first], np.inf)
             # All that were found are of its own episode: others may be further away.
             later.append(some[~any_there & there.all(axis=1) & (wanted < len(row))])
         waiting = np.concatenate(later)

@@ -78,7 +78,7 @@ class CrossFit:
         Returns:
             The same as mining at them once for each fold gives.
         """
-        found: list[tuple[Integers, ...]] = []
+        counted: list[tuple[Integers, ...]] = []
         for fold in self.folds:
             first = fold.counts[0]
             samples, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
@@ -95,8 +95,8 @@ class CrossFit:
                 ] = True
                 some, right = counts.together(chosen)
                 samples, correct = samples + some, correct + right
-            found.append((first.numbers, first.lengths, samples, correct))
-        numbers, lengths, samples, correct = map(np.concatenate, zip(*found, strict=True))
+            counted.append((first.numbers, first.lengths, samples, correct))
+        numbers, lengths, samples, correct = map(np.concatenate, zip(*counted, strict=True))
         return Judged(
             numbers=numbers,
             lengths=lengths,
@@ -146,8 +146,8 @@ class Judged:
         # 1 + K / (K - 1) times as much as that of as many independent numbers (Nadeau and Bengio,
         # "Inference for the generalization error", 2003).
         widened = (1.0 + self.folds / (self.folds - 1)) ** 0.5 if self.folds > 1 else 1.0
-        found = held_out_of(whole, part, whole_set=True, widened=widened)
-        return found if self.whole_episodes else found._replace(low=None, high=None)
+        held_out = held_out_of(whole, part, whole_set=True, widened=widened)
+        return held_out if self.whole_episodes else held_out._replace(low=None, high=None)
 
     @property
     def influence(self) -> Influence | None:
@@ -222,13 +222,13 @@ def cross_fit(
     episodes = parted.episodes[parted.episode_starts]
     order = episodes[np.random.default_rng(seed).permutation(count)]
     dealt = [order[first :: min(folds, count)] for first in range(min(folds, count))]
-    found = run_each(
+    fitted = run_each(
         fold_of,
         [(parted, some, divider) for some in dealt],
         executor=executor,
         progress=progress,
     )
-    return CrossFit(tuple(found), whole)
+    return CrossFit(tuple(fitted), whole)
 
 
 def fold_of(demonstrations: Demonstrations, episodes: Integers, divider: int) -> Fold:

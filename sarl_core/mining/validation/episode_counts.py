@@ -84,9 +84,9 @@ class EpisodeCounts:
             Pairs of each episode to which it applies, and those it is right about, (E,) each.
         """
         first, last = np.searchsorted(self.thing, [thing, thing + 1]).tolist()
-        found = np.zeros((2, len(self.numbers)), dtype=np.int64)
-        found[:, self.episode[first:last]] = self.samples[first:last], self.correct[first:last]
-        return found[0], found[1]
+        counts = np.zeros((2, len(self.numbers)), dtype=np.int64)
+        counts[:, self.episode[first:last]] = self.samples[first:last], self.correct[first:last]
+        return counts[0], counts[1]
 
 
 def episode_of_each(demonstrations: Demonstrations) -> Integers:
@@ -107,12 +107,12 @@ def count_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> EpisodeCou
     Raises:
         InputError: If the rules are for other features or actions.
     """
-    shown = labels_of(rule_set, demonstrations)
-    found = applications(rule_set, demonstrations.observations)
+    labels = labels_of(rule_set, demonstrations)
+    applied = applications(rule_set, demonstrations.observations)
     dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
     says = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
-    right = shown[found.row, dimension[found.rule]] == says[found.rule]
-    return count_applied(len(rule_set.rules), found.rule, found.row, right, demonstrations)
+    right = labels[applied.row, dimension[applied.rule]] == says[applied.rule]
+    return count_applied(len(rule_set.rules), applied.rule, applied.row, right, demonstrations)
 
 
 def count_applied(
@@ -150,19 +150,19 @@ def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCoun
         The counts, by node number.
     """
     n_labels, episodes = tree.dimension.n_labels, demonstrations.n_episodes
-    shown = tree.dimension.labels_of(demonstrations.action_columns[:, tree.index])
+    label = tree.dimension.labels_of(demonstrations.action_columns[:, tree.index])
     leaf = tree.apply(demonstrations.observations)
     # The pairs of one leaf, episode and label go up together.
-    key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + shown
+    key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + label
     key, samples = np.unique(key, return_counts=True)
-    above, shown = np.divmod(key, n_labels)
+    above, label = np.divmod(key, n_labels)
     node, episode = np.divmod(above, episodes)
     parts: list[tuple[Integers, ...]] = []
     while len(node):
-        parts.append((node, episode, samples, samples * (tree.label[node] == shown)))
+        parts.append((node, episode, samples, samples * (tree.label[node] == label)))
         inner = tree.parent[node] >= 0
         node, episode = tree.parent[node[inner]], episode[inner]
-        samples, shown = samples[inner], shown[inner]
+        samples, label = samples[inner], label[inner]
     columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
     return _counted(tree.n_nodes, columns[0], columns[1], columns[2], columns[3], demonstrations)
 

@@ -88,11 +88,11 @@ def with_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
         InputError: If the rules are for other features or actions.
     """
     rule_set = rules_for(rule_set, held_out).rule_set
-    found = count_rules(rule_set, held_out).held_out()
+    counts = count_rules(rule_set, held_out).held_out()
     return replace(
         rule_set,
         rules=tuple(
-            replace(rule, held_out=one) for rule, one in zip(rule_set.rules, found, strict=True)
+            replace(rule, held_out=one) for rule, one in zip(rule_set.rules, counts, strict=True)
         ),
     )
 
@@ -145,7 +145,7 @@ def lower_bound(rule: Rule) -> float:
     return 0.0 if rule.held_out is None else rule.held_out.low or 0.0
 
 
-def most_shown(episodes: int) -> float:
+def best_lower_bound(episodes: int) -> float:
     """The largest `lower_bound` there is with so many held-out episodes.
 
     Args:
@@ -219,7 +219,7 @@ def shortfall(rules: Sequence[Rule], least: float, episodes: int) -> Shortfall:
         for rule, bound in zip(rules, bounds, strict=True)
         if bound < least
     ]
-    enough = {count: most_shown(count) >= least for count in set(met)}
+    enough = {count: best_lower_bound(count) >= least for count in set(met)}
     wrong = sum(enough[count] for count in met)
     return Shortfall(
         least, episodes, len(bounds) - len(met), len(met) - wrong, wrong, max(bounds, default=0.0)
@@ -289,7 +289,7 @@ def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tup
         Whole numbers, 0 where it is reached; infinity where it never is at this rate, and NaN
         where too few episodes were held out to say.
     """
-    found = np.full(len(rules), np.nan)
+    needed = np.full(len(rules), np.nan)
     known = [
         (place, rule.held_out, rule.held_out.share)
         for place, rule in enumerate(rules)
@@ -298,7 +298,7 @@ def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tup
         and rule.held_out.interval is not None
     ]
     if not known:
-        return tuple(found.tolist())
+        return tuple(needed.tolist())
     place = [at for at, _, _ in known]
     share = np.array([share for _, _, share in known])
     there = np.array([held.episodes for _, held, _ in known], dtype=np.float64)
@@ -306,8 +306,8 @@ def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tup
     missing = episodes_needed(share, spread, threshold) - there
     more = np.maximum(np.ceil(missing * episodes / there), 1.0)
     sure = np.array([(held.low or 0.0) >= threshold for _, held, _ in known])
-    found[place] = np.where(sure, 0.0, more)
-    return tuple(found.tolist())
+    needed[place] = np.where(sure, 0.0, more)
+    return tuple(needed.tolist())
 
 
 def _spread(held: HeldOut) -> float:

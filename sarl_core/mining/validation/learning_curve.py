@@ -40,7 +40,7 @@ class CurvePoint(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LearningCurve:
+class MiningCurve:
     """Rule sets of more and more episodes, for several orders of the episodes.
 
     Attributes:
@@ -77,7 +77,7 @@ def learning_curve(
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> LearningCurve:
+) -> MiningCurve:
     """Mine from one episode, from a few more, ... from all of them, in several orders.
 
     Args:
@@ -115,7 +115,7 @@ def learning_curve(
         for column, size in enumerate(sizes.tolist())
         for row in range(orders if size < count else 1)
     ]
-    found = run_each(
+    curve_points = run_each(
         curve_point,
         [
             (demonstrations, drawn[row], int(sizes[column]), thresholds, divider, held_out)
@@ -125,11 +125,11 @@ def learning_curve(
         progress=progress,
     )
     layers = np.full((len(CurvePoint._fields), orders, len(sizes)), np.nan)
-    for (row, column), point in zip(places, found, strict=True):
+    for (row, column), point in zip(places, curve_points, strict=True):
         rows = slice(None) if sizes[column] == count else slice(row, row + 1)
         layers[:, rows, column] = np.reshape(point, (-1, 1))
     rules, mean_length, coverage, fidelity = layers
-    return LearningCurve(
+    return MiningCurve(
         episodes=sizes,
         rules=rules,
         mean_length=mean_length,

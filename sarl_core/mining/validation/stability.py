@@ -40,7 +40,7 @@ class Band(NamedTuple):
         threshold: Of the rule itself.
         low: The 5 % quantile over the rules that came back and ask this too; NaN without any.
         high: The 95 % quantile.
-        found: In how many rounds it was asked.
+        rounds: In how many rounds it was asked.
     """
 
     feature: int
@@ -48,7 +48,7 @@ class Band(NamedTuple):
     threshold: float
     low: float
     high: float
-    found: int
+    rounds: int
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Stability:
     rules: tuple[RuleStability, ...]
 
 
-class Side(NamedTuple):
+class RuleThreshold(NamedTuple):
     """One threshold of a rule of the original set.
 
     Attributes:
@@ -99,7 +99,7 @@ class Side(NamedTuple):
     threshold: float
 
 
-class Round(NamedTuple):
+class ResampledRound(NamedTuple):
     """What one round says of R rules with S thresholds.
 
     Attributes:
@@ -159,7 +159,7 @@ def rule_stability(
     count = demonstrations.n_episodes
     own = applications(rule_set, demonstrations.observations)
     sides = _sides(rule_set.rules)
-    found = run_each(
+    resamples = run_each(
         resampled,
         [
             (rule_set, demonstrations, own, sides, rng.integers(0, count, count), limit)
@@ -168,8 +168,8 @@ def rule_stability(
         executor=executor,
         progress=progress,
     )
-    overlap = np.stack([one.overlap for one in found])
-    thresholds = np.stack([one.thresholds for one in found])
+    overlap = np.stack([one.overlap for one in resamples])
+    thresholds = np.stack([one.thresholds for one in resamples])
     bands: list[list[Band]] = [[] for _ in rule_set.rules]
     for side, values in zip(sides, thresholds.T, strict=True):
         there = values[~np.isnan(values)]
@@ -194,14 +194,14 @@ def rule_stability(
     )
 
 
-def _sides(rules: tuple[Rule, ...]) -> list[Side]:
+def _sides(rules: tuple[Rule, ...]) -> list[RuleThreshold]:
     sides = []
     for place, rule in enumerate(rules):
         for feature, low, high in rule.bounds:
             if np.isfinite(low):
-                sides.append(Side(place, feature, ">", low))
+                sides.append(RuleThreshold(place, feature, ">", low))
             if np.isfinite(high):
-                sides.append(Side(place, feature, "<=", high))
+                sides.append(RuleThreshold(place, feature, "<=", high))
     return sides
 
 
@@ -209,10 +209,10 @@ def resampled(
     rule_set: RuleSet,
     demonstrations: Demonstrations,
     own: Applications,
-    sides: list[Side],
+    sides: list[RuleThreshold],
     drawn: NDArray[np.int64],
     limit: float,
-) -> Round:
+) -> ResampledRound:
     """One round: mine from other episodes and look for the rules.
 
     Args:
@@ -234,18 +234,18 @@ def resampled(
         max_depth=rule_set.thresholds.max_depth,
     )
     overlap, like = _most_alike(rule_set, own, mined, demonstrations)
-    asked: dict[int, dict[tuple[int, Operator], float]] = {}
+    known: dict[int, dict[tuple[int, Operator], float]] = {}
     thresholds = np.full(len(sides), np.nan)
     for place, side in enumerate(sides):
         if overlap[side.rule] < limit:
             continue
         other = int(like[side.rule])
-        if other not in asked:
-            asked[other] = {
+        if other not in known:
+            known[other] = {
                 (one.feature, one.op): one.threshold for one in _sides((mined.rules[other],))
             }
-        thresholds[place] = asked[other].get((side.feature, side.op), np.nan)
-    return Round(overlap, thresholds)
+        thresholds[place] = known[other].get((side.feature, side.op), np.nan)
+    return ResampledRound(overlap, thresholds)
 
 
 def _drawn(demonstrations: Demonstrations, drawn: NDArray[np.int64]) -> Demonstrations:

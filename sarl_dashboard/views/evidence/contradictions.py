@@ -79,7 +79,7 @@ def _show(remaining: Demonstrations, rule_set: RuleSet, contradictions: Contradi
         names = ["any action", *(action.name for action in actions)]
         name = st.selectbox("Action", names, key="contradiction", bind="query-params", width=260)
         dimension = names.index(name) - 1 if name in names[1:] else None
-    flags = contradictions.found(dimension)
+    flags = contradictions.contradicting(dimension)
     which = slice(None) if dimension is None else [dimension]
     identical = int(contradictions.identical[:, which].any(axis=1).sum())
     near = int(contradictions.near[:, which].any(axis=1).sum())

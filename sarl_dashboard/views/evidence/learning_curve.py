@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.explaining.figures import evidence as figures
 from sarl_core.mining.language import counted
-from sarl_core.mining.validation.learning_curve import LearningCurve, learning_curve
+from sarl_core.mining.validation.learning_curve import MiningCurve, learning_curve
 from sarl_core.progress import Progress
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.worked_out import worked_out
@@ -41,7 +41,7 @@ def show_curve(evidence: Evidence) -> None:
         )
     )
 
-    def work(executor: Executor, progress: Progress) -> LearningCurve:
+    def work(executor: Executor, progress: Progress) -> MiningCurve:
         return learning_curve(
             mined,
             thresholds,
@@ -61,7 +61,7 @@ def show_curve(evidence: Evidence) -> None:
     )
 
 
-def _show_curve(curve: LearningCurve) -> None:
+def _show_curve(curve: MiningCurve) -> None:
     with st.grid(4, min_column_width=240, gap="small") as grid:
         for layer, title in figures.CURVE_TITLES.items():
             with grid.cell():

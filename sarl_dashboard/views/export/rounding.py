@@ -19,7 +19,7 @@ def show_rounding(prepared: Prepared, steps: int) -> None:
     rounding = prepared.rounding
     if rounding is None:
         return
-    unrounded = rounding.kept
+    unrounded = rounding.unrounded
     with st.grid(3, min_column_width=150, gap="small"):
         st.metric("Decisions changed", f"{prepared.changed:,}", border=True)
         st.metric("Thresholds rounded", f"{rounding.rounded:,}", border=True)
