@@ -28,6 +28,9 @@ T = TypeVar("T")
 # What the signs of a text may come to as objects of Python, in bytes: about half of the worst.
 _COSTS = {"{": 100, "[": 40, ":": 20, ",": 20, '"': 15}
 
+# What may be half of a sign that is written as two: no file can be written with it again.
+_PERHAPS_HALF = re.compile("\\\\u[dD]|[\ud800-\udfff]")
+
 
 def parse_json(
     text: str | bytes,
@@ -60,17 +63,24 @@ def parse_json(
         )
     )
     try:
-        return json.loads(
+        if not isinstance(text, str):  # as `json.loads` does, which lets halves of pairs through
+            text = str(text, json.detect_encoding(text))
+        document = json.loads(
             text,
             object_pairs_hook=object_pairs_hook,
             parse_constant=_refuse_constant if finite else None,
             parse_float=_finite if finite else None,
             parse_int=_whole,
         )
+        if _PERHAPS_HALF.search(text):
+            json.dumps(document, ensure_ascii=False).encode()
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
     except UnicodeDecodeError as error:
         raise ValueError("it is not UTF-8") from error
+    except UnicodeEncodeError as error:
+        raise ValueError("it holds half of a surrogate pair, which is no text") from error
+    return document
 
 
 def _refuse_constant(constant: str) -> Any:
@@ -121,8 +131,6 @@ def conformed(value: Any, kind: type[T]) -> T:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         raise _in_words(value, kind, str(error)) from error
-    except UnicodeError as error:  # a name of which UTF-8 cannot write every sign
-        raise MisfitError("something in it is not known to this version") from error
 
 
 def _in_words(value: Any, kind: Any, text: str) -> MisfitError:

@@ -70,6 +70,9 @@ def test_a_number_that_python_does_not_write_is_quoted():
     ("text", "reason"),
     [
         (b"\xff\xfe\xfd", "UTF-8"),
+        (b'["\xed\xa0\x80"]', "UTF-8"),
+        (b'["\\uD800"]', "half of a surrogate pair"),
+        ('{"\ud800": 1}', "half of a surrogate pair"),
         ("[" * 100_000, "nested too deeply"),
         ("[NaN]", "NaN"),
         ("[1e999]", "too large"),
@@ -80,6 +83,10 @@ def test_a_number_that_python_does_not_write_is_quoted():
 def test_json_that_is_none_is_one_kind_of_error(text, reason):
     with pytest.raises(ValueError, match=reason):
         parse_json(text)
+
+
+def test_a_pair_that_is_whole_is_a_sign():
+    assert parse_json(rb'["\ud83d\ude00", "\\ud800"]') == ["\U0001f600", r"\ud800"]
 
 
 def test_json_that_would_take_too_much_memory_is_not_parsed(monkeypatch):

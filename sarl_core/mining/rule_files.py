@@ -98,10 +98,10 @@ def read_rules(text: str | bytes, name: str) -> RuleFile:
         )
     kind: Any = _Document[_HeldOutPairs] if version == 1 else _Document[_HeldOut]
     try:
-        found: RuleFile = conformed(document, kind).read()
+        contents: RuleFile = conformed(document, kind).read()
     except MisfitError as error:
         raise InputError(f"{name}: {error}; mend it or mine the rules again") from error
-    return found
+    return contents
 
 
 def file_parts(rule_set: RuleSet) -> Iterator[str]:

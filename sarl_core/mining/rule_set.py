@@ -174,7 +174,7 @@ class RuleSet(Sequence[Rule]):
         """
         digest = hashlib.blake2b(digest_size=16)
         for part in file_parts(self):
-            # A file may have brought half of a pair that UTF-8 cannot write.
+            # A caller may have given half of a pair that UTF-8 cannot write.
             digest.update(part.encode(errors="surrogatepass"))
         return digest.hexdigest()
 

@@ -266,7 +266,11 @@ BAD = {
         lambda d: d.update({"x - at `$.rules[0].support": 1}),
         "'x - at `$.rules[0].support' is not known to this version",
     ),
-    "a key of half a pair": (lambda d: d.update({"\ud800": 1}), "is not known to this version"),
+    "a key of half a pair": (lambda d: d.update({"\ud800": 1}), "holds half of a surrogate pair"),
+    "a name of half a pair": (
+        lambda d: d["features"][0].update(name="\ud800"),
+        "holds half of a surrogate pair",
+    ),
     "a label that is a number": (
         lambda d: d["actions"][0].update(labels=["a", 2]),
         "labels 2 is 2, of the wrong kind in actions 1;",
