@@ -262,7 +262,7 @@ def coarse_notes(
     table: Table,
     names: Sequence[str],
     observations: NDArray[np.float32],
-    kept: NDArray[np.int64] | None = None,
+    rows: NDArray[np.int64] | None = None,
 ) -> tuple[str, ...]:
     """Sentences on features whose values are too close to one another for float32.
 
@@ -270,7 +270,7 @@ def coarse_notes(
         table: The opened file; a few of its columns are read again, with all their digits.
         names: Columns of the d features.
         observations: What was read of them, (N, d).
-        kept: Shape (N,), their rows in the file, from 0; None if they are all.
+        rows: Shape (N,), their rows in the file, from 0; None if they are all.
 
     Returns:
         One sentence for each of them.
@@ -279,10 +279,10 @@ def coarse_notes(
     if not suspects:
         return ()
     again = table.read(ColumnMap((), tuple(names[index] for index in suspects)))
-    rows = slice(None) if kept is None else kept
+    places = slice(None) if rows is None else rows
     notes: list[str] = []
     for index in suspects:
-        exact = again[names[index]].values[rows, None]
+        exact = again[names[index]].values[places, None]
         notes += coarse_columns(
             exact, observations[:, index : index + 1], (f"column {names[index]!r}",)
         )
