@@ -6,13 +6,15 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import Demonstrations, RuleSet, grow_policy_trees, mine_rules
+from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
 from sarl_core.mining.editing.edits import Add, Pin, Switch
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 from sarl_dashboard.cache import cached, key_of
@@ -222,6 +224,37 @@ def test_other_names_grow_no_other_tree() -> None:
     assert first.source.digest != second.source.digest
     (other,) = grown_trees(OTHER_ACTION, 2)
     assert other.threshold is not first.threshold
+
+
+def test_nothing_large_is_hashed_again_when_a_page_runs_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    hashed: list[str] = []
+    for kind in (Demonstrations, PolicyTree, RuleSet):
+        for name in ("digest", "pairs_digest"):
+            attribute = vars(kind).get(name)
+            if attribute is None:
+                continue
+
+            def counting(self: object, work: Callable[[Any], str] = attribute.func) -> str:
+                hashed.append(type(self).__name__)
+                return work(self)
+
+            again = cached_property(counting)
+            again.__set_name__(kind, name)
+            monkeypatch.setattr(kind, name, again)
+    sys.modules["sarl_dashboard.cache"].RESULTS.clear()
+    app = open_page("thresholds", data="cartpole", holdout="0.2")
+    assert {"Demonstrations", "PolicyTree"} <= set(hashed)
+    hashed.clear()
+    app.select_slider(key="support").set_value(0.02).run()
+    assert not hashed
+    for page in ("rules", "edit", "what_if", "evidence", "export", "difference", "shield"):
+        app.switch_page(f"{page}.py").run()
+        hashed.clear()
+        app.run()
+        assert not app.exception
+        assert not hashed, page
 
 
 # --- what a visitor brought --------------------------------------------------------------------
