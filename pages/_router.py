@@ -6,6 +6,7 @@ from pathlib import Path
 
 import streamlit as st
 
+from sarl_core.explaining.templates import style_sheet
 from sarl_dashboard.components.sidebar import sidebar
 from sarl_dashboard.session import settle
 from sarl_dashboard.state.url import absurd_parameters, say_left_out, show_left_out, without
@@ -115,6 +116,7 @@ if absurd := absurd_parameters():
     # Widgets take their values from the address before anything here could mend them.
     say_left_out(absurd, page.title)
     st.switch_page(page, query_params=without(absurd))
+st.html(style_sheet())
 show_left_out(page.title)
 sidebar(thresholds_shown=page.title != "Thresholds")
 page.run()

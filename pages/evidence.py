@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import influence_sentences
@@ -47,7 +48,7 @@ else:
     elsewhere_notice(
         evidence.thresholds,
         evidence.rule_set.fidelity,
-        lambda judged: "".join(map(note, influence_sentences(judged))),
+        lambda judged: Markup().join(map(note, influence_sentences(judged))),
     )
 enough, curve, stability, contradictions, left_out = st.tabs(
     [

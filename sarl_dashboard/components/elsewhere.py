@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
@@ -21,7 +22,7 @@ _LOOK_SECONDS = 1.0
 
 
 def elsewhere_notice(
-    thresholds: Thresholds, fidelity: float, more: Callable[[Judged], str] = lambda _: ""
+    thresholds: Thresholds, fidelity: float, more: Callable[[Judged], Markup] = lambda _: Markup()
 ) -> None:
     """What is known of the rules in other episodes, and a warning where that is much less.
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import streamlit as st
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.explaining.figures.tree import tree_figure
@@ -91,7 +92,7 @@ def _picture(path: PathInTree, dark: bool) -> Any:
 
 
 @cached()
-def _place(path: PathInTree, dark: bool) -> str:
+def _place(path: PathInTree, dark: bool) -> Markup:
     cut = _cut(path.tree, path.cut_at)
     return place_html(path.tree, cut, path.node, note=path.note, dark=dark)
 

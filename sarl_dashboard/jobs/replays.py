@@ -17,7 +17,7 @@ import streamlit as st
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.environments.description import EnvironmentDescription
-from sarl_core.explaining.html.lit_path import PathFinder
+from sarl_core.explaining.state_path import PathFinder
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from streamlit.testing.v1 import AppTest
 
+from sarl_core.explaining.templates import style_sheet
+
 ROUTER = Path(__file__).parents[2] / "pages" / "_router.py"
 
 
@@ -30,8 +32,10 @@ def texts(app: AppTest) -> str:
 
 
 def html(app: AppTest) -> str:
-    """What is written in HTML."""
-    return "\n".join(part.proto.body for part in app.get("html"))
+    """What is written in HTML, without the style sheet of every page."""
+    return "\n".join(
+        part.proto.body for part in app.get("html") if part.proto.body != style_sheet()
+    )
 
 
 def errors(app: AppTest) -> list[str]:

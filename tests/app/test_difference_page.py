@@ -26,7 +26,7 @@ def test_two_sets_are_compared_on_the_demonstrations() -> None:
     different = sum(a != b for a, b in zip(one, other, strict=True))
     assert f"decide {different:,} of {len(CARTPOLE):,} demonstrated states" in texts(app)
     assert re.search(r"\d\N{NO-BREAK SPACE}%\) differently", texts(app))  # kept on one line
-    (table,) = (part for part in app.get("html") if "sarl-confusion" in part.proto.body)
+    (table,) = (part for part in app.get("html") if 'class="sarl-confusion"' in part.proto.body)
     counted = re.findall(r'<td title="([^"]*)"[^>]*>([\d,]*)</td>', table.proto.body)
     assert len(counted) == 9
     words = ("push left", "push right", "no rule")

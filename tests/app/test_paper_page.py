@@ -93,7 +93,7 @@ def test_the_claims_come_first_with_their_verdicts(folder: Path) -> None:
     assert "of 24 claims would agree: 4 that follow from the method" in texts(app)
     shown = rendered(app)
     assert shown.count("How this is decided") == 24
-    assert "The lone novice's return varies between 8 and 95." in shown.replace("&#x27;", "'")
+    assert "The lone novice's return varies between 8 and 95." in shown.replace("&#39;", "'")
     assert shown.count("Agrees ") >= 20
 
 

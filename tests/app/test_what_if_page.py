@@ -27,7 +27,7 @@ def the_state(app: AppTest, features: int) -> np.ndarray:
 
 def table(app: AppTest, column: str) -> list[str]:
     """A column of the table that has it."""
-    for found in re.findall(r"<table>.*?</table>", html(app)):
+    for found in re.findall(r"<table>.*?</table>", html(app), re.DOTALL):
         rows = [
             ["".join(cell.itertext()) for cell in row]
             for row in ElementTree.fromstring(found).iter("tr")
@@ -147,7 +147,9 @@ def test_edited_rules_of_a_file_are_followed_in_a_table_and_light_no_foreign_pat
     app.button_group(key="edits").set_value("edited").run()
     assert not app.exception, app.exception
     assert "Its way through the rules" in said(app)
-    (table_shown,) = [part.proto.body for part in app.get("html") if "sarl-lit" in part.proto.body]
+    (table_shown,) = [
+        part.proto.body for part in app.get("html") if 'class="sarl-lit"' in part.proto.body
+    ]
     assert re.search(r">R\d+: ", table_shown)
     # In another environment the edited rules say nothing; the mined ones are shown, and it is said.
     app.query_params["data"] = "lunar_lander"

@@ -10,6 +10,7 @@ import pytest
 from sarl_core import mine_rules
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.figures import evidence as figures
+from sarl_core.explaining.html.evidence_bar import evidence_bar
 from sarl_core.explaining.tables.evidence import (
     enough_columns,
     held_out_columns,
@@ -18,7 +19,6 @@ from sarl_core.explaining.tables.evidence import (
 )
 from sarl_core.explaining.words.evidence import (
     band_text,
-    evidence_bar,
     evidence_text,
     held_out_text,
     influence_text,

@@ -18,7 +18,8 @@ from sarl_core.explaining.exports.steps import (
     steps_to_csv,
     steps_to_parquet,
 )
-from sarl_core.explaining.html.lit_path import PathFinder, lit_path_table, lit_paths_html
+from sarl_core.explaining.html.lit_path import lit_path_table, lit_paths_html
+from sarl_core.explaining.state_path import PathFinder
 from sarl_core.explaining.tables.recorder import (
     PAGE,
     filter_text,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.html.plot import round_ticks
 from sarl_core.explaining.html.rule_features import MOST, features_html
 from sarl_core.explaining.rule_evidence import FeatureEvidence
+from sarl_core.explaining.ticks import round_ticks
 from sarl_core.mining.rules import Bounds
 
 
@@ -96,7 +96,7 @@ def test_names_and_units_are_escaped() -> None:
     html = drawn(evidence(4.0), Feature('<b>"x"', "<i>m&"))
     for raw in ('<b>"x"', "<i>m", "m&<"):
         assert raw not in html
-    assert "&lt;b&gt;&quot;x&quot;" in html
+    assert "&lt;b&gt;&#34;x&#34;" in html
     assert "&lt;i&gt;m&amp;" in html
 
 

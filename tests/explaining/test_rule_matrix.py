@@ -125,14 +125,6 @@ def test_marks_are_explained_where_they_are_seen(lander_trees: tuple[PolicyTree,
     assert marked.height > unmarked.height  # by a line that says what the mark means
 
 
-def test_the_style_stays_when_the_page_is_cleaned(lander_trees: tuple[PolicyTree, ...]) -> None:
-    # A style that holds something like a tag, as "<length>", is taken out as a whole.
-    text = matrix_html(rule_matrix(rules_of(lander_trees)), ())
-    styles = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
-    assert len(styles) == 2
-    assert not any("<" in style for style in styles)
-
-
 def test_markdown_holds_every_rule(lander_trees: tuple[PolicyTree, ...]) -> None:
     rules = rules_of(lander_trees)
     text = rules_to_markdown(rules)

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sarl_core.explaining.figures.colours import label_colour
-from sarl_core.explaining.html.step_card import picture, step_card, swatch
+from sarl_core.explaining.html.step_card import legend, picture, step_card
 from sarl_core.explaining.replay import ActionView, StepView
 
 ACTION = ActionView(
@@ -45,5 +45,5 @@ def test_each_of_several_actions_is_named_and_names_are_no_markup() -> None:
     assert "Outside the data" in card
     for raw in ("<i>", "<u>", "<s>", "<b>x</b>"):
         assert raw not in card
-    assert "<script" not in swatch("<script>", "#000000")
-    assert 'alt="a &quot;b&quot;"' in picture(b"png", 'a "b"')
+    assert "<script" not in legend([("<script>", "#000000")])
+    assert 'alt="a &#34;b&#34;"' in picture(b"png", 'a "b"')

@@ -7,9 +7,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.html.what_if import changes_html, decision_html, misses_html, way_html
+from sarl_core.explaining.templates import style_sheet
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
@@ -105,8 +107,8 @@ def test_how_the_rules_met_the_action_and_what_is_executed(state, action, outsid
     root = element(decided(state, action, outside))
     shown = [one for one in root.iter("span") if "badge" in one.get("class")]
     assert [one.text for one in shown] == badges
-    # Each ground is told apart: what is not described in the piece itself looks like plain text.
-    looks = "".join(style.text for style in root.iter("style"))
+    # Each ground is told apart: what the style sheet does not describe looks like plain text.
+    looks = style_sheet()
     for one in shown:
         assert all(f".{name} {{" in looks for name in one.get("class").split() if name != PLAIN)
     (title,) = root.iter("h4")
@@ -211,8 +213,8 @@ def test_a_miss_that_another_rule_would_still_come_before_is_not_in_force():
 
 def test_the_way_says_when_a_person_gave_the_rule_its_place():
     placed = "A person gave this rule its place"
-    assert placed not in words(way_html("<p>queries</p>", RULES.rules[0]))
-    found = words(way_html("<p>queries</p>", replace(RULES.rules[0], pinned=True)))
+    assert placed not in words(way_html(Markup("<p>queries</p>"), RULES.rules[0]))
+    found = words(way_html(Markup("<p>queries</p>"), replace(RULES.rules[0], pinned=True)))
     assert placed in found
     assert "queries" in found
     assert placed not in words(way_html("", None))

@@ -7,6 +7,9 @@ second ring follows, and a third for the many intervals of a finely divided acti
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 LABEL_COLOURS = (
     "#0072B2",  # blue
     "#E69F00",  # orange
@@ -66,3 +69,36 @@ def faded(colour: str, opacity: float) -> str:
         As "#0072B24C".
     """
     return f"{colour}{round(255 * opacity):02X}"
+
+
+def layer_colour(share: float) -> tuple[str, str]:
+    """The colour of a cell of a landscape, and one that is legible on it.
+
+    Args:
+        share: 0 to 1, from ground to ink.
+
+    Returns:
+        Ground and text, as "#f4ecd8".
+    """
+    places = [place for place, _ in LAYER_SCALE]
+    channels: NDArray[np.float64] = np.array(
+        [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for _, colour in LAYER_SCALE], float
+    )
+    mixed = [round(float(np.interp(share, places, channels[:, index]))) for index in range(3)]
+    ground = "#" + "".join(f"{value:02x}" for value in mixed)
+    dark, light = "#15202a", "#ffffff"
+    return ground, dark if _contrast(ground, dark) >= _contrast(ground, light) else light
+
+
+def _contrast(one: str, other: str) -> float:
+    """The contrast of two colours as WCAG defines it, 1 to 21."""
+    first, second = sorted((_luminance(one), _luminance(other)))
+    return (second + 0.05) / (first + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    ]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

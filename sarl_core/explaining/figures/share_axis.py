@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sarl_core.explaining.html.plot import round_ticks, tick_text
+from sarl_core.explaining.ticks import round_ticks, tick_text
 
 _LEAST = 1e-3  # an axis over less than this would have no round number
 

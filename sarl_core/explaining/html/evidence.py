@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import LABEL_COLOURS, MARKER_COLOUR, MUTED_COLOUR, faded
-from sarl_core.explaining.html.plot import (
-    PLOT_STYLE,
-    Axis,
-    Scale,
-    area,
-    plot,
-    round_ticks,
-    tick_text,
-)
+from sarl_core.explaining.figures.colours import LABEL_COLOURS, MUTED_COLOUR, faded
+from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
+from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
     VERDICTS,
@@ -35,20 +29,9 @@ _NAMED = 30  # rules up to which each has its name written
 _CLOSE = 10  # names that stand side by side in a narrow window
 _TIPS = 60
 _MINED = faded(MUTED_COLOUR, 0.7)
-_STYLE = (
-    """<style>
-.sarl-sure b { margin-left: -0.5px; width: 1px; }
-.sarl-sure b::after { content: ''; position: absolute; left: 50%; bottom: var(--at);
-  width: 4px; height: 4px; margin: 0 0 -2px -2px; border-radius: 50%; background: inherit; }
-.sarl-few b { margin-left: -1.5px; width: 3px; }
-@media (max-width: 640px) { .sarl-close .x:not(:nth-child(3n)) { display: none; } }
-.sarl-few b::after { width: 9px; height: 9px; margin: 0 0 -4.5px -4.5px; }
-</style>"""
-    + PLOT_STYLE
-)
 
 
-def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> str:
+def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> Markup:
     """What is known of many rules, side by side.
 
     Args:
@@ -57,7 +40,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
         threshold: The minimum confidence, drawn as a line.
 
     Returns:
-        HTML without script. Grey: the confidence on what each was mined from, a dot. In colour:
+        HTML. Grey: the confidence on what each was mined from, a dot. In colour:
         held out, with the interval where there is one.
     """
     few = len(rules) <= _FEW
@@ -73,18 +56,18 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
     ends = [interval.low if interval is not None else share for _, interval, share, _ in drawn]
     floor = max(min([threshold, *ends]) - 0.03, 0.0)
     across, upwards = Scale(0.5, len(rules) + 0.5), Scale(floor, 1.01)
-    whiskers = ""
+    parts = []
     for at, found, share, colour in drawn:
         interval = found or Interval(share, share)
-        whiskers += (
-            f'<b style="left:{across.place(at)};bottom:{upwards.place(interval.low)};'
-            f"height:{upwards.length(interval.low, interval.high)};background:{colour};"
-            f'--at:{_within(share, interval)}"></b>'
+        parts.append(
+            Part(
+                "whisker",
+                f"left:{across.place(at)};bottom:{upwards.place(interval.low)};"
+                f"height:{upwards.length(interval.low, interval.high)};background:{colour};"
+                f"--at:{_within(share, interval)}",
+            )
         )
-    line = (
-        f'<i style="left:0;right:0;bottom:{upwards.place(threshold)};'
-        f'border-top:2px dotted {MARKER_COLOUR}"></i>'
-    )
+    parts.append(Part("least", f"bottom:{upwards.place(threshold)}"))
     counts = verdict_counts(rules, threshold)
     told = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
     named = (
@@ -93,29 +76,25 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
         else [tick for tick in round_ticks(1, len(rules), 8, whole=True) if tick >= 1]
     )
     heights = round_ticks(100 * floor, 100.0, 5)
-    close = " sarl-close" * (len(named) > _CLOSE)
-    return (
-        f'{_STYLE}<div class="sarl-sure{" sarl-few" * few}{close}">'
-        + plot(
-            whiskers + line,
-            Axis(
-                across,
-                named,
-                [rule_set.name_of(rules[round(place) - 1]) for place in named],
-                "Rules, the most support first",
-            ),
-            Axis(
-                upwards,
-                [height / 100 for height in heights],
-                [f"{tick_text(height)} %" for height in heights],
-                "Confidence",
-            ),
-            label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
-            f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {told}",
-            height=262,
-            tips=[_tip(rule, rule_set) for rule in rules],
-        )
-        + "</div>"
+    return plot(
+        parts,
+        Axis(
+            across,
+            named,
+            [rule_set.name_of(rules[round(place) - 1]) for place in named],
+            "Rules, the most support first",
+        ),
+        Axis(
+            upwards,
+            [height / 100 for height in heights],
+            [f"{tick_text(height)} %" for height in heights],
+            "Confidence",
+        ),
+        label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
+        f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {told}",
+        height=262,
+        tips=[_tip(rule, rule_set) for rule in rules],
+        css=f"sarl-overview{' sarl-few' * few}{' sarl-close' * (len(named) > _CLOSE)}",
     )
 
 
@@ -131,14 +110,14 @@ def _tip(rule: Rule, rule_set: RuleSet) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def enough_plot(missing: Sequence[float]) -> str:
+def enough_plot(missing: Sequence[float]) -> Markup:
     """How many rules would reach the minimum confidence after so many more episodes.
 
     Args:
         missing: What `more_episodes` gives of each rule; at least one.
 
     Returns:
-        HTML without script: episodes to the right, rules upwards, in steps.
+        HTML: episodes to the right, rules upwards, in steps.
     """
     some = np.sort([value for value in missing if np.isfinite(value)])
     turns = [0.0, *np.unique(some[some > 0]).tolist()]
@@ -154,8 +133,8 @@ def enough_plot(missing: Sequence[float]) -> str:
     middles = (np.arange(_TIPS) + 0.5) * far / _TIPS
     by_then = np.searchsorted(some, middles, side="right").tolist()
     widths, heights = round_ticks(0.0, far, 5), round_ticks(0.0, top, 4, whole=True)
-    return PLOT_STYLE + plot(
-        area(corners, across, upwards, faded(colour, 0.55)),
+    return plot(
+        [area(corners, across, upwards, faded(colour, 0.55))],
         Axis(across, widths, list(map(tick_text, widths)), "More episodes"),
         Axis(upwards, heights, list(map(tick_text, heights)), f"Rules that reach it, of {most:,}"),
         label=f"Of {counted(most, 'rule')} {reached[0]:,} "

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from html import escape
+from markupsafe import Markup
 
-_HEADING = (
-    "font-size:1.1rem;font-weight:600;line-height:1.2;letter-spacing:-0.005em;margin:0;"
-    "padding:0.75rem 0 0.8rem 0"
-)
-_NOTE = "font-size:0.875rem;line-height:1.5;opacity:0.7;margin:0 0 0.5rem 0"
+from sarl_core.explaining.templates import render
 
 
-def heading(text: str) -> str:
+def heading(text: str) -> Markup:
     """A heading of the third level.
 
     Args:
         text: What it says.
 
     Returns:
-        HTML, styled in place; the text escaped.
+        HTML.
     """
-    return f'<h3 style="{_HEADING}">{escape(text)}</h3>'
+    return render("heading", text=text)
 
 
-def note(text: str) -> str:
+def note(text: str) -> Markup:
     """A paragraph that stands back.
 
     Args:
         text: What it says.
 
     Returns:
-        HTML, styled in place; the text escaped.
+        HTML.
     """
-    return f'<p style="{_NOTE}">{escape(text)}</p>'
+    return render("note", text=text)

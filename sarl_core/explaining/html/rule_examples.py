@@ -1,10 +1,12 @@
-"""Some states of a rule, in HTML without script."""
+"""Some states of a rule, in HTML."""
 
 from __future__ import annotations
 
+from markupsafe import Markup
+
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.html.table import TABLE_STYLE, Column, table_html
+from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.rule_evidence import example_columns
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
@@ -13,7 +15,7 @@ _DID, _AGREES = "Expert did", "As the rule says"
 _WHOLE = ("Episode", "Step")
 
 
-def examples_html(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) -> str:
+def examples_html(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) -> Markup:
     """Example states of a rule, see `example_columns`.
 
     Args:
@@ -29,9 +31,7 @@ def examples_html(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) 
         Column(name, "m" if name == _DID else "" if name == _AGREES else "n") for name in columns
     ]
     texts = [[_text(name, value) for value in values] for name, values in columns.items()]
-    return TABLE_STYLE + table_html(
-        shown, list(zip(*texts, strict=True)), "States to which the rule applies"
-    )
+    return table_html(shown, list(zip(*texts, strict=True)), "States to which the rule applies")
 
 
 def _text(name: str, value: object) -> str:

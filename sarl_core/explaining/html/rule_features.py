@@ -1,54 +1,31 @@
-"""What a rule asks, feature by feature: histograms in HTML without script; every name escaped."""
+"""What a rule asks, feature by feature: histograms in HTML."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.figures.colours import MARKER_COLOUR, MUTED_COLOUR, faded
-from sarl_core.explaining.html.plot import (
-    PLOT_STYLE,
-    Axis,
-    Scale,
-    area,
-    plot,
-    round_ticks,
-    tick_text,
-)
+from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
 from sarl_core.explaining.rule_evidence import FeatureEvidence
+from sarl_core.explaining.templates import render
+from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.mining.language import condition_text, number_text, share_text, short_condition
 
 MOST = 12  # features
 _X_TICKS, _Y_TICKS = 5, 4  # at most, beside zero
 
 _EVERYWHERE = faded(MUTED_COLOUR, 0.55)
-_STYLE = (
-    """<style>
-.sarl-features { display: grid; gap: 1.1rem 1.6rem;
-  grid-template-columns: repeat(auto-fill, minmax(min(100%, max(15rem, 30%)), 1fr)); }
-.sarl-features-note { font-size: 0.875rem; margin: 0 0 0.8rem; display: flex; flex-wrap: wrap;
-  gap: 0.1rem 1rem; }
-.sarl-features-note span { opacity: 0.75; }
-.sarl-features-note i { display: inline-block; width: 11px; height: 11px; border-radius: 2px;
-  margin-right: 0.35rem; vertical-align: -1px; }
-.sarl-features figure { margin: 0; min-width: 0; }
-.sarl-features figcaption { font-weight: 600; font-size: 1rem; margin-bottom: 0.5rem;
-  overflow-wrap: anywhere; color: inherit; }
-.sarl-features .asked { top: 0; bottom: 0; background: ASKED; }
-.sarl-features .bound { top: 0; bottom: 0; width: 2px; margin-left: -1px; background: MARKER; }
-</style>""".replace("MARKER", MARKER_COLOUR).replace("ASKED", faded(MARKER_COLOUR, 0.13))
-    + PLOT_STYLE
-)
 
 
 def features_html(
     found: Sequence[FeatureEvidence], features: Sequence[Feature], colour: str
-) -> str:
+) -> Markup:
     """A figure for each feature that a rule asks about, as many side by side as there is room for.
 
     Args:
@@ -61,48 +38,43 @@ def features_html(
         shaded.
     """
     reached = any(one.at_rule.any() for one in found)
-    key = [(_EVERYWHERE, "all states")]
+    key = [("all states", _EVERYWHERE)]
     if reached:
-        key.append((faded(colour, 0.75), "states of the rule"))
-    key.append((faded(MARKER_COLOUR, 0.25), "the interval asked for"))
-    parts = [f'<span><i style="background:{fill}"></i>{name}</span>' for fill, name in key]
+        key.append(("states of the rule", faded(colour, 0.75)))
+    key.append(("the interval asked for", faded(MARKER_COLOUR, 0.25)))
     if len(found) > MOST:
-        parts.append(f"<span>the first {MOST} of {len(found)} features</span>")
-    figures = "".join(_figure(one, features[one.feature], colour) for one in found[:MOST])
-    return (
-        f'{_STYLE}<div class="sarl-features-note">{"".join(parts)}</div>'
-        f'<div class="sarl-features">{figures}</div>'
-    )
+        key.append((f"the first {MOST} of {len(found)} features", ""))
+    figures = [_figure(one, features[one.feature], colour) for one in found[:MOST]]
+    return render("features", key=key, figures=figures)
 
 
-def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> str:
+def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> tuple[str, Markup]:
+    """What stands above a figure, and the figure."""
     low, high = float(one.edges[0]), float(one.edges[-1])
     highest = float(max(one.everywhere.max(), one.at_rule.max()))
     across, upwards = Scale(low, high), Scale(0.0, 1.04 * highest)
     least, most = max(one.bounds.low, low), min(one.bounds.high, high)
     parts = [
-        f'<i class="asked" style="left:{across.place(least)};'
-        f'width:{across.length(least, most)}"></i>',
+        Part("asked", f"left:{across.place(least)};width:{across.length(least, most)}"),
         _bars(one, one.everywhere, across, upwards, _EVERYWHERE),
     ]
     if one.at_rule.any():
         parts.append(_bars(one, one.at_rule, across, upwards, faded(colour, 0.75)))
     parts += [
-        f'<i class="bound" style="left:{across.place(bound)}"></i>'
+        Part("bound", f"left:{across.place(bound)}")
         for bound in (one.bounds.low, one.bounds.high)
         if math.isfinite(bound)
     ]
     values, shares = round_ticks(low, high, _X_TICKS), round_ticks(0.0, highest, _Y_TICKS)
     drawn = plot(
-        "".join(parts),
+        parts,
         Axis(across, values, list(map(tick_text, values)), feature.unit or feature.name),
         Axis(upwards, shares, [f"{100 * share:g} %" for share in shares]),
         label=_in_words(one, feature),
         height=132,
         tips=_tips(one, feature),
     )
-    caption = escape(short_condition(one.bounds, feature))
-    return f"<figure><figcaption>{caption}</figcaption>{drawn}</figure>"
+    return short_condition(one.bounds, feature), drawn
 
 
 def _bars(
@@ -111,7 +83,7 @@ def _bars(
     across: Scale,
     upwards: Scale,
     colour: str,
-) -> str:
+) -> Part:
     """All bars of a histogram, as one area within their outline."""
     corners = [
         (edge, share)

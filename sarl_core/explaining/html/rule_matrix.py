@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.figures.colours import label_colour
-from sarl_core.explaining.html.scrolling import WIDE_STYLE, wide_html
+from sarl_core.explaining.templates import render, style_sheet
 from sarl_core.mining.language import (
     action_text,
     counted,
@@ -146,7 +146,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     )
 
 
-def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> str:
+def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> Markup:
     """Some rows as a table.
 
     Args:
@@ -154,23 +154,18 @@ def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> str:
         rules: Some of its rules.
 
     Returns:
-        HTML without script, every name escaped; it may be wider than the screen and then scrolls.
+        HTML; it may be wider than the screen and then scrolls.
     """
-    upright = " up" if len(matrix.columns) > _MANY_COLUMNS else ""
-    head = "".join(
-        f'<th class="f{upright}"><div><b>{escape(column.name.name)}</b>'
-        f"<small>{_scale_text(column)}</small></div></th>"
-        for column in matrix.columns
+    return render(
+        "rule_matrix",
+        key=_key(rules, matrix.rule_set),
+        columns=[(column.name.name, _scale_text(column)) for column in matrix.columns],
+        upright=len(matrix.columns) > _MANY_COLUMNS,
+        rows=[_row(matrix, rule) for rule in rules],
     )
-    body = "".join(_row(matrix, rule) for rule in rules)
-    table = (
-        '<table class="sarl-matrix"><thead><tr><th class="a">Action</th><th class="n">States</th>'
-        f'<th class="n">Expert agrees</th>{head}</tr></thead><tbody>{body}</tbody></table>'
-    )
-    return f"{_STYLE}{_key(rules, matrix.rule_set)}{wide_html(table, 'Rules by features')}"
 
 
-def matrix_document(matrix: RuleMatrix) -> str:
+def matrix_document(matrix: RuleMatrix) -> Markup:
     """All rows as a file that opens without a network and prints on A4, light.
 
     Args:
@@ -179,31 +174,28 @@ def matrix_document(matrix: RuleMatrix) -> str:
     Returns:
         An HTML document.
     """
-    source = matrix.rule_set.source
-    title = f"Rules for {escape(source.env_id) or 'an unnamed environment'}"
-    return (
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width">'
-        f"<title>{title}</title>{_DOCUMENT_STYLE}</head><body><h1>{title}</h1>"
-        f"<p>{counted(len(matrix.rules), 'rule')}, by action, the most general first. {LEGEND} "
-        "The rules were learned from examples and guarantee nothing.</p>"
-        f"{matrix_html(matrix, matrix.rules)}</body></html>"
+    return render(
+        "rule_matrix_document",
+        title=f"Rules for {matrix.rule_set.source.env_id or 'an unnamed environment'}",
+        about=f"{counted(len(matrix.rules), 'rule')}, by action, the most general first. {LEGEND} "
+        "The rules were learned from examples and guarantee nothing.",
+        matrix=matrix_html(matrix, matrix.rules),
+        style_sheet=style_sheet(),
     )
 
 
-def _key(rules: Sequence[Rule], rule_set: RuleSet) -> str:
-    """What the colours and marks of some rows mean."""
+def _key(rules: Sequence[Rule], rule_set: RuleSet) -> list[tuple[str, str]]:
+    """What the colours and marks of some rows mean; a mark has no colour."""
     shown = {(rule.dimension, rule.action) for rule in rule_set.rules}
-    entries = "".join(
-        f'<span><i style="background:{label_colour(label)}"></i>'
-        f"{escape(_action(label, rule_set, dimension))}</span>"
+    entries = [
+        (_action(label, rule_set, dimension), label_colour(label))
         for dimension, label in sorted(shown)
-    )
+    ]
     if any(rule.placed for rule in rules):
-        entries += f"<span>{PLACED_LEGEND}</span>"
+        entries.append((PLACED_LEGEND, ""))
     if not all(rule.enabled for rule in rules):
-        entries += f"<span>{OFF_LEGEND}</span>"
-    return f'<div class="sarl-matrix-key">{entries}</div>'
+        entries.append((OFF_LEGEND, ""))
+    return entries
 
 
 def _action(label: int, rule_set: RuleSet, dimension: int) -> str:
@@ -213,37 +205,45 @@ def _action(label: int, rule_set: RuleSet, dimension: int) -> str:
     return f"{action.name}: {label_text(label, action)}" if several else text
 
 
-def _row(matrix: RuleMatrix, rule: Rule) -> str:
-    colour = label_colour(rule.action)
-    bars = matrix.bars(rule)
-    cells = []
-    for column in matrix.columns:
-        bar = bars.get(column.feature)
-        if bar is None:
-            cells.append('<td class="c"></td>')
-            continue
-        cells.append(
-            f'<td class="c" title="{escape(bar.text)}"><i style="left:{bar.left:.1f}%;'
-            f'width:{bar.right - bar.left:.1f}%;background:{colour}"></i></td>'
-        )
-    action = escape(_action(rule.action, matrix.rule_set, rule.dimension))
+class _Row(NamedTuple):
+    """A rule, as the template draws it: a cell is its text and its style."""
+
+    name: str
+    action: str
+    colour: str
+    samples: str
+    share: str
+    off: bool
+    cells: list[tuple[str, str]]
+
+
+def _row(matrix: RuleMatrix, rule: Rule) -> _Row:
+    bars, colour = matrix.bars(rule), label_colour(rule.action)
+    cells = [("", "")] * len(matrix.columns)
+    for place, column in enumerate(matrix.columns):
+        if bar := bars.get(column.feature):
+            width = bar.right - bar.left
+            cells[place] = bar.text, f"left:{bar.left:.1f}%;width:{width:.1f}%;background:{colour}"
+    action = _action(rule.action, matrix.rule_set, rule.dimension)
     name = matrix.rule_set.name_of(rule)
     if rule.placed:
         action = f"{PLACED_MARK}{action}"
         name += ", by hand" if rule.origin == "manual" else ", pinned"
-    off = "" if rule.enabled else ' class="off"'
-    share = share_text(rule.confidence) if rule.samples else "–"
-    return (
-        f'<tr{off}><td class="a" title="{name}"><i style="background:{colour}"></i>'
-        f'{action}</td><td class="n">{rule.samples:,}</td><td class="n">{share}</td>'
-        f"{''.join(cells)}</tr>"
+    return _Row(
+        name,
+        action,
+        colour,
+        f"{rule.samples:,}",
+        share_text(rule.confidence) if rule.samples else "–",
+        not rule.enabled,
+        cells,
     )
 
 
 def _scale_text(column: Column) -> str:
     low = number_text(column.low, apart_from=column.high)
     high = number_text(column.high, apart_from=column.low)
-    unit = f" {escape(column.name.unit)}" if column.name.unit else ""
+    unit = f" {column.name.unit}" if column.name.unit else ""
     return f"{low} to {high}{unit}"
 
 
@@ -275,46 +275,3 @@ def _bar(bounds: Bounds, column: Column) -> Bar:
         return float(np.clip(_INSET + share * (100.0 - 2 * _INSET), _OPEN, 100.0 - _OPEN))
 
     return Bar(place(bounds.low), place(bounds.high), short_condition(bounds, column.name))
-
-
-_STYLE = (
-    WIDE_STYLE
-    + """<style>
-.sarl-matrix { border-collapse: collapse; font-size: 0.8rem; min-width: 100%; }
-.sarl-matrix th { text-align: left; vertical-align: bottom; font-weight: 400; padding: 0 6px 4px;
-  border: 0; }
-.sarl-matrix th b { font-weight: 600; display: block; }
-.sarl-matrix th small { opacity: 0.7; white-space: nowrap; display: block; }
-.sarl-matrix th.up div { writing-mode: vertical-rl; transform: rotate(180deg); max-height: 11rem; }
-.sarl-matrix td { padding: 2px 6px; border: 0; border-top: 1px solid rgba(128,140,150,0.25);
-  height: 22px; }
-.sarl-matrix td.n, .sarl-matrix th.n { text-align: right; white-space: nowrap;
-  font-variant-numeric: tabular-nums; }
-.sarl-matrix td.a { white-space: nowrap; max-width: 15rem; overflow: hidden;
-  text-overflow: ellipsis; }
-.sarl-matrix td.a i { display: inline-block; width: 10px; height: 10px; border-radius: 2px;
-  margin-right: 6px; }
-.sarl-matrix td.c { position: relative; min-width: 44px; padding: 0;
-  border-left: 1px solid rgba(128,140,150,0.25); }
-.sarl-matrix td.c i { position: absolute; top: 5px; bottom: 5px; min-width: 2px;
-  border-radius: 2px; -webkit-print-color-adjust: exact; print-color-adjust: exact; }
-.sarl-matrix td.a i, .sarl-matrix-key i { -webkit-print-color-adjust: exact;
-  print-color-adjust: exact; }
-.sarl-matrix tr.off { opacity: 0.4; }
-.sarl-matrix-key { display: flex; flex-wrap: wrap; gap: 0.2rem 0.9rem; font-size: 0.82rem;
-  margin-bottom: 0.5rem; }
-.sarl-matrix-key i { display: inline-block; width: 11px; height: 11px; border-radius: 2px;
-  margin-right: 0.35rem; vertical-align: -1px; }
-@media print { .sarl-matrix thead { display: table-header-group; }
-  .sarl-matrix tr { break-inside: avoid; } }
-</style>"""
-)
-
-_DOCUMENT_STYLE = """<style>
-@page { size: A4 landscape; margin: 12mm; }
-:root { color-scheme: light; }
-body { font: 14px/1.4 system-ui, sans-serif; color: #1d2730; background: #ffffff; margin: 1.5rem; }
-h1 { font-size: 1.3rem; margin: 0 0 0.3rem; }
-p { max-width: 60rem; margin: 0 0 0.8rem; }
-@media print { body { margin: 0; font-size: 11px; } }
-</style>"""

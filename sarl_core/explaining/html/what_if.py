@@ -1,16 +1,15 @@
-"""What the page What if says of a state, in HTML without script; every name escaped."""
+"""What the page What if says of a state, in HTML."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
-from sarl_core.explaining.html.badges import BADGE_STYLE, badge
-from sarl_core.explaining.html.headings import heading
-from sarl_core.explaining.html.table import TABLE_STYLE, Column, table_html
+from sarl_core.explaining.html.table import Column, table_html
+from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import (
     change_text,
     condition_views,
@@ -29,19 +28,6 @@ from sarl_core.shielding.shield import Decision, Outside
 
 PLACED = "A person gave this rule its place: it is asked before the tree is."
 _SHOWN = 3  # features beyond the data that are named
-
-_STYLE = (
-    """<style>
-.sarl-state { font-size: 1rem; line-height: 1.55; }
-.sarl-state h4 { font-size: 1rem; font-weight: 600; line-height: 1.4; margin: 0;
-  padding: 0.4rem 0; }
-.sarl-state p { margin: 0 0 0.5rem 0; }
-.sarl-state p:last-child { margin-bottom: 0; }
-.sarl-state .quiet { opacity: 0.65; font-size: 0.875rem; }
-</style>"""
-    + TABLE_STYLE
-    + BADGE_STYLE
-)
 
 _WIDTH = "interquartile range, the width of the middle half of its demonstrated values"
 _CHANGES = (
@@ -80,7 +66,7 @@ def decision_html(
     state: NDArray[np.float32],
     rule_set: RuleSet,
     outside: Outside,
-) -> str:
+) -> Markup:
     """What is executed, and the rule behind it.
 
     Args:
@@ -91,20 +77,20 @@ def decision_html(
         outside: What the shield does outside the data of a rule.
 
     Returns:
-        HTML without script: how the rules met the agent's action, the action executed, the rule
+        HTML: how the rules met the agent's action, the action executed, the rule
         as a sentence, its conditions beside the state's values, and whether the state lies
         within its data.
     """
     if decision.intervened:
-        badges = badge("Changed by the rules", "changed")
+        badges = [("Changed by the rules", "changed")]
     elif decision.outside and outside == "abstain":
-        badges = badge("Rule abstains")
+        badges = [("Rule abstains", "plain")]
     elif any(one is not None for one in decision.rules):
-        badges = badge("Allowed by the rules", "allowed")
+        badges = [("Allowed by the rules", "allowed")]
     else:
-        badges = badge("No rule applies")
+        badges = [("No rule applies", "plain")]
     if decision.outside:
-        badges += badge("Outside the data", "beyond")
+        badges.append(("Outside the data", "beyond"))
     wanted, done = (
         np.asarray(values, dtype=float).reshape(-1).tolist()
         for values in (decision.proposed, decision.executed)
@@ -116,48 +102,36 @@ def decision_html(
         if decision.intervened
         else f"{executed[:1].upper()}{executed[1:]} is executed, as the agent wants"
     )
-    return _section(
-        f"<div>{badges}</div><h4>{escape(said)}</h4>{_rule_html(rule, state, rule_set)}"
-    )
-
-
-def _rule_html(rule: Rule | None, state: NDArray[np.float32], rule_set: RuleSet) -> str:
     if rule is None:
         which = "No rule applies to this state"
         if len(rule_set.actions) > 1:
             which = "No rule for this action dimension applies to this state"
-        return _note(f"{which}: the agent's action is passed on as it is.")
+        note = f"{which}: the agent's action is passed on as it is."
+        return render("decision", badges=badges, said=said, rule="", outside="", note=note)
     values = tuple(state.astype(np.float64).tolist())
-    views = condition_views(rule, values, rule_set)
-    table = table_html(
-        _CONDITIONS,
-        [(view.condition, view.value, view.room) for view in views],
-        "The rule's conditions and the state's values",
-    )
-    told = escape(sentence(rule, rule_set, state=values))
-    said = f"<p><b>{rule_set.name_of(rule)}.</b> {told}</p>"
-    return f"{said}{table if views else ''}{_data_html(rule, values, rule_set)}"
-
-
-def _data_html(rule: Rule, values: tuple[float, ...], rule_set: RuleSet) -> str:
-    """Whether the state lies within the data of a rule."""
-    if rule.box is None:
-        return _note("It is not kept where the data of this rule lay.")
-    texts = outside_texts(rule, values, rule_set.source.features)
-    if not texts:
-        return _note(
-            "The state lies inside this rule's data: every feature is between the least and the "
-            "largest value seen where it applies."
-        )
-    shown = escape("; ".join(texts[:_SHOWN]))
-    others = len(texts) - _SHOWN
+    rows = [(one.condition, one.value, one.room) for one in condition_views(rule, values, rule_set)]
+    caption = "The rule's conditions and the state's values"
+    beyond = outside_texts(rule, values, rule_set.source.features)
+    others = len(beyond) - _SHOWN
     more = f"; and {counted(others, 'feature')} more" if others > 0 else ""
-    return f"<p><b>Outside this rule's data:</b> {shown}{more}.</p>"
+    return render(
+        "decision",
+        badges=badges,
+        said=said,
+        rule=rule_set.name_of(rule),
+        sentence=sentence(rule, rule_set, state=values),
+        conditions=table_html(_CONDITIONS, rows, caption) if rows else "",
+        outside=f"{'; '.join(beyond[:_SHOWN])}{more}",
+        note="The state lies inside this rule's data: every feature is between the least and the "
+        "largest value seen where it applies."
+        if rule.box is not None
+        else "It is not kept where the data of this rule lay.",
+    )
 
 
 def changes_html(
     changes: Sequence[DecisionChange], spans: Sequence[Span], rule_set: RuleSet
-) -> str:
+) -> Markup:
     """The least change of each feature that makes the shield execute another action.
 
     Args:
@@ -166,17 +140,13 @@ def changes_html(
         rule_set: The shield's.
 
     Returns:
-        HTML without script: the first as a sentence, and all in a table.
+        HTML: the first as a sentence, and all in a table.
     """
-    title = heading("The least change that changes the decision")
-    if not changes:
-        none = "No change of a single feature changes what is executed."
-        return _section(f"{title}<p>{none}</p>")
     rows = [_change_row(change, spans, rule_set) for change in changes]
-    condition, does, *_ = rows[0]
-    said = f"<p>Executed would be <b>{escape(does)}</b> if {escape(condition)}.</p>"
-    return _section(
-        f"{title}{said}{table_html(_CHANGES, rows, 'The least changes that change the decision')}"
+    return render(
+        "least_changes",
+        first=rows[0] if rows else None,
+        table=table_html(_CHANGES, rows, "The least changes that change the decision"),
     )
 
 
@@ -196,7 +166,7 @@ def _change_row(
     )
 
 
-def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
+def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> Markup:
     """The rules that nearly apply.
 
     Args:
@@ -204,18 +174,11 @@ def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> str:
         rule_set: The shield's.
 
     Returns:
-        HTML without script, in a table.
+        HTML, in a table.
     """
-    title = heading("Rules that nearly apply")
-    if not misses:
-        none = "No rule would apply if one or two features were different."
-        return _section(f"{title}<p>{none}</p>")
-    note = _note(
-        "First those that lack one feature, then those that lack two; each with the least change "
-        "that lets it apply."
-    )
     rows = [_miss_row(miss, rule_set) for miss in misses]
-    return _section(f"{title}{table_html(_MISSES, rows, 'Rules that nearly apply')}{note}")
+    table = table_html(_MISSES, rows, "Rules that nearly apply") if rows else ""
+    return render("near_misses", table=table)
 
 
 def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
@@ -233,7 +196,7 @@ def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
     )
 
 
-def way_html(table: str, rule: Rule | None) -> str:
+def way_html(table: Markup, rule: Rule | None) -> Markup:
     """The way of the state through rules that are not of the tree on screen.
 
     Args:
@@ -241,24 +204,10 @@ def way_html(table: str, rule: Rule | None) -> str:
         rule: That it ends at, or None.
 
     Returns:
-        HTML without script.
+        HTML.
     """
-    placed = _note(PLACED) if rule is not None and rule.placed else ""
-    note = _note(
-        "These rules were not cut from the tree of the chosen demonstrations, so it is not drawn."
-    )
-    return _section(f"{heading('Its way through the rules')}{placed}{table}{note}")
-
-
-# --- the parts ---------------------------------------------------------------------------------
-
-
-def _section(inner: str) -> str:
-    return f'{_STYLE}<div class="sarl-state">{inner}</div>'
-
-
-def _note(text: str) -> str:
-    return f'<p class="quiet">{escape(text)}</p>'
+    placed = PLACED if rule is not None and rule.placed else ""
+    return render("way", placed=placed, table=table)
 
 
 def _yes(holds: bool) -> str:

@@ -1,16 +1,18 @@
-"""What the shield would do along each feature of a state, as bars in HTML without script."""
+"""What the shield would do along each feature of a state, as bars in HTML."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.figures.colours import faded, label_colour
 from sarl_core.explaining.html.path import label_key
+from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
@@ -18,22 +20,17 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.near import FeatureLine
 
 _PALE = 0.32
-# The mark is dark with a white edge, so that it is seen on every colour and on both grounds.
-_STYLE = """<style>
-.sarl-lines { font-size: 0.82rem; line-height: 1.25; }
-.sarl-lines p { margin: 0 0 0.4rem 0; font-size: 1rem; font-weight: 600; }
-.sarl-lines p.note { margin: 0.3rem 0 0 0; font-size: 0.875rem; font-weight: 400; opacity: 0.65; }
-.sarl-lines .row { display: flex; align-items: flex-start; gap: 0.6rem; padding: 0.2rem 0; }
-.sarl-lines .name { flex: none; width: 28%; max-width: 11rem; text-align: right;
-  overflow-wrap: anywhere; }
-.sarl-lines .track { flex: 1; min-width: 0; padding-right: 4px; }
-.sarl-lines .bar { position: relative; height: 17px; }
-.sarl-lines .bar span { position: absolute; top: 0; bottom: 0; min-width: 2px; }
-.sarl-lines .bar b { position: absolute; top: -3px; bottom: -3px; width: 3px; margin-left: -1.5px;
-  background: #1d2730; box-shadow: 0 0 0 1.5px #ffffff; border-radius: 1px; }
-.sarl-lines .ends { display: flex; justify-content: space-between; font-size: 0.7rem;
-  opacity: 0.65; padding-top: 3px; }
-</style>"""
+
+
+class _Row(NamedTuple):
+    """A bar, as the template draws it."""
+
+    name: str
+    told: str
+    now: str
+    place: str
+    parts: list[tuple[str, str]]
+    ends: list[str]
 
 
 def lines_html(
@@ -43,7 +40,7 @@ def lines_html(
     features: Sequence[Feature],
     dimension: int,
     rule_set: RuleSet,
-) -> str:
+) -> Markup:
     """A bar for each feature, coloured by what would be executed along it.
 
     Full colour where a rule decides, pale where the agent's action is passed on because no rule
@@ -58,22 +55,15 @@ def lines_html(
         rule_set: The shield's.
 
     Returns:
-        HTML without script, every name escaped. Every bar is as wide as there is room; the
+        HTML. Every bar is as wide as there is room; the
         present value is marked on it.
     """
     labels = rule_set.actions[dimension]
-    rows = "".join(
+    rows = [
         _row(stretches(line, ends, dimension, rule_set), ends, value, feature, labels)
         for line, ends, value, feature in zip(lines, ranges, values, features, strict=True)
-    )
-    return (
-        f'{_STYLE}<div class="sarl-lines">'
-        "<p>If one feature were different, and all others as they are</p>"
-        f"{label_key(labels)}{rows}"
-        '<p class="note">Each bar is a feature from its least to its largest demonstrated value, '
-        "the mark is the state. Full colour: a rule decides. Pale: the agent's action is passed "
-        "on.</p></div>"
-    )
+    ]
+    return render("lines", labels=label_key(labels), rows=rows)
 
 
 def stretches(
@@ -120,26 +110,22 @@ def _row(
     value: float,
     feature: Feature,
     labels: LabelledDimension,
-) -> str:
+) -> _Row:
     low, high = ends
     # The narrowest last: they are drawn wider than they are, and stay on top of their neighbours.
-    bar = "".join(
-        _part(part, ends, feature, labels)
-        for part in sorted(parts, key=lambda part: part[0] - part[1])
-    )
+    shown = sorted(parts, key=lambda part: part[0] - part[1])
     near = decimal_text(decimal_on_scale(value, low, high))
-    now = escape(f"{feature.name} is {with_unit(near, feature)}")
-    told = f"{now}: {_told(parts, value, feature, labels)}"
-    place = 100 * (value - low) / (high - low)
-    under = "".join(
-        f"<span>{escape(with_unit(number_text(end, apart_from=other), feature))}</span>"
-        for end, other in ((low, high), (high, low))
-    )
-    return (
-        f'<div class="row" role="img" aria-label="{told}">'
-        f'<div class="name">{escape(feature.name)}</div><div class="track"><div class="bar">{bar}'
-        f'<b style="left:{place:.2f}%" title="{now}"></b></div>'
-        f'<div class="ends">{under}</div></div></div>'
+    now = f"{feature.name} is {with_unit(near, feature)}"
+    return _Row(
+        feature.name,
+        f"{now}: {_told(parts, value, feature, labels)}",
+        now,
+        f"{100 * (value - low) / (high - low):.2f}%",
+        [_part(part, ends, feature, labels) for part in shown],
+        [
+            with_unit(number_text(end, apart_from=other), feature)
+            for end, other in ((low, high), (high, low))
+        ],
     )
 
 
@@ -148,7 +134,8 @@ def _part(
     ends: tuple[float, float],
     feature: Feature,
     labels: LabelledDimension,
-) -> str:
+) -> tuple[str, str]:
+    """What is said of it, and where it stands."""
     start, end, label, ruled = part
     low, high = ends
     # What ends with the bar hangs at its right, so that it stays within it however narrow it is.
@@ -159,10 +146,8 @@ def _part(
     )
     colour = label_colour(label) if ruled else faded(label_colour(label), _PALE)
     between = f"{feature.name} {_between(start, end, feature)}"
-    return (
-        f'<span style="{side};width:{100 * (end - start) / (high - low):.2f}%;'
-        f'background:{colour}" title="{escape(between)}: {_done(part, labels)}"></span>'
-    )
+    width = f"{100 * (end - start) / (high - low):.2f}%"
+    return f"{between}: {_done(part, labels)}", f"{side};width:{width};background:{colour}"
 
 
 def _told(
@@ -171,10 +156,10 @@ def _told(
     feature: Feature,
     labels: LabelledDimension,
 ) -> str:
-    """What a bar shows, for those who do not see it, escaped."""
+    """What a bar shows, for those who do not see it."""
     place = max((at for at, part in enumerate(parts) if part[0] <= value), default=0)
     here = parts[place]
-    stays = f"{_done(here, labels)}, from {escape(_between(here[0], here[1], feature))}"
+    stays = f"{_done(here, labels)}, from {_between(here[0], here[1], feature)}"
     if len(parts) == 1:
         return f"{stays}, which is all of the bar"
     below, above = (
@@ -192,7 +177,7 @@ def _between(start: float, end: float, feature: Feature) -> str:
 
 
 def _done(part: tuple[float, float, int, bool], labels: LabelledDimension) -> str:
-    """What is executed in a stretch, escaped."""
+    """What is executed in a stretch."""
     _, _, label, ruled = part
     does = label_text(label, labels) if 0 <= label < labels.n_labels else f"action {label}"
-    return escape(does) + (", by a rule" if ruled else ", as the agent wants")
+    return does + (", by a rule" if ruled else ", as the agent wants")

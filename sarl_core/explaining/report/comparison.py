@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+from markupsafe import Markup
+
 from sarl_core.documents import parse_json
 from sarl_core.environments.failures import cannot_fail
 from sarl_core.errors import InputError, quoted
@@ -101,7 +103,7 @@ class Row:
     """
 
     name: str
-    picture: str
+    picture: Markup
     typical: str
     interval: str
     mean: str

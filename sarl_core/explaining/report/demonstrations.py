@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -33,7 +34,7 @@ class ActionRow:
     name: str
     colour: str
     share: str
-    bar: str
+    bar: Markup
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,13 @@ class ActionShares:
     Attributes:
         name: Of the dimension.
         rows: One an action; () where there are many.
-        picture: SVG of many; "" where there are rows.
+        picture: SVG of many; None where there are rows.
         ends: Under the picture's left and right end.
     """
 
     name: str
     rows: tuple[ActionRow, ...] = ()
-    picture: str = ""
+    picture: Markup | None = None
     ends: tuple[str, str] = ("", "")
 
 
@@ -85,7 +86,7 @@ class Shown:
 
     sentences: tuple[str, ...]
     actions: tuple[ActionShares, ...]
-    returns: str
+    returns: Markup
     returns_text: str
     features: tuple[FeatureLine, ...]
     notes: tuple[str, ...]
@@ -201,10 +202,10 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _returns(demonstrations: Demonstrations) -> tuple[str, str]:
+def _returns(demonstrations: Demonstrations) -> tuple[Markup, str]:
     returns = demonstrations.episode_returns
     if returns is None:
-        return "", ""
+        return Markup(), ""
     series = episode_series(returns, demonstrations.episode_finished, most=120)
     least, most = float(returns.min()), float(returns.max())
     zero = 0.0

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -37,7 +38,7 @@ class Coverage:
 
     name: str
     text: str
-    bar: str
+    bar: Markup
     uncovered: ActionShares | None
 
 

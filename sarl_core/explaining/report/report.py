@@ -1,7 +1,7 @@
 """A report: one HTML file that opens without a network, for people who know only the domain.
 
 The parts are worked out first, each by a module of its own; the template only puts them in place,
-and escapes every text. What is drawn comes as SVG from `report_svg`, without script.
+and escapes every text. What is drawn comes as SVG from `svg`, without script.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from sarl_core.explaining.report.provenance import commands_that_hold, facts, mi
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report.thresholds import kept
+from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.files import whole_file
 from sarl_core.mining.editing.renaming import renamed_rules
@@ -41,7 +41,6 @@ from sarl_core.rendering.example_frames import (
     try_example_frames,
 )
 
-TEMPLATES = Path(__file__).parent / "templates"
 MOST_IN_FULL = 60
 MOST_FRAMES = 12
 _MOST_FITTED = 50_000  # steps; to grow ten trees of more takes minutes
@@ -189,7 +188,8 @@ def make_report(
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
-    html = _template().render(
+    html = render(
+        "report",
         title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
         elsewhere=_elsewhere(as_given, demonstrations, trees),
@@ -338,17 +338,3 @@ def _elsewhere(
     fit = cross_fit(demonstrations, divider=rule_set.divider)
     judged = fit.at(rule_set.thresholds)
     return judged_sentence(judged), parting_text(rule_set.fidelity, judged)
-
-
-@lru_cache(maxsize=1)
-def _template() -> Any:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html")

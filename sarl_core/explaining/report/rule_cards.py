@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.figures.colours import label_colour
@@ -49,7 +50,7 @@ class Evidence:
     source: str
     text: str
     interval: str
-    bar: str
+    bar: Markup
     below: bool
 
 
@@ -65,7 +66,7 @@ class ConditionRow:
 
     text: str
     data: str
-    bar: str
+    bar: Markup
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ def _states(share: Share) -> str:
 
 
 def _nothing(source: str) -> Evidence:
-    return Evidence(source, "0 of 0 states", "nothing is known there", "", below=False)
+    return Evidence(source, "0 of 0 states", "nothing is known there", Markup(), below=False)
 
 
 def _mined(share: Share, threshold: float | None) -> Evidence:
@@ -270,7 +271,7 @@ def _condition(
 ) -> ConditionRow:
     text = short_condition(bounds, feature)
     if is_flag(feature, bounds):
-        return ConditionRow(text, "", "")
+        return ConditionRow(text, "", Markup())
     unit = f" {feature.unit}" if feature.unit else ""
     low = number_text(row.low, apart_from=row.high)
     high = number_text(row.high, apart_from=row.low)

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import LAYER_SCALE
+from sarl_core.explaining.templates import render
 
 # Of the page's own style, light or dark. The colours of actions stay those of actions.
 NEUTRAL, BAD, MUTED = "var(--fill)", "var(--bad)", "var(--muted)"
@@ -51,7 +49,19 @@ class Scale(NamedTuple):
         return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
 
 
-def share_bar(share: float, colour: str) -> str:
+class Shape(NamedTuple):
+    """Something drawn.
+
+    Attributes:
+        tag: Of the element.
+        attributes: Its own; those that are None are left out.
+    """
+
+    tag: str
+    attributes: dict[str, str | None]
+
+
+def share_bar(share: float, colour: str) -> Markup:
     """A share as a bar; said in words beside it.
 
     Args:
@@ -62,12 +72,12 @@ def share_bar(share: float, colour: str) -> str:
         SVG.
     """
     track = _box(0, 1, 0, 12, "track")
-    return _picture("bar", 12, track + _box(0, share, 0, 12, fill=colour))
+    return _picture("bar", 12, [track, _box(0, share, 0, 12, fill=colour)])
 
 
 def evidence_bar(
     share: float, interval: tuple[float, float] | None, *, below: bool, threshold: float | None
-) -> str:
+) -> Markup:
     """A share with its interval, and the threshold it had to reach; said in words beside it.
 
     Args:
@@ -85,12 +95,12 @@ def evidence_bar(
     if interval is not None:
         low, high = interval
         parts += [_across(low, high, 9, "ink"), _line(low, 5, 13, "ink"), _line(high, 5, 13, "ink")]
-    return _picture("bar", 18, "".join(parts))
+    return _picture("bar", 18, parts)
 
 
 def interval_bar(
     scale: Scale, data: tuple[float, float], asked: tuple[float, float], states: Sequence[float]
-) -> str:
+) -> Markup:
     """What a rule asks of a feature, against the data; said in words beside it.
 
     Args:
@@ -113,12 +123,12 @@ def interval_bar(
     for place, bound in ((low, asked[0]), (high, asked[1])):
         if math.isfinite(bound):
             parts.append(_line(place, 0, 16, "edge"))
-    return _picture("bar", 16, "".join(parts))
+    return _picture("bar", 16, parts)
 
 
 def columns(
     values: Sequence[float], label: str, colours: Sequence[str], *, zero: float, top: float
-) -> str:
+) -> Markup:
     """Numbers as columns, side by side.
 
     Args:
@@ -140,17 +150,15 @@ def columns(
     for index, (value, colour) in enumerate(zip(values, colours, strict=True)):
         end = height * (high - value) / span
         y, tall = min(ground, end), max(abs(end - ground), 0.8)
-        parts.append(
-            f'<rect x="{_percent((index + 0.1) * width)}" y="{y:.1f}" '
-            f'width="{_percent(0.8 * width)}" height="{tall:.1f}" style="fill:{colour}"/>'
-        )
+        x = (index + 0.1) * width
+        parts.append(_box(x, x + 0.8 * width, round(y, 1), round(tall, 1), fill=colour))
     parts.append(_across(0, 1, round(ground, 1), "axis"))
-    return _picture("columns", int(height), "".join(parts), label)
+    return _picture("columns", int(height), parts, label)
 
 
 def dot_and_interval(
     scale: Scale, value: float, low: float, high: float, *, colour: str, zero: bool
-) -> str:
+) -> Markup:
     """A number and how sure one can be of it; said in words beside it.
 
     Args:
@@ -168,62 +176,9 @@ def dot_and_interval(
     if zero and scale.low < 0 < scale.high:
         parts.append(_line(scale.place(0.0), 0, 16, "axis"))
     parts.append(_across(scale.place(low), scale.place(high), 8, "wide", colour))
-    parts.append(
-        f'<circle cx="{_percent(scale.place(value))}" cy="8" r="4.5" class="dot" '
-        f'style="fill:{colour}"/>'
-    )
-    return _picture("bar", 16, "".join(parts))
-
-
-def mix_bar(shares: Sequence[float], colours: Sequence[str]) -> str:
-    """Shares of a whole behind each other; said in words beside it.
-
-    Args:
-        shares: Summing to at most 1.
-        colours: One a share.
-
-    Returns:
-        SVG.
-    """
-    parts, at = [_box(0, 1, 0, 12, "track")], 0.0
-    for share, colour in zip(shares, colours, strict=True):
-        if share > 0:
-            parts.append(_box(at, at + share, 0, 12, fill=colour))
-        at += share
-    return _picture("bar", 12, "".join(parts))
-
-
-def layer_colour(share: float) -> tuple[str, str]:
-    """The colour of a cell of a landscape, and one that is legible on it.
-
-    Args:
-        share: 0 to 1, from ground to ink.
-
-    Returns:
-        Ground and text, as "#f4ecd8".
-    """
-    places = [place for place, _ in LAYER_SCALE]
-    channels: NDArray[np.float64] = np.array(
-        [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for _, colour in LAYER_SCALE], float
-    )
-    mixed = [round(float(np.interp(share, places, channels[:, index]))) for index in range(3)]
-    ground = "#" + "".join(f"{value:02x}" for value in mixed)
-    dark, light = "#15202a", "#ffffff"
-    return ground, dark if _contrast(ground, dark) >= _contrast(ground, light) else light
-
-
-def _contrast(one: str, other: str) -> float:
-    """The contrast of two colours as WCAG defines it, 1 to 21."""
-    first, second = sorted((_luminance(one), _luminance(other)))
-    return (second + 0.05) / (first + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
-    linear = [
-        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
-    ]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    places = {"cx": _percent(scale.place(value)), "cy": "8", "r": "4.5"}
+    parts.append(_shape("circle", places, "dot", f"fill:{colour}"))
+    return _picture("bar", 16, parts)
 
 
 def _percent(share: float) -> str:
@@ -232,27 +187,29 @@ def _percent(share: float) -> str:
 
 def _box(
     start: float, end: float, y: float, height: float, css: str = "", *, fill: str = ""
-) -> str:
-    look = (f' class="{css}"' if css else "") + (f' style="fill:{fill}"' if fill else "")
-    return (
-        f'<rect x="{_percent(start)}" y="{y:g}" width="{_percent(max(end - start, 0.0))}" '
-        f'height="{height:g}"{look}/>'
-    )
+) -> Shape:
+    places = {
+        "x": _percent(start),
+        "y": f"{y:g}",
+        "width": _percent(max(end - start, 0.0)),
+        "height": f"{height:g}",
+    }
+    return _shape("rect", places, css, f"fill:{fill}" if fill else "")
 
 
-def _line(at: float, top: float, bottom: float, css: str) -> str:
+def _line(at: float, top: float, bottom: float, css: str) -> Shape:
     place = _percent(at)
-    return f'<line x1="{place}" x2="{place}" y1="{top:g}" y2="{bottom:g}" class="{css}"/>'
+    return _shape("line", {"x1": place, "x2": place, "y1": f"{top:g}", "y2": f"{bottom:g}"}, css)
 
 
-def _across(start: float, end: float, y: float, css: str, colour: str = "") -> str:
-    look = f' style="stroke:{colour}"' if colour else ""
-    return (
-        f'<line x1="{_percent(start)}" x2="{_percent(end)}" y1="{y:g}" y2="{y:g}" '
-        f'class="{css}"{look}/>'
-    )
+def _across(start: float, end: float, y: float, css: str, colour: str = "") -> Shape:
+    places = {"x1": _percent(start), "x2": _percent(end), "y1": f"{y:g}", "y2": f"{y:g}"}
+    return _shape("line", places, css, f"stroke:{colour}" if colour else "")
 
 
-def _picture(css: str, height: int, content: str, label: str = "") -> str:
-    told = f'role="img" aria-label="{escape(label)}"' if label else 'aria-hidden="true"'
-    return f'<svg class="{css}" width="100%" height="{height}" {told}>{content}</svg>'
+def _shape(tag: str, places: dict[str, str], css: str = "", style: str = "") -> Shape:
+    return Shape(tag, {**places, "class": css or None, "style": style or None})
+
+
+def _picture(css: str, height: int, shapes: Sequence[Shape], label: str = "") -> Markup:
+    return render("svg", css=css, height=height, shapes=shapes, label=label)

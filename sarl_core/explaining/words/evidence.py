@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MARKER_COLOUR, MUTED_COLOUR
+from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.mining.language import counted, number_text, share_text
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.episode_counts import Influence
@@ -316,73 +315,3 @@ def band_text(band: Band, feature: Feature) -> str:
     low = number_text(band.low, apart_from=band.high)
     high = number_text(band.high, apart_from=band.low)
     return f"{own} ({low})" if band.low == band.high else f"{own} ({low} to {high})"
-
-
-_STYLE = """<style>
-.sarl-sure { width: 100%; max-width: 640px; font-size: 0.82rem; margin: 0.1rem 0 0.2rem; }
-.sarl-sure div { display: flex; align-items: center; gap: 0.6rem; line-height: 1.5; }
-.sarl-sure b { flex: 0 0 5.6rem; font-weight: 400; opacity: 0.75; }
-.sarl-sure span.t { position: relative; flex: 1 1 auto; height: 14px; min-width: 90px; }
-.sarl-sure span.t::before { content: ''; position: absolute; left: 0; right: 0; top: 6.5px;
-  height: 1px; background: rgba(128,140,150,0.4); }
-.sarl-sure i { position: absolute; }
-.sarl-sure i.w { top: 4px; height: 6px; border-radius: 3px; min-width: 2px; }
-.sarl-sure i.p { top: 1px; width: 12px; height: 12px; margin-left: -6px; border-radius: 50%; }
-.sarl-sure i.m { top: -1px; bottom: -1px; width: 2px; margin-left: -1px; background: MARKER; }
-.sarl-sure em { flex: 0 0 10.5rem; font-style: normal; font-variant-numeric: tabular-nums; }
-</style>""".replace("MARKER", MARKER_COLOUR)
-
-
-def evidence_bar(rule: Rule, threshold: float) -> str:
-    """What is known of a rule over one scale, with the minimum confidence marked.
-
-    Args:
-        rule: With what was held out, if anything was.
-        threshold: The minimum confidence.
-
-    Returns:
-        HTML without script, styled in place: a dot for each share, and for what was held out a
-        whisker, its interval; "" where no pair is the rule's.
-    """
-    if not rule.samples:
-        return ""
-    held = rule.held_out
-    share = None if held is None else held.share
-    interval = None if held is None else held.interval
-    lowest = min(
-        value
-        for value in (threshold, rule.confidence, share, *(interval or ()))
-        if value is not None
-    )
-    # To the next tenth below, so that dots can be told apart where all is near to one.
-    floor = float(max(math.floor(lowest * 10 - 0.5) / 10, 0.0))
-
-    def place(value: float) -> float:
-        return 100 * (value - floor) / (1 - floor)
-
-    def line(name: str, share: float, interval: Interval | None, ink: str, text: str) -> str:
-        whisker = ""
-        if interval is not None:
-            low, high = place(interval.low), place(interval.high)
-            whisker = (
-                f'<i class="w" style="left:{low:.2f}%;width:{high - low:.2f}%;'
-                f'background:{ink}"></i>'
-            )
-        return (
-            f"<div><b>{escape(name)}</b>"
-            f'<span class="t" title="{escape(text)}">'
-            f'<i class="m" style="left:{place(threshold):.2f}%"></i>{whisker}'
-            f'<i class="p" style="left:{place(share):.2f}%;background:{ink}"></i></span>'
-            f"<em>{escape(text)}</em></div>"
-        )
-
-    lines = [line("mined from", rule.confidence, None, MUTED_COLOUR, share_text(rule.confidence))]
-    if share is not None:
-        ink = VERDICT_COLOURS[verdict(rule, threshold)]
-        lines.append(line("held out", share, interval, ink, interval_text(held)))
-    scale = (
-        f'<div style="opacity:0.6"><b></b><span class="t" style="display:flex;justify-content:'
-        f'space-between;height:auto"><small>{share_text(floor)}</small><small>100 %</small></span>'
-        "<em></em></div>"
-    )
-    return f'{_STYLE}<div class="sarl-sure">{"".join(lines)}{scale}</div>'

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import html
-
 import plotly.graph_objects as go
 import streamlit as st
 
@@ -12,6 +10,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.colours import label_colour
 from sarl_core.explaining.figures.demonstrations import feature_figure
 from sarl_core.explaining.figures.distributions import FeatureRow, histogram_by_label
+from sarl_core.explaining.html.step_card import legend
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 from sarl_core.mining.language import label_text
 from sarl_dashboard.cache import cached
@@ -38,16 +37,13 @@ def feature_figures(
     )
 
 
-def legend(dimension: LabelledDimension) -> None:
+def show_legend(dimension: LabelledDimension) -> None:
     """The colours of the labels."""
-    entries = "".join(
-        f'<span style="display:inline-block;margin-right:1.1em;white-space:nowrap">'
-        f'<span style="display:inline-block;width:.75em;height:.75em;border-radius:2px;'
-        f'background:{label_colour(label)};margin-right:.4em"></span>'
-        f"{html.escape(label_text(label, dimension))}</span>"
+    entries = [
+        (label_text(label, dimension), label_colour(label))
         for label in range(min(dimension.n_labels, 24))
-    )
-    st.html(f'<div style="font-size:.9rem">{html.escape(dimension.name)}: {entries}</div>')
+    ]
+    st.html(legend(entries, before=f"{dimension.name}:"))
 
 
 def show_features(
@@ -83,7 +79,7 @@ def show_features(
             bind="query-params",
             max_selections=MOST,
         )
-    legend(dimensions[by])
+    show_legend(dimensions[by])
     if not features:
         st.caption("Choose a feature above to see how it is distributed.")
     figures = feature_figures(demonstrations, divider, by, tuple(features))

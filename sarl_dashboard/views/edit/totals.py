@@ -85,7 +85,6 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
     with st.container(key="numbers"):
         st.html(
             number_cards(cards, framed=True)
-            + '<div style="height:0.8rem"></div>'
             + note(f"Against the unedited set: {sentence[:1].lower() + sentence[1:]}{where(of)}")
         )
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.explaining.html.evidence import overview_plot
-from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.html.number_cards import Number, number_cards
+from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import influence_sentences, judged_sentence
 from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
@@ -32,7 +33,7 @@ MEANINGS: tuple[tuple[Verdict, str], ...] = (
 
 
 @cached()
-def _overview(evidence: Evidence) -> str:
+def _overview(evidence: Evidence) -> Markup:
     findings = evidence.findings
     return overview_plot(findings.rules[:MOST_DRAWN], evidence.rule_set, findings.threshold)
 
@@ -66,21 +67,19 @@ def show_overview(evidence: Evidence) -> None:
         remedy = remedy_text(short, evidence.parts.remaining.n_episodes)
         if remedy:
             sentences.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
-    ink = {name: f"<b style='color:{colour}'>■</b> " for name, colour in VERDICT_COLOURS.items()}
-    words = f"dotted: minimum confidence {share_text(findings.threshold)}"
-    if judged is not None:
-        words = (
-            f"{ink['reached']}reached &ensp; {ink['open']}open &ensp; {ink['below']}too low &ensp; "
-            "a dot alone: too few episodes &ensp; grey: on what it was mined from &ensp; " + words
-        )
+    told_apart: tuple[Verdict, ...] = ("reached", "open", "below") if judged is not None else ()
     if len(findings.rules) > MOST_DRAWN:
         sentences.append(
             f"Drawn: the {MOST_DRAWN} rules with the most support, of {len(findings.rules):,}."
         )
     with st.container(key="overview"):  # one piece: each element of its own takes its time
         st.html(
-            f"{number_cards(numbers)}<div style='height:1.2rem'></div>"
-            + _overview(evidence)
-            + f"<div style='font-size:0.85rem;opacity:0.9;margin:0.6rem 0 0.9rem'>{words}</div>"
-            + "".join(map(note, sentences))
+            render(
+                "evidence_overview",
+                numbers=number_cards(numbers),
+                plot=_overview(evidence),
+                verdicts=[(VERDICT_COLOURS[name], VERDICTS[name]) for name in told_apart],
+                threshold=share_text(findings.threshold),
+                sentences=sentences,
+            )
         )

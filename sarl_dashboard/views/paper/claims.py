@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from html import escape
 
 import streamlit as st
 
+from sarl_core.explaining.templates import render
 from sarl_core.mining.language import counted
 from sarl_core.paper.chance import chance_text, how_decided
 from sarl_core.paper.report import Entry
@@ -21,20 +21,6 @@ _DOTS: dict[Verdict, str] = {
     "does not agree": "#D55E00",
     "cannot be judged": "#8a949c",
 }
-_STYLE = """<style>
-.claims { font-size: 0.95rem; }
-.claims .claim { display: grid; grid-template-columns: 9em minmax(0, 5fr) minmax(0, 6fr);
-  gap: 0.3em 1.6em; padding: 0.75em 0; border-top: 1px solid rgba(128, 128, 128, 0.3); }
-.claims.beside .claim { grid-template-columns: minmax(0, 1fr); }
-.claims.beside .claim:first-child { border-top: none; padding-top: 0.2em; }
-.claims .who { opacity: 0.72; font-size: 0.85em; }
-.claims .verdict { font-weight: 600; white-space: nowrap; }
-.claims .dot { display: inline-block; width: 0.65em; height: 0.65em; border-radius: 50%;
-  margin-right: 0.5em; }
-.claims details { opacity: 0.72; font-size: 0.85em; margin-top: 0.2em; }
-.claims summary { cursor: pointer; width: fit-content; }
-@media (max-width: 900px) { .claims .claim { grid-template-columns: minmax(0, 1fr); } }
-</style>"""
 
 
 def show_all_claims(entries: Iterable[Entry]) -> None:
@@ -84,15 +70,5 @@ def show_claims(claims: tuple[Claim, ...], *, beside: bool) -> None:
         claims: To show.
         beside: Whether they stand beside a figure, in a narrow column.
     """
-    rows = [
-        '<div class="claim">'
-        f'<div class="verdict"><span class="dot" style="background:{_DOTS[one.verdict]}"></span>'
-        f"{escape(one.verdict.capitalize())}</div>"
-        f'<div><div class="who">The paper, {escape(one.where)}</div>{escape(one.paper)}</div>'
-        f'<div><div class="who">Here</div>{escape(one.ours)}'
-        f"<details><summary>How this is decided</summary>{escape(how_decided(one))}</details></div>"
-        "</div>"
-        for one in claims
-    ]
-    kind = "claims beside" if beside else "claims"
-    st.html(f'{_STYLE}<div class="{kind}">{"".join(rows)}</div>')
+    rows = [(one, _DOTS[one.verdict], how_decided(one)) for one in claims]
+    st.html(render("claims", rows=rows, beside=beside))

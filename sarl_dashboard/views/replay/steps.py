@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import html
 
 import numpy as np
 import streamlit as st
+from markupsafe import Markup
 from streamlit.errors import StreamlitAPIException
 
 from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, label_colour
@@ -19,7 +19,7 @@ from sarl_core.explaining.figures.replay import (
     return_figure,
 )
 from sarl_core.explaining.html.lit_path import lit_paths_html
-from sarl_core.explaining.html.step_card import picture, step_card, swatch
+from sarl_core.explaining.html.step_card import legend, picture, step_card
 from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, label_text, number_text
@@ -32,20 +32,18 @@ from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
 
 
-def legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
+def show_legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
     """The colours of the strip."""
     many = len(dimensions) > 1
     entries = [
-        swatch(f"{dimension.name} {text}" if many else text, label_colour(label))
+        (f"{dimension.name} {text}" if many else text, label_colour(label))
         for dimension in dimensions
         for label in range(min(dimension.n_labels, 24))
         for text in [label_text(label, dimension)]
     ]
     if marks:
-        entries.append(swatch("changed by the rules", INTERVENTION_COLOUR))
-    entries.append('<span style="opacity:.7">Click a step to look at it.</span>')
-    gap = "display:flex;flex-wrap:wrap;column-gap:1.2em;font-size:.9rem"
-    st.html(f'<div style="{gap}">{"".join(entries)}</div>')
+        entries.append(("changed by the rules", INTERVENTION_COLOUR))
+    st.html(legend(entries, after="Click a step to look at it."))
 
 
 def pick_step() -> None:
@@ -76,7 +74,7 @@ def step_by_step(played: Played) -> None:
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     st.subheader("Step by step")
-    legend(replay.dimensions, marks=shielded)
+    show_legend(replay.dimensions, marks=shielded)
     plain = replay.plain.steps
     assert plain is not None  # a replay records them
     rows = tracks(steps, replay.dimensions, shielded=shielded)
@@ -151,15 +149,13 @@ def at_step(played: Played, timeline: Timeline) -> None:
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
-        seen = picture(replay.png(current), f"The environment at step {current}")
+        ways: list[tuple[str, Markup]] = []
         if replay.finder is not None:
             tables = lit_paths_html(replay.finder, steps.observation[current], steps.rules[current])
             many = len(tables) > 1
-            seen += "".join(
-                f"<b>{html.escape(action.dimension)}</b>{table}" if many else table
-                for action, table in zip(view.actions, tables, strict=True)
-            )
-        st.html(seen)
+            names = [action.dimension if many else "" for action in view.actions]
+            ways = list(zip(names, tables, strict=True))
+        st.html(picture(replay.png(current), f"The environment at step {current}", ways))
     with words:
         st.html(step_card(view, shielded=shielded))
         if linked is not None:

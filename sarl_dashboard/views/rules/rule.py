@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.colours import label_colour
@@ -113,7 +114,7 @@ def note_of(tree: PolicyTree, in_force: InForce) -> str:
 
 
 @cached()
-def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) -> str:
+def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) -> Markup:
     """The interval on each feature against its distribution, and some states of the rule."""
     parts = []
     if rule.conditions:
@@ -123,4 +124,4 @@ def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) ->
     if rule.samples:
         title = "Example states" if rule.samples > 1 else "The one state it applies to"
         parts.append(heading(title) + examples_html(demonstrations, tree, rule))
-    return "".join(parts)
+    return Markup().join(parts)

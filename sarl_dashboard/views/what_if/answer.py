@@ -11,7 +11,7 @@ import streamlit as st
 from numpy.typing import NDArray
 from streamlit.delta_generator import DeltaGenerator
 
-from sarl_core.explaining.html.headings import heading
+from sarl_core.explaining.html.headings import heading, note
 from sarl_core.explaining.html.lit_path import lit_path_table
 from sarl_core.explaining.html.what_if import (
     PLACED,
@@ -141,7 +141,7 @@ def least_changes(
 
 def way_through(rules: RulesOnTrees, dimension: int, rule: Rule | None, node: int) -> None:
     """The way of the state through the tree, to a node."""
-    placed = f"<p>{PLACED}</p>" if rule is not None and rule.placed else ""
+    placed = note(PLACED) if rule is not None and rule.placed else ""
     st.html(heading("Its way through the tree") + placed)
     path = PathInTree(
         tree=rules.trees[dimension],

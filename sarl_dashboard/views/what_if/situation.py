@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.html.lit_path import PathFinder
+from sarl_core.explaining.state_path import PathFinder
 from sarl_core.explaining.words.what_if import by_use
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.near import Neighbourhood, feature_spreads
