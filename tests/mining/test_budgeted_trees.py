@@ -136,7 +136,7 @@ def test_the_file_says_how_the_paths_were_cut(tmp_path):
     assert RuleSet.load(tmp_path / "rules.json") == rules
     text = (tmp_path / "rules.json").read_text()
     (tmp_path / "rules.json").write_text(text.replace('"cut": "leaves"', '"cut": "branches"'))
-    with pytest.raises(InputError, match="'branches' is neither 'thresholds' nor 'leaves'"):
+    with pytest.raises(InputError, match="'branches' is neither 'leaves' nor 'thresholds'"):
         RuleSet.load(tmp_path / "rules.json")
 
 
