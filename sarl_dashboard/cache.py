@@ -48,7 +48,7 @@ HASH_FUNCS: HashFuncs = {
     bytes: digest_of,
 }
 """What stands in a key for a thing that is large or has no hash."""
-_PLAIN = (type(None), bool, int, float, str, Path, np.generic)
+_PLAIN = (type(None), bool, int, str, Path)
 
 
 def key_of(value: object, hash_funcs: HashFuncs = HASH_FUNCS) -> object:
@@ -66,9 +66,13 @@ def key_of(value: object, hash_funcs: HashFuncs = HASH_FUNCS) -> object:
         TypeError: If something in it is of another type: a key that leaves it out, or that samples
             it, would bring back what was made from something else.
     """
+    if isinstance(value, np.generic):
+        value = value.item()
     kind = type(value)
     if kind in hash_funcs:
         return kind, hash_funcs[kind](value)
+    if isinstance(value, float):
+        return kind, repr(value)  # so that NaN is found again
     if isinstance(value, _PLAIN):
         return kind, value
     if isinstance(value, tuple):

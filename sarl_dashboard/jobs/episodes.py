@@ -1,31 +1,45 @@
 """Episodes of agents with and without shields: run in processes, kept for whoever asks again.
 
 An episode depends on its environment, agent, rules and seed, and on nothing else. So what is kept
-under the digest of these are the episodes themselves, as many as there are: more of them continue
+under the key of these are the episodes themselves, as many as there are: more of them continue
 where the last ones ended, and fewer are the first of them.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from threading import Lock
+from typing import Protocol
 
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
 from sarl_core.errors import SarlError
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import Processes
 from sarl_core.rollouts.episodes import Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.tasks import Task, run_tasks
-from sarl_core.shielding.shield import Shield
+from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.processes import processes
-from sarl_dashboard.text import digest_of
 
 MOST_RESULTS = 1_000  # a hundred episodes take about 10 kB
+
+
+class AgentMaker(Protocol):
+    """Makes an agent, which may take its time."""
+
+    @property
+    def digest(self) -> str:
+        """What tells the agent from others in its environment and with its seed."""
+
+    def __call__(self) -> Agent:
+        """Make it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,36 +47,34 @@ class Row:
     """One row of a comparison: whose episodes they are, and how to run them.
 
     Attributes:
-        key: Digest of everything the episodes depend on, their number left out.
         name: On screen.
         env_id: Environment.
         seed: Of the first episode.
         agent: Makes the agent.
-        shield: Makes the shield, or gives None.
+        rules: Of the shield; None without one.
+        projection: How the shield replaces a continuous action.
+        outside: Whether rules act in states outside the data they were mined from.
     """
 
-    key: str
     name: str
     env_id: str
     seed: int
-    agent: Callable[[], Agent]
-    shield: Callable[[], Shield | None]
+    agent: AgentMaker
+    rules: RuleSet | None = None
+    projection: Projection = "centre"
+    outside: Outside = "act"
 
+    @cached_property
+    def key(self) -> object:
+        """Of everything that the episodes depend on, their number left out."""
+        shield = (self.rules, self.projection, self.outside)
+        return key_of((self.env_id, self.seed, self.agent.digest, shield))
 
-def row_key(env_id: str, agent: str, rules: str, projection: str, seed: int) -> str:
-    """Digest of what episodes depend on.
-
-    Args:
-        env_id: Environment.
-        agent: Tells the agent from all others, by content.
-        rules: Tells the rules, "" for none.
-        projection: How they replace a continuous action; "centre" where there are none.
-        seed: Of the first episode.
-
-    Returns:
-        Hexadecimal digits.
-    """
-    return digest_of(repr((env_id, agent, rules, projection, seed)).encode())
+    def shield(self) -> Shield | None:
+        """Make the shield."""
+        if self.rules is None:
+            return None
+        return Shield(self.rules, projection=self.projection, outside=self.outside)
 
 
 class Results:
@@ -70,10 +82,10 @@ class Results:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._episodes: OrderedDict[str, Episodes] = OrderedDict()
-        self._cuts: dict[str, Episodes] = {}
+        self._episodes: OrderedDict[object, Episodes] = OrderedDict()
+        self._cuts: dict[object, Episodes] = {}
 
-    def get(self, key: str, most: int) -> Episodes | None:
+    def get(self, key: object, most: int) -> Episodes | None:
         """The first of the episodes that are kept.
 
         Args:
@@ -135,7 +147,7 @@ class Batch:
 
     rows: tuple[Row, ...]
     episodes: int
-    problems: dict[str, SarlError] = field(default_factory=dict)
+    problems: dict[object, SarlError] = field(default_factory=dict)
 
 
 COMPARISON = Place[Batch]("comparison")  # of the page Shield

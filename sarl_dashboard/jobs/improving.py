@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from threading import Lock
 
 import streamlit as st
 
-from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.improving.aggregation import Aggregation, AggregationRound, aggregate
 from sarl_core.improving.gaps import Gaps, gaps_so_far
@@ -18,6 +18,8 @@ from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import Processes
+from sarl_dashboard.cache import key_of
+from sarl_dashboard.jobs.episodes import AgentMaker
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.memory_cache import BoundedCache
@@ -31,7 +33,6 @@ class Order:
     """Everything that a run depends on.
 
     Attributes:
-        key: Digest of it; equal keys give equal results.
         start: What the expert has shown so far.
         env_id: Environment.
         plan: How many rules, rounds and episodes.
@@ -40,13 +41,18 @@ class Order:
         command: The same on the command line.
     """
 
-    key: str
     start: Demonstrations
     env_id: str
     plan: Plan
-    expert: Callable[[], Agent] | None
+    expert: AgentMaker | None
     rules: RuleSet | None
     command: str
+
+    @cached_property
+    def key(self) -> object:
+        """Equal keys give equal results."""
+        expert = self.expert.digest if self.expert is not None else None
+        return key_of((self.start, self.env_id, self.plan, expert, self.rules))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import streamlit as st
@@ -14,10 +15,10 @@ from sarl_core.explaining.report.report import Report, Wishes, make_report
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
+from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.memory_cache import BoundedCache
-from sarl_dashboard.text import digest_of
 
 KEPT = 8  # a report has about a megabyte
 
@@ -27,7 +28,6 @@ class Order:
     """Everything that a report depends on.
 
     Attributes:
-        key: Digest of it; equal keys give equal reports.
         rule_set: The rules.
         demonstrations: They are about.
         wishes: What it is to hold.
@@ -36,7 +36,6 @@ class Order:
         trees: Grown from the demonstrations, None where no thresholds cut the rules.
     """
 
-    key: str
     rule_set: RuleSet
     demonstrations: Demonstrations
     wishes: Wishes
@@ -44,24 +43,13 @@ class Order:
     comparison: tuple[Result, ...]
     trees: tuple[PolicyTree, ...] | None
 
-
-def order_key(
-    rules: RuleSet, demonstrations: Demonstrations, wishes: Wishes, comparison: Sequence[Result]
-) -> str:
-    """Digest of what a report depends on.
-
-    Args:
-        rules: The rules.
-        demonstrations: They are about.
-        wishes: What it is to hold; no agent among them.
-        comparison: Results to show.
-
-    Returns:
-        Hexadecimal digits.
-    """
-    contents = (wishes.in_full, wishes.frames, wishes.commands, wishes.rules_name)
-    parts = (rules.digest, demonstrations.digest, contents, tuple(comparison))
-    return digest_of(repr(parts).encode())
+    @cached_property
+    def key(self) -> object:
+        """Equal keys give equal reports; no agent is among the wishes."""
+        wishes = self.wishes
+        names = (wishes.rules_name, wishes.demonstrations_name)
+        contents = (wishes.in_full, wishes.frames, wishes.commands, names)
+        return key_of((self.rule_set, self.demonstrations, contents, self.comparison))
 
 
 @st.cache_resource

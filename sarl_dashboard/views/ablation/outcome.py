@@ -27,7 +27,7 @@ def outcome(choice: Choice) -> None:
         run_bar(
             PLACE,
             Offer(
-                key=wanted.key,
+                key=wanted.row.key,
                 start=lambda: ablating(wanted),
                 about=f"{counted(wanted.episodes, 'episode')} with all rules, and again without "
                 f"each of the {wanted.most} most used{'; all done already' if finished else ''}.",

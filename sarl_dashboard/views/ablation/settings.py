@@ -21,7 +21,7 @@ from sarl_dashboard.components.settings import (
     projection_choice,
 )
 from sarl_dashboard.jobs.ablation import Wanted
-from sarl_dashboard.jobs.episodes import row_key
+from sarl_dashboard.jobs.episodes import Row
 from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
 from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
@@ -52,8 +52,8 @@ class Choice:
     @property
     def on_demonstrated_seeds(self) -> bool:
         """Whether some of its episodes are among the demonstrated ones."""
-        wanted = self.wanted
-        return self.rules != OWN_FILE and demonstrated(wanted.env_id, wanted.seed, wanted.episodes)
+        row, episodes = self.wanted.row, self.wanted.episodes
+        return self.rules != OWN_FILE and demonstrated(row.env_id, row.seed, episodes)
 
 
 def settings() -> Choice:
@@ -132,13 +132,6 @@ def settings() -> Choice:
         )
     no_boxes_notice([rule_set], outside)
     notes_notice(check_environment(env_id, Shield(rule_set)).notes)
-    wanted = Wanted(
-        row_key(env_id, chosen.digest, f"{rule_set.digest} {outside}", projection, first),
-        env_id,
-        first,
-        int(episodes or LEAST_EPISODES),
-        int(most or 1),
-        chosen,
-        lambda: Shield(rule_set, projection=projection, outside=outside),
-    )
+    row = Row("all rules", env_id, first, chosen, rule_set, projection, outside)
+    wanted = Wanted(row, int(episodes or LEAST_EPISODES), int(most or 1))
     return Choice(wanted, rules)

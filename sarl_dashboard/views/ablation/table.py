@@ -113,11 +113,11 @@ def table(ablation: Ablation, choice: Choice) -> None:
             "Click a heading to sort, the box at the left of a row to read the rule.",
             width="content",
         )
-        name = choice.wanted.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+        name = choice.wanted.row.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
         download(
             "Download CSV",
             lambda: csv(ablation),
-            f"ablation-{name}-{choice.wanted.seed}.csv",
+            f"ablation-{name}-{choice.wanted.row.seed}.csv",
             key="ablation_csv",
         )
     picked = chosen["selection"]["rows"]

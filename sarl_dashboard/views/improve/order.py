@@ -20,7 +20,6 @@ from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.mined import grown_trees, mined_rules
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_thresholds
-from sarl_dashboard.text import digest_of
 from sarl_dashboard.views.improve.settings import AT_THRESHOLDS, MOST, NOBODY, Choices
 
 GAPS_SEEDS_A_RUN = MOST
@@ -66,9 +65,8 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         validation=choices.validation,
         seed=choices.seed,
     )
-    key = digest_of(repr((demonstrations.digest, env_id, plan, expert.digest)).encode())
     command = command_for(choices, demonstrations, env_id, thresholds)
-    return Order(key, demonstrations, env_id, plan, expert, None, command)
+    return Order(demonstrations, env_id, plan, expert, None, command)
 
 
 def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) -> Order:
@@ -83,8 +81,7 @@ def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) ->
         divider=choices.divider,
         seed=FRESH + choices.seed * GAPS_SEEDS_A_RUN,
     )
-    key = digest_of(repr((demonstrations.digest, env_id, plan, NOBODY)).encode())
-    return Order(key, demonstrations, env_id, plan, None, rules, "")
+    return Order(demonstrations, env_id, plan, None, rules, "")
 
 
 def command_for(

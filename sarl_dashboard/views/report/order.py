@@ -12,7 +12,7 @@ from sarl_core.explaining.report.report import Wishes
 from sarl_core.explaining.report.tally import report_rules
 from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.jobs.report import Order, as_results, comparison_of_session, order_key
+from sarl_dashboard.jobs.report import Order, as_results, comparison_of_session
 from sarl_dashboard.state.data import (
     UPLOAD,
     chosen_dataset,
@@ -62,8 +62,7 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         trees = grown_trees(demonstrations, rule_set.divider)
     # The card of the shipped compact rules says how they came about.
     card = read_card(compact_file()) if choices.rules == COMPACT else None
-    key = order_key(rule_set, demonstrations, wishes, results)
-    return Order(key, rule_set, demonstrations, wishes, card, results, trees)
+    return Order(rule_set, demonstrations, wishes, card, results, trees)
 
 
 def results_of_choices(

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.comparison import ArmStyle, arm_style
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.shield import Outside, Shield
+from sarl_core.shielding.shield import Outside
 from sarl_core.studies.comparison import Arm
 from sarl_dashboard.components.settings import no_boxes_notice
-from sarl_dashboard.jobs.episodes import Row, row_key
+from sarl_dashboard.jobs.episodes import Row
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, ChosenAgent, agent_for
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
@@ -116,18 +116,8 @@ def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
     outside: Outside = choices.outside if guard.rules is not None else "act"
     name = f"{pilot.name}, {guard.name}"
-    # Acting everywhere is what other pages ask for, under the same key.
-    way = projection if outside == "act" else f"{projection}, {outside}"
-    rules = guard.rules.digest if guard.rules is not None else ""
-    key = row_key(env_id, pilot.agent.digest, rules, way, choices.seed)
-
-    def shield() -> Shield | None:
-        if guard.rules is None:
-            return None
-        return Shield(guard.rules, projection=projection, outside=outside)
-
     return Line(
-        Row(key, name, env_id, choices.seed, pilot.agent, shield),
+        Row(name, env_id, choices.seed, pilot.agent, guard.rules, projection, outside),
         Arm(name, pilot.name, guard.rules, projection, outside=outside),
         arm_style(pilot.place, guard.place),
         pilot.name,

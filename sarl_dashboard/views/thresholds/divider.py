@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
@@ -19,10 +21,10 @@ from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.run_bar import episodes_bar, watched
-from sarl_dashboard.jobs.episodes import Batch, Row, known, row_key
+from sarl_dashboard.jobs.episodes import Batch, Row, known
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.session import is_dark
-from sarl_dashboard.state.agents import FRESH_SEED, agent_for, has_expert
+from sarl_dashboard.state.agents import FRESH_SEED, ChosenAgent, agent_for, has_expert
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.text import escaped, in_full
 
@@ -143,33 +145,47 @@ def unchanged_as(divider: int, snapping: Snapping) -> Combination:
     return (0, snapping) if snapping == "clip" else (divider, snapping)
 
 
+@dataclass(frozen=True, eq=False)
+class SnappedExpert:
+    """The expert with every action snapped to its interval, which a call makes.
+
+    Attributes:
+        expert: As it is.
+        demonstrations: Whose actions say where the intervals and their targets lie.
+        divided: Every action dimension at this divider.
+        divider: Number of intervals.
+        snapping: What an action becomes.
+    """
+
+    expert: ChosenAgent
+    demonstrations: Demonstrations
+    divided: tuple[tuple[Quantisation], ...]
+    divider: int
+    snapping: Snapping
+
+    @property
+    def digest(self) -> str:
+        """What tells it from others."""
+        known = (self.expert.digest, self.demonstrations.digest, self.divider, self.snapping)
+        return repr(known)
+
+    def __call__(self) -> Agent:
+        """Make it."""
+        expert = self.expert()
+        return snapped_agents(self.expert.env_id, expert, self.divided, (self.snapping,))[0]
+
+
 def snapped_rows(
     demonstrations: Demonstrations, env_id: str, divided: Divided
 ) -> dict[Combination, Row]:
     """What is run, by divider and way to snap; the expert as it is first."""
     expert = agent_for("expert", None, env_id, FRESH_SEED)
-    key = row_key(env_id, expert.digest, "", "centre", FRESH_SEED)
-    rows = {
-        unchanged_as(0, "clip"): Row(
-            key, "expert as it is", env_id, FRESH_SEED, expert, lambda: None
-        )
-    }
+    rows = {unchanged_as(0, "clip"): Row("expert as it is", env_id, FRESH_SEED, expert)}
     for column, divider in enumerate(STUDIED_DIVIDERS):
+        own = tuple((each[column],) for each in divided)
         for snapping in SNAPPINGS:
-            if snapping == "clip":
-                continue
-
-            def snapped(column: int = column, snapping: Snapping = snapping) -> Agent:
-                own = [(each[column],) for each in divided]
-                return snapped_agents(env_id, expert(), own, (snapping,))[0]
-
-            agent = f"{expert.digest}, {demonstrations.digest}, {divider} intervals, {snapping}"
-            rows[divider, snapping] = Row(
-                row_key(env_id, agent, "", "centre", FRESH_SEED),
-                f"{divider} intervals, {snapping}",
-                env_id,
-                FRESH_SEED,
-                snapped,
-                lambda: None,
-            )
+            if snapping != "clip":
+                snapped = SnappedExpert(expert, demonstrations, own, divider, snapping)
+                name = f"{divider} intervals, {snapping}"
+                rows[divider, snapping] = Row(name, env_id, FRESH_SEED, snapped)
     return rows
