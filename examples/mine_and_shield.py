@@ -1,6 +1,7 @@
 """From demonstrations to a shield: mine rules, read them, and see what they do for a novice.
 
-Run it from the top folder: `python -m examples.mine_and_shield`, or anywhere once installed.
+Run it from the top folder of a checkout, `python -m examples.mine_and_shield`, or copy it to where
+the library is installed.
 """
 
 from __future__ import annotations

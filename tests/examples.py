@@ -21,7 +21,7 @@ def run(command: list[str], folder: Path, *, library: Path | None = None) -> str
     places = [str(folder / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]]
     environment = {**os.environ, "PATH": os.pathsep.join(places)}
     if library is not None:
-        environment["PYTHONPATH"] = os.pathsep.join((str(library), str(folder)))
+        environment["PYTHONPATH"] = str(library)
     done = subprocess.run(
         command,
         cwd=folder,

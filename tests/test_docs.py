@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import sarl_core
+from sarl_core import load_demonstrations, mine_rules
 
 from .examples import ROOT, run
 
@@ -49,7 +51,11 @@ def folder(tmp_path):
     shutil.copytree(ROOT / "data", tmp_path / "data")
     command = tmp_path / "bin" / "sarl"
     command.parent.mkdir()
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sarl_core "$@"\n')
+    # As pip writes it: the folder it is called in is not where Python looks for modules.
+    command.write_text(
+        f"#!{sys.executable}\nimport sys\nsys.path.insert(0, {str(ROOT)!r})\n"
+        "from sarl_core.__main__ import run\nrun()\n"
+    )
     command.chmod(command.stat().st_mode | stat.S_IXUSR)
     return tmp_path
 
@@ -80,6 +86,28 @@ def test_every_public_name_stands_in_the_reference():
     reference = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^::: sarl_core\.(?:\w+\.)*(\w+)$", reference, flags=re.MULTILINE))
     assert named == set(sarl_core.__all__)
+
+
+def test_every_key_of_a_rule_file_stands_in_its_page(tmp_path):
+    def keys(part: object) -> set[str]:
+        if isinstance(part, dict):
+            return set(part) | set().union(*map(keys, part.values()))
+        return set().union(*map(keys, part)) if isinstance(part, list) else set()
+
+    demonstrations = load_demonstrations(ROOT / "data/demonstrations/pendulum.parquet")
+    mine_rules(demonstrations, supp_min=0.05, conf_min=0.7).save(tmp_path / "interval.json")
+    files = [tmp_path / "interval.json", *(ROOT / "data" / "rules").glob("*_compact.json")]
+    told = (DOCS / "reference" / "files.md").read_text(encoding="utf-8")
+    for file in files:
+        for key in keys(json.loads(file.read_text())):
+            assert f"`{key}`" in told, key
+
+
+def test_a_sentence_that_the_guide_quotes_is_one_of_the_product():
+    page = (DOCS / "guides" / "explaining.md").read_text(encoding="utf-8")
+    (quoted,) = re.findall(r"^> (.+)$", page, flags=re.MULTILINE)
+    demonstrations = load_demonstrations(ROOT / "data/demonstrations/cartpole.parquet")
+    assert quoted in mine_rules(demonstrations, supp_min=0.005, conf_min=0.9).to_text()
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):
