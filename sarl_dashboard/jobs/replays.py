@@ -14,7 +14,6 @@ from pathlib import Path
 
 import streamlit as st
 
-from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.explaining.state_path import PathFinder
@@ -28,8 +27,10 @@ from sarl_core.rendering.replay import render_episode, side_by_side
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Outside, Projection, Shield
+from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.job import Tell
 from sarl_dashboard.memory_cache import BoundedCache
+from sarl_dashboard.state.agents import ChosenAgent
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
@@ -38,30 +39,64 @@ KEPT_PICTURES = 64  # of a replay, some 30 kB each
 _LATEST = "_replay"
 
 
-@dataclass(frozen=True)
-class Request:
-    """Everything that a replay depends on; equal requests give equal replays."""
+@dataclass(frozen=True, eq=False)
+class Order:
+    """A replay that is asked for.
+
+    Attributes:
+        env_id: Environment.
+        agent: Makes the agent.
+        rules: Which rules were chosen.
+        rule_set: Those in force, or None.
+        projection: How they replace a continuous action.
+        seed: Of the episode.
+        outside: Whether they act in states outside the data they were mined from.
+        description: Of the environment, under the names in force.
+    """
 
     env_id: str
-    agent: str
-    agent_digest: str
+    agent: ChosenAgent
     rules: str
-    rules_digest: str
+    rule_set: RuleSet | None
     projection: Projection
     seed: int
-    outside: Outside = "act"
-    names: str = ""
+    outside: Outside
+    description: EnvironmentDescription
+
+    @cached_property
+    def key(self) -> object:
+        """Equal keys give equal replays."""
+        # Fresh weights depend on a seed too: those of the first episode act in all.
+        weights = self.agent.seed if self.agent.choice == "untrained" else None
+        shield = (self.rules, self.rule_set, self.projection, self.outside)
+        parts = (self.env_id, self.seed, self.agent.digest, weights, shield)
+        return key_of((parts, repr(self.description)))
+
+    @property
+    def shield(self) -> Shield | None:
+        """The rules in force, or None."""
+        if self.rule_set is None:
+            return None
+        return Shield(self.rule_set, projection=self.projection, outside=self.outside)
+
+    def of_seed(self, seed: int) -> Order:
+        """The same agent and rules on another seed, as in a comparison over several."""
+        return replace(self, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
 class Replay:
     """One episode without the rules and, where there are any, one with them."""
 
-    key: Request
+    order: Order
     film: Film
-    rule_set: RuleSet | None
     dimensions: tuple[LabelledDimension, ...]
     features: tuple[Feature, ...]
+
+    @property
+    def rule_set(self) -> RuleSet | None:
+        """The rules in force, or None."""
+        return self.order.rule_set
 
     @property
     def plain(self) -> Episodes:
@@ -97,54 +132,20 @@ class Replay:
 
 @st.cache_resource
 def kept_replays() -> BoundedCache[Replay]:
-    """Replays by their request."""
+    """Replays by the key of their order."""
     return BoundedCache(KEPT_REPLAYS)
 
 
 @st.cache_resource
 def kept_comparisons() -> BoundedCache[tuple[tuple[str, Episodes], ...]]:
-    """Comparisons by their request and number of episodes."""
+    """Comparisons by the key of their order, and number of episodes."""
     return BoundedCache(KEPT_COMPARISONS)
 
 
 @st.cache_resource
 def kept_forks() -> BoundedCache[Fork]:
-    """Forks by the request, the step, and what the shield does after it."""
+    """Forks by the key of their order, the step, and what the shield does after it."""
     return BoundedCache(KEPT_FORKS)
-
-
-@dataclass(frozen=True, eq=False)
-class Order:
-    """A request, and what it takes to fulfil it.
-
-    Attributes:
-        request: What is asked for.
-        agent: Makes the agent.
-        rule_set: The rules in force, or None.
-        description: Of the environment, under the names in force.
-    """
-
-    request: Request
-    agent: Callable[[], Agent]
-    rule_set: RuleSet | None
-    description: EnvironmentDescription
-
-    @property
-    def shield(self) -> Shield | None:
-        """The rules in force, or None."""
-        if self.rule_set is None:
-            return None
-        return Shield(
-            self.rule_set, projection=self.request.projection, outside=self.request.outside
-        )
-
-    def of_seed(self, seed: int) -> Order:
-        """The same agent and rules on another seed, as in a comparison over several."""
-        request = self.request
-        # Fresh weights depend on a seed too: those of the first episode act in all.
-        made_for = f" made for {request.seed}" if request.agent == "untrained" else ""
-        digest = request.agent_digest + (made_for if seed != request.seed else "")
-        return replace(self, request=replace(request, seed=seed, agent_digest=digest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +165,7 @@ def latest_order() -> Order | None:
 def latest() -> Played | None:
     """The replay that the visitor ran last, while it is kept."""
     order = latest_order()
-    replay = None if order is None else kept_replays().get(order.request)
+    replay = None if order is None else kept_replays().get(order.key)
     return None if order is None or replay is None else Played(order, replay)
 
 
@@ -186,9 +187,9 @@ def compared(order: Order) -> tuple[Order, int] | None:
     if latest is None:
         return None
     first, episodes = latest
-    number = order.request.seed - first.request.seed
+    number = order.seed - first.seed
     inside = 0 <= number < episodes
-    return latest if inside and first.of_seed(order.request.seed).request == order.request else None
+    return latest if inside and first.of_seed(order.seed).key == order.key else None
 
 
 # --- running -----------------------------------------------------------------------------------
@@ -200,7 +201,7 @@ def run(order: Order, tell: Tell) -> Replay:
     Raises:
         SarlError: If it cannot be run.
     """
-    request, shield, rule_set = order.request, order.shield, order.rule_set
+    shield, rule_set = order.shield, order.rule_set
     tell(0.0, "Making the agent …")
     agent = order.agent()
 
@@ -208,13 +209,13 @@ def run(order: Order, tell: Tell) -> Replay:
         tell(0.7 * done / total, "Playing the episode and drawing it …")
 
     if shield is None or rule_set is None:
-        film = render_episode(request.env_id, agent, seed=request.seed, progress=playing)
+        film = render_episode(order.env_id, agent, seed=order.seed, progress=playing)
     else:
         film = side_by_side(
-            request.env_id,
+            order.env_id,
             agent,
             shield,
-            seed=request.seed,
+            seed=order.seed,
             progress=playing,
             describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         )
@@ -227,9 +228,8 @@ def run(order: Order, tell: Tell) -> Replay:
     film = film.named(dimensions)
     film.gif(progress=encoding)
     return Replay(
-        key=request,
+        order=order,
         film=film,
-        rule_set=rule_set,
         dimensions=dimensions,
         features=tuple(
             Feature(name, unit)
@@ -261,11 +261,11 @@ def compare(order: Order, episodes: int, tell: Tell) -> tuple[tuple[str, Episode
             (
                 name,
                 rollout(
-                    order.request.env_id,
+                    order.env_id,
                     agent,
                     shield=guard,
                     episodes=episodes,
-                    seed=order.request.seed,
+                    seed=order.seed,
                     keep_steps=part == 0,
                     progress=playing,
                 ),
@@ -286,7 +286,7 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Tell) -> Fork:
     Raises:
         SarlError: If it cannot be run.
     """
-    request, shield, rule_set = order.request, order.shield, order.rule_set
+    shield, rule_set = order.shield, order.rule_set
     assert shield is not None
     assert rule_set is not None
     tell(0.0, "Making the agent …")
@@ -299,12 +299,12 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Tell) -> Fork:
         tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
 
     branched = fork(
-        request.env_id,
+        order.env_id,
         agent,
         shield,
         step=step,
         rest=rest,
-        seed=request.seed,
+        seed=order.seed,
         describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         progress=playing,
     )

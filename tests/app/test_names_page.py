@@ -133,4 +133,4 @@ def kept(app: AppTest) -> Any:
     """The replay on screen."""
     from sarl_dashboard.jobs.replays import kept_replays
 
-    return kept_replays().get(app.session_state["_replay"].request)
+    return kept_replays().get(app.session_state["_replay"].key)

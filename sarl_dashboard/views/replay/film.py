@@ -23,33 +23,33 @@ def headline(replay: Replay, settings: Settings) -> None:
         replay: To show.
         settings: As they are now.
     """
-    request, rule_set = replay.key, replay.rule_set
+    order, rule_set = replay.order, replay.order.rule_set
     st.markdown(
-        f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(request.env_id)}**, seed "
-        f"{request.seed}"
-        + (f", {len(rule_set):,} rules ({request.rules})" if rule_set else "")
+        f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(order.env_id)}**, seed "
+        f"{order.seed}"
+        + (f", {len(rule_set):,} rules ({order.rules})" if rule_set else "")
         + (
             ""
-            if settings.ask_for(request)
+            if settings.ask_for(order)
             else "  \n:orange[:material/info: The settings have changed since: press Run.]"
         )
     )
     notes_notice(note for episode in replay.film.episodes for note in episode.remarks)
-    no_boxes_notice([] if rule_set is None else [rule_set], request.outside)
+    no_boxes_notice([] if rule_set is None else [rule_set], order.outside)
 
 
 def film(replay: Replay) -> None:
     """The episode as a film, and the film as files."""
-    request = replay.key
-    if request.rules not in (OWN_FILE, NO_RULES) and demonstrated(request.env_id, request.seed, 1):
+    order = replay.order
+    if order.rules not in (OWN_FILE, NO_RULES) and demonstrated(order.env_id, order.seed, 1):
         st.caption(
             ":material/casino: The demonstrations have an episode of this seed, where the rules "
             f"know the way. A seed such as {FRESH_SEED:,} shows what they bring elsewhere."
         )
     gif = replay.film.gif()
     st.image(gif, width="content", alt="The episode, with the rules and without")
-    env = request.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
-    name = f"replay-{env}-{request.agent}-{request.seed}"
+    env = order.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+    name = f"replay-{env}-{order.agent.choice}-{order.seed}"
     with st.container(horizontal=True):
         download("Download GIF", gif, f"{name}.gif", key="gif")
         download("Download MP4", partial(movie, replay), f"{name}.mp4", key="mp4")

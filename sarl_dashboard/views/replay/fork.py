@@ -42,7 +42,7 @@ def fork_section(played: Played, current: int) -> None:
             required=True,
         )
         rest = RESTS[chosen or next(iter(RESTS))]
-        key = (order.request, current, rest)
+        key = (order.key, current, rest)
         branched = kept_forks().get(key)
         slot = st.empty()
         if branched is None and slot.button(

@@ -76,7 +76,7 @@ def numbers(replay: Replay) -> None:
 def _unfiltered_differ(replay: Replay) -> bool:
     """Whether the rules were filtered, from demonstrations that are at hand."""
     return (
-        replay.key.rules in (CHOSEN, "filtered")
+        replay.order.rules in (CHOSEN, "filtered")
         and replay.rule_set is not None
         and replay.rule_set.thresholds != UNFILTERED
     )

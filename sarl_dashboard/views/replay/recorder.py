@@ -86,7 +86,7 @@ def flight_recorder(played: Played, current: int) -> None:
         )
         return
     place = place_of(rows, recorded.row(current))
-    page = page_of(rows, place, (played.replay.key, chosen, current))
+    page = page_of(rows, place, (played.order.key, chosen, current))
     on_page = rows[page * PAGE : (page + 1) * PAGE]
     selected = [] if place is None or place // PAGE != page else [place % PAGE]
     wanted: Any = {"selection": {"rows": selected, "columns": [], "cells": []}}
@@ -120,7 +120,7 @@ def source(played: Played) -> Recorded:
     replay, comparison = played.replay, compared(played.order)
     runs = None
     if comparison is not None:
-        runs = kept_comparisons().get((comparison[0].request, comparison[1]))
+        runs = kept_comparisons().get((comparison[0].key, comparison[1]))
     if comparison is not None and runs is not None and runs[0][1].steps is not None:
         several = runs[0][1]
         if (
@@ -135,7 +135,7 @@ def source(played: Played) -> Recorded:
             )
             == ALL
         ):
-            return Recorded(replay, several, replay.key.seed - comparison[0].request.seed)
+            return Recorded(replay, several, replay.order.seed - comparison[0].seed)
     return Recorded(replay, replay.shown, 0)
 
 

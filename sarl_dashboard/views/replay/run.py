@@ -64,11 +64,11 @@ def run_bar(settings: Settings, jump: Jump | None) -> None:
     except SarlError as error:
         refuse(error)
         return
-    if kept_replays().get(order.request) is None:
+    if kept_replays().get(order.key) is None:
         replay = waited_for(lambda tell: run(order, tell))
         if replay is None:
             return
-        kept_replays().put(order.request, replay)
+        kept_replays().put(order.key, replay)
     show_next(order)
 
 

@@ -19,7 +19,7 @@ from sarl_dashboard.components.settings import (
     outside_choice,
     projection_choice,
 )
-from sarl_dashboard.jobs.replays import Order, Request
+from sarl_dashboard.jobs.replays import Order
 from sarl_dashboard.state.agents import (
     AGENTS,
     FRESH_SEED,
@@ -32,7 +32,6 @@ from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import continuous, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, NO_RULES, OWN_FILE, PAPERS
-from sarl_dashboard.text import digest_of
 
 RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
 
@@ -58,30 +57,27 @@ class Settings:
         """
         env_id = environment_of(self.env)
         rule_set = rules_for(self.rules, self.rule_file)
-        rules_digest = rule_set.digest if rule_set is not None else ""
         if rule_set is not None:
             rule_set = shield_for(env_id, Shield(rule_set)).rule_set
         agent = agent_for(self.agent, self.policy_file, env_id, self.seed)
-        described = named_description(
+        description = named_description(
             describe_environment(env_id), rule_set, chosen_demonstrations()
         )
-        request = Request(
+        return Order(
             env_id,
-            self.agent,
-            agent.digest,
+            agent,
             self.rules,
-            rules_digest,
+            rule_set,
             self.projection,
             self.seed,
             self.outside,
-            digest_of(repr(described).encode()),
+            description,
         )
-        return Order(request, agent, rule_set, described)
 
-    def ask_for(self, request: Request) -> bool:
+    def ask_for(self, order: Order) -> bool:
         """Whether they still ask for what is on screen."""
         try:
-            return self.order().request == request
+            return self.order().key == order.key
         except SarlError:
             return False
 

@@ -131,7 +131,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     # Under which set the Rules page has these rules.
-    linked = SHOWN_AS.get(replay.key.rules)
+    linked = SHOWN_AS.get(replay.order.rules)
     last = len(steps) - 1
     if "_step" in st.session_state:
         st.session_state["step"] = st.session_state.pop("_step")
