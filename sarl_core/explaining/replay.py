@@ -12,9 +12,9 @@ from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
-from sarl_core.explaining.figures.colours import OUTSIDE_COLOUR
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import OUTSIDE_COLOUR
 from sarl_core.explaining.figures.replay import Track
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.markup import plain
 from sarl_core.explaining.figures.png import Draw, sheet
+from sarl_core.explaining.markup import plain
 from sarl_core.explaining.templates import render
 from sarl_core.paper.chance import how_decided
 from sarl_core.paper.report import Entry
@@ -72,7 +72,7 @@ def page(study: Study, frame: pd.DataFrame, entry: Entry) -> str:
         for row in in_rows(study.draw(frame, part, False))
     ]
     return render(
-        "sheet",
+        "documents/sheet",
         title=f"{study.place}. {study.title}",
         about=f"{study.about} Made from {replication(frame)} for each environment.",
         script=SCRIPT,

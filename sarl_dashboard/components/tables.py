@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import streamlit as st
 
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.tables.evidence import held_out_columns
 from sarl_core.explaining.tables.rules import rule_columns
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, VERDICTS

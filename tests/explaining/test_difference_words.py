@@ -10,7 +10,7 @@ import pytest
 
 from sarl_core import RuleSet, mine_rules
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.figures.colours import LAYER_SCALE
+from sarl_core.explaining.colours import LAYER_SCALE
 from sarl_core.explaining.html.confusion import confusion_html
 from sarl_core.explaining.tables.difference import example_rows, rule_rows
 from sarl_core.explaining.words.difference import (

@@ -9,10 +9,10 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.figures import demonstrations as demonstration_figures
 from sarl_core.explaining.figures import tree as rule_figures
 from sarl_core.explaining.figures.distributions import histogram_by_label
-from sarl_core.explaining.figures.markup import plain
 from sarl_core.explaining.figures.replay import Timeline, Track, intervention_strip
 from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.html.tree import place_html
+from sarl_core.explaining.markup import plain
 from sarl_core.explaining.rule_evidence import feature_evidence
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.labels import LabelledDimension

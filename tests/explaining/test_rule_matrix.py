@@ -8,9 +8,9 @@ import numpy as np
 from PIL import Image
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.exports.markdown import markdown_text, rules_to_markdown
 from sarl_core.explaining.exports.rule_matrix_png import matrix_png
-from sarl_core.explaining.figures.colours import label_colour
 from sarl_core.explaining.html.rule_matrix import (
     OFF_LEGEND,
     PAGE_ROWS,

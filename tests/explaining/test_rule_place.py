@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sarl_core import PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.figures.colours import faded, label_colour
+from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.figures.tree import window_around
 from sarl_core.explaining.html.tree import place_html
 from sarl_core.mining.algorithm_1 import cut_nodes

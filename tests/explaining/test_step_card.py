@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.step_card import legend, picture, step_card
 from sarl_core.explaining.replay import ActionView, StepView
 

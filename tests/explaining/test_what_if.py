@@ -10,7 +10,7 @@ import pytest
 
 from sarl_core import grow_policy_trees, mine_rules
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import faded, label_colour
+from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.what_if_bars import lines_html, stretches
 from sarl_core.explaining.words.what_if import (
     by_use,

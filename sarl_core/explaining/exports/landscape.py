@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import json
-import logging
-import os
 from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.errors import InputError, WorkError, quoted
+from sarl_core.errors import InputError
 from sarl_core.files import whole_file
 from sarl_core.mining.landscape import LAYERS, Landscape
 
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
-
 MAX_VALUES = 10_001  # an axis in steps of 0.0001
 MAX_CELLS = 4_000_000  # as a file, half a gigabyte
-
-_BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
 
 
 def parse_grid(text: str, name: str) -> NDArray[np.float64]:
@@ -85,6 +78,7 @@ def save_landscape(
     elif suffix == ".csv":
         content = _csv(landscape, names).encode()
     elif suffix in (".html", ".png"):
+        from sarl_core.explaining.figures.png import figure_to_png
         from sarl_core.explaining.figures.thresholds import landscape_figure
 
         figure = landscape_figure(landscape, title=title)
@@ -141,66 +135,3 @@ def _csv(landscape: Landscape, names: Sequence[str]) -> str:
     columns = ["dimension", "support", "confidence", *LAYERS]
     table = pd.concat(part.to_frame().assign(dimension=name)[columns] for name, part in parts)
     return table.to_csv(index=False, lineterminator="\n")
-
-
-def figure_to_png(figure: go.Figure) -> bytes:
-    """Draw a Plotly figure as a picture, two pixels for one so that text is sharp.
-
-    Args:
-        figure: To draw, at the size its layout says.
-
-    Returns:
-        A PNG file.
-
-    Raises:
-        WorkError: If there is no Chromium or Chrome to draw it with.
-    """
-    silence_browser()
-    try:
-        picture: bytes = figure.to_image(format="png", scale=2)
-    except Exception as error:  # whatever Kaleido or the browser has to complain about
-        raise cannot_draw(error, "write .html") from error
-    return picture
-
-
-def silence_browser() -> None:
-    """Let what speaks to the browser log nothing: traces of what it mends or raises itself."""
-    logging.getLogger("choreographer").setLevel(logging.CRITICAL + 1)
-
-
-def cannot_draw(error: Exception, advice: str) -> WorkError:
-    """What to tell who has no browser to draw pictures with, or none that works.
-
-    Args:
-        error: Of Kaleido or the browser.
-        advice: What else to do, after "or".
-
-    Returns:
-        The error to raise.
-    """
-    return WorkError(
-        "the picture could not be drawn, which takes an installed Chromium or Chrome: "
-        f"{_lacking(error)}, or {advice}"
-    )
-
-
-def _lacking(error: Exception) -> str:
-    """What is missing, and how it is mended."""
-    try:
-        from choreographer.browsers.chromium import Chromium
-        from choreographer.errors import BrowserClosedError, BrowserFailedError
-    except ImportError:
-        return "the package kaleido, which speaks to it, is not installed; install it"
-    browser = Chromium.find_browser(skip_local=False)
-    named = browser is not None and os.environ.get(_BROWSER) == browser
-    if browser is None:
-        return f"there is none; install one and, if it is not found, set {_BROWSER} to its program"
-    which = f"{quoted(browser)}, to which {_BROWSER} is set," if named else quoted(browser)
-    do = f"set {_BROWSER} to one that works" if named else "install it anew"
-    if not Path(browser).is_file():
-        return f"{which} does not exist; {do}"
-    if isinstance(error, (BrowserClosedError, BrowserFailedError, OSError)):
-        return f"{which} could not be started; {do}"
-    # Some put several sentences in one error, and some none.
-    text = error.args[0] if error.args and isinstance(error.args[0], str) else type(error).__name__
-    return f"{which} failed ({quoted(text.split('. ')[0].strip(), 120)}); {do}"

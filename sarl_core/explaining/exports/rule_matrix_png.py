@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.exports.program import one_line
-from sarl_core.explaining.figures.colours import label_colour
 from sarl_core.explaining.html.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
 from sarl_core.mining.language import label_text, number_text, share_text
 from sarl_core.mining.rules import Rule

@@ -8,9 +8,9 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MUTED_COLOUR
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.figures.replay import SHIELDED_COLOUR
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import action_text, conditions_text, counted
 from sarl_core.studies.ablation import VERDICTS, Ablation, RuleEffect, Verdict
 

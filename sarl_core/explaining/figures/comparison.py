@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from sarl_core.explaining.figures.colours import LABEL_COLOURS, faded
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import LABEL_COLOURS, faded
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import at_least_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.studies.comparison import Arm, Comparison

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import MUTED_COLOUR, faded, label_colour
+from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.figures.distributions import EpisodeSeries, Histogram
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
 

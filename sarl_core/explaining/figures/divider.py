@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from sarl_core.explaining.figures.colours import MUTED_COLOUR
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.figures.thresholds import layer_scale
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import number_text, share_text
 from sarl_core.mining.quantisation import SNAPPINGS, Quantisation, Snapping
 from sarl_core.rollouts.episodes import Episodes

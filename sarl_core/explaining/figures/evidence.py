@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import plotly.graph_objects as go
 
-from sarl_core.explaining.figures.colours import (
+from sarl_core.explaining.colours import (
     INTERVENTION_COLOUR,
     LABEL_COLOURS,
     faded,

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from sarl_core.explaining.figures.colours import LABEL_COLOURS, MUTED_COLOUR, faded
+from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.words.learning import value_text
 from sarl_core.files import whole_file

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import io
+import logging
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sarl_core.errors import WorkError
-from sarl_core.explaining.exports.landscape import cannot_draw, silence_browser
+from sarl_core.errors import WorkError, quoted
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -20,6 +22,7 @@ Draw = Callable[["go.Figure"], bytes]
 
 _SCALE = 2  # pixels for one, so that text is sharp
 _COLOURS = 256
+_BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
 
 
 @contextmanager
@@ -67,12 +70,12 @@ class _Session:
             return self.runner.run(self._drawn(figure))
         except Exception:
             self._end()
-            raise cannot_draw(first, "leave the pictures out") from first
+            raise _cannot_draw(first, "leave the pictures out") from first
 
     async def _drawn(self, figure: go.Figure) -> bytes:
         import kaleido
 
-        silence_browser()
+        _silence_browser()
         if self.browser is None:
             # Formulas would make the browser ask a server for MathJax; there are none.
             self.browser = await kaleido.Kaleido(n=1, mathjax=False).__aenter__()
@@ -92,6 +95,26 @@ class _Session:
     def close(self) -> None:
         self._end()
         self.runner.close()
+
+
+def figure_to_png(figure: go.Figure) -> bytes:
+    """Draw a Plotly figure as a picture, two pixels for one so that text is sharp.
+
+    Args:
+        figure: To draw, at the size its layout says.
+
+    Returns:
+        A PNG file.
+
+    Raises:
+        WorkError: If there is no Chromium or Chrome to draw it with.
+    """
+    _silence_browser()
+    try:
+        picture: bytes = figure.to_image(format="png", scale=_SCALE)
+    except Exception as error:  # whatever Kaleido or the browser has to complain about
+        raise _cannot_draw(error, "write .html") from error
+    return picture
 
 
 def sheet(rows: Sequence[Sequence[bytes]]) -> bytes:
@@ -119,3 +142,46 @@ def sheet(rows: Sequence[Sequence[bytes]]) -> bytes:
     file = io.BytesIO()
     whole.quantize(_COLOURS, dither=Image.Dither.NONE).save(file, format="PNG", optimize=True)
     return file.getvalue()
+
+
+def _silence_browser() -> None:
+    """Let what speaks to the browser log nothing: traces of what it mends or raises itself."""
+    logging.getLogger("choreographer").setLevel(logging.CRITICAL + 1)
+
+
+def _cannot_draw(error: Exception, advice: str) -> WorkError:
+    """What to tell who has no browser to draw pictures with, or none that works.
+
+    Args:
+        error: Of Kaleido or the browser.
+        advice: What else to do, after "or".
+
+    Returns:
+        The error to raise.
+    """
+    return WorkError(
+        "the picture could not be drawn, which takes an installed Chromium or Chrome: "
+        f"{_lacking(error)}, or {advice}"
+    )
+
+
+def _lacking(error: Exception) -> str:
+    """What is missing, and how it is mended."""
+    try:
+        from choreographer.browsers.chromium import Chromium
+        from choreographer.errors import BrowserClosedError, BrowserFailedError
+    except ImportError:
+        return "the package kaleido, which speaks to it, is not installed; install it"
+    browser = Chromium.find_browser(skip_local=False)
+    named = browser is not None and os.environ.get(_BROWSER) == browser
+    if browser is None:
+        return f"there is none; install one and, if it is not found, set {_BROWSER} to its program"
+    which = f"{quoted(browser)}, to which {_BROWSER} is set," if named else quoted(browser)
+    do = f"set {_BROWSER} to one that works" if named else "install it anew"
+    if not Path(browser).is_file():
+        return f"{which} does not exist; {do}"
+    if isinstance(error, (BrowserClosedError, BrowserFailedError, OSError)):
+        return f"{which} could not be started; {do}"
+    # Some put several sentences in one error, and some none.
+    text = error.args[0] if error.args and isinstance(error.args[0], str) else type(error).__name__
+    return f"{which} failed ({quoted(text.split('. ')[0].strip(), 120)}); {do}"

@@ -10,8 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MUTED_COLOUR, label_colour
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR, label_colour
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 
 SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it

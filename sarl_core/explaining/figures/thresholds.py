@@ -13,9 +13,9 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.explaining.figures.colours import LAYER_SCALE, MARKER_COLOUR
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.landscape import Landscape
 from sarl_core.mining.language import number_text, share_text
 

@@ -10,8 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from sarl_core.explaining.figures.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
-from sarl_core.explaining.figures.markup import plain
+from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
+from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import label_text, query_text, share_text
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import label_colour, layer_colour
+from sarl_core.explaining.colours import label_colour, layer_colour
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.difference import kinds_text, said_text
 from sarl_core.mining.language import counted
@@ -48,7 +48,7 @@ def confusion_html(
             cells.append((f"{count:,}" if count else "", told, same, *look))
         rows.append((head, cells))
     return render(
-        "confusion",
+        "parts/confusion",
         names=names,
         said=heads,
         rows=rows,

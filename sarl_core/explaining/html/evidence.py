@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import LABEL_COLOURS, MUTED_COLOUR, faded
+from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
 from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
 from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.explaining.words.evidence import (

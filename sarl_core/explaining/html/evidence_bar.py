@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import MUTED_COLOUR
+from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.html.plot import Scale
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, interval_text
@@ -57,5 +57,5 @@ def evidence_bar(rule: Rule, threshold: float) -> Markup:
         colour = VERDICT_COLOURS[verdict(rule, threshold)]
         lines.append(_Line("held out", scale.place(share), whisker, colour, interval_text(held)))
     return render(
-        "evidence_bar", lines=lines, threshold=scale.place(threshold), floor=share_text(floor)
+        "rules/evidence_bar", lines=lines, threshold=scale.place(threshold), floor=share_text(floor)
     )

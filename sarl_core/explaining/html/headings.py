@@ -16,7 +16,7 @@ def heading(text: str) -> Markup:
     Returns:
         HTML.
     """
-    return render("heading", text=text)
+    return render("parts/heading", text=text)
 
 
 def note(text: str) -> Markup:
@@ -28,4 +28,4 @@ def note(text: str) -> Markup:
     Returns:
         HTML.
     """
-    return render("note", text=text)
+    return render("parts/note", text=text)

@@ -8,7 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.state_path import PathFinder, StatePath
 from sarl_core.explaining.templates import render
 from sarl_core.mining.language import action_text, bounds_of, number_text, query_text
@@ -44,7 +44,7 @@ def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup
         )
     rule = None if path.rule is None else rule_set.rules[path.rule]
     return render(
-        "lit_path",
+        "rules/lit_path",
         queries=queries,
         rule=rule and rule_set.name_of(rule),
         action=rule and action_text(rule.action, rule_set.actions[dimension]),

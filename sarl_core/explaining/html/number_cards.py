@@ -37,4 +37,4 @@ def number_cards(numbers: Sequence[Number], *, framed: bool = False) -> Markup:
         A list of terms in HTML.
     """
     meanings = [(one.label, one.meaning) for one in numbers if one.meaning]
-    return render("number_cards", numbers=numbers, framed=framed, meanings=meanings)
+    return render("parts/number_cards", numbers=numbers, framed=framed, meanings=meanings)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.rule_evidence import PathStep
 from sarl_core.explaining.templates import render
 from sarl_core.mining.labels import LabelledDimension
@@ -55,4 +55,4 @@ def path_table(
         )
         for step in steps
     ]
-    return render("path", labels=labels, rows=rows, leaf=leaf)
+    return render("rules/path", labels=labels, rows=rows, leaf=leaf)

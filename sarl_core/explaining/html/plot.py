@@ -93,7 +93,7 @@ def plot(
         for axis in (across, upwards)
     )
     return render(
-        "plot",
+        "parts/plot",
         parts=parts,
         along=along,
         across=across.name,

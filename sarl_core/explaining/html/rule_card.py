@@ -62,7 +62,7 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> Mark
         sureness, colour = _sureness(rule, threshold)
         bar = evidence_bar(rule, threshold)
     return render(
-        "rule_card",
+        "rules/rule_card",
         sentence=sentence(rule, rule_set, evidence=reached),
         words=" · ".join(words),
         sureness=sureness,

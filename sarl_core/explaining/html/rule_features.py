@@ -10,7 +10,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import MARKER_COLOUR, MUTED_COLOUR, faded
+from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
 from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
 from sarl_core.explaining.rule_evidence import FeatureEvidence
 from sarl_core.explaining.templates import render
@@ -45,7 +45,7 @@ def features_html(
     if len(found) > MOST:
         key.append((f"the first {MOST} of {len(found)} features", ""))
     figures = [_figure(one, features[one.feature], colour) for one in found[:MOST]]
-    return render("features", key=key, figures=figures)
+    return render("rules/features", key=key, figures=figures)
 
 
 def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> tuple[str, Markup]:

@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.templates import render, style_sheet
 from sarl_core.mining.language import (
     action_text,
@@ -157,7 +157,7 @@ def matrix_html(matrix: RuleMatrix, rules: Sequence[Rule]) -> Markup:
         HTML; it may be wider than the screen and then scrolls.
     """
     return render(
-        "rule_matrix",
+        "rules/rule_matrix",
         key=_key(rules, matrix.rule_set),
         columns=[(column.name.name, _scale_text(column)) for column in matrix.columns],
         upright=len(matrix.columns) > _MANY_COLUMNS,
@@ -175,7 +175,7 @@ def matrix_document(matrix: RuleMatrix) -> Markup:
         An HTML document.
     """
     return render(
-        "rule_matrix_document",
+        "documents/rule_matrix_document",
         title=f"Rules for {matrix.rule_set.source.env_id or 'an unnamed environment'}",
         about=f"{counted(len(matrix.rules), 'rule')}, by action, the most general first. {LEGEND} "
         "The rules were learned from examples and guarantee nothing.",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.replay import StepView, margin_text
 from sarl_core.explaining.templates import render
@@ -26,7 +26,7 @@ def legend(entries: Sequence[tuple[str, str]], *, before: str = "", after: str =
     Returns:
         HTML.
     """
-    return render("legend", entries=entries, before=before, after=after)
+    return render("parts/legend", entries=entries, before=before, after=after)
 
 
 def picture(png: bytes, alt: str, ways: Sequence[tuple[str, Markup]] = ()) -> Markup:
@@ -40,7 +40,7 @@ def picture(png: bytes, alt: str, ways: Sequence[tuple[str, Markup]] = ()) -> Ma
     Returns:
         HTML, as wide as there is room.
     """
-    return render("picture", png=b64encode(png).decode("ascii"), alt=alt, ways=ways)
+    return render("states/picture", png=b64encode(png).decode("ascii"), alt=alt, ways=ways)
 
 
 def step_card(view: StepView, *, shielded: bool) -> Markup:
@@ -55,7 +55,7 @@ def step_card(view: StepView, *, shielded: bool) -> Markup:
     """
     rows = [(name, value, unit or "–") for name, value, unit in view.state]
     return render(
-        "step_card",
+        "states/step_card",
         view=view,
         shielded=shielded,
         margin=margin_text(view.margin),

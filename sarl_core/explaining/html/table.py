@@ -37,4 +37,4 @@ def table_html(columns: Sequence[Column], rows: Sequence[Sequence[str]], label: 
     """
     looks = [column.css for column in columns]
     cells = [zip(looks, row, strict=True) for row in rows]
-    return render("table", columns=columns, rows=cells, label=label)
+    return render("parts/table", columns=columns, rows=cells, label=label)

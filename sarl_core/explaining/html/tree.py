@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from sarl_core.explaining.figures.colours import MUTED_COLOUR, faded, label_colour
+from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.figures.tree import (
     WIDTH,
     below_rules,
@@ -64,7 +64,7 @@ def place_html(
     points = _points(tree, path, window)
     label = label_text(int(tree.label[node]), tree.dimension)
     return render(
-        "tree",
+        "rules/tree",
         dark=dark,
         told=f"The tree around the rule: {counted(len(path) - 1, 'condition')} lead to "
         f"{counted(int(tree.samples[node]), 'state')}, {label}",

@@ -107,7 +107,7 @@ def decision_html(
         if len(rule_set.actions) > 1:
             which = "No rule for this action dimension applies to this state"
         note = f"{which}: the agent's action is passed on as it is."
-        return render("decision", badges=badges, said=said, rule="", outside="", note=note)
+        return render("states/decision", badges=badges, said=said, rule="", outside="", note=note)
     values = tuple(state.astype(np.float64).tolist())
     rows = [(one.condition, one.value, one.room) for one in condition_views(rule, values, rule_set)]
     caption = "The rule's conditions and the state's values"
@@ -115,7 +115,7 @@ def decision_html(
     others = len(beyond) - _SHOWN
     more = f"; and {counted(others, 'feature')} more" if others > 0 else ""
     return render(
-        "decision",
+        "states/decision",
         badges=badges,
         said=said,
         rule=rule_set.name_of(rule),
@@ -144,7 +144,7 @@ def changes_html(
     """
     rows = [_change_row(change, spans, rule_set) for change in changes]
     return render(
-        "least_changes",
+        "states/least_changes",
         first=rows[0] if rows else None,
         table=table_html(_CHANGES, rows, "The least changes that change the decision"),
     )
@@ -178,7 +178,7 @@ def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> Markup:
     """
     rows = [_miss_row(miss, rule_set) for miss in misses]
     table = table_html(_MISSES, rows, "Rules that nearly apply") if rows else ""
-    return render("near_misses", table=table)
+    return render("states/near_misses", table=table)
 
 
 def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
@@ -207,7 +207,7 @@ def way_html(table: Markup, rule: Rule | None) -> Markup:
         HTML.
     """
     placed = PLACED if rule is not None and rule.placed else ""
-    return render("way", placed=placed, table=table)
+    return render("states/way", placed=placed, table=table)
 
 
 def _yes(holds: bool) -> str:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import faded, label_colour
+from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.path import label_key
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import with_unit
@@ -63,7 +63,7 @@ def lines_html(
         _row(stretches(line, ends, dimension, rule_set), ends, value, feature, labels)
         for line, ends, value, feature in zip(lines, ranges, values, features, strict=True)
     ]
-    return render("lines", labels=label_key(labels), rows=rows)
+    return render("states/lines", labels=label_key(labels), rows=rows)
 
 
 def stretches(

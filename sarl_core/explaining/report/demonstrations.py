@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
 from sarl_core.explaining.report.tally import Tally

@@ -189,7 +189,7 @@ def make_report(
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
     html = render(
-        "report",
+        "documents/report",
         title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
         elsewhere=_elsewhere(as_given, demonstrations, trees),

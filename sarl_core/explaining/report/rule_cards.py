@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow
 from sarl_core.explaining.report.svg import Scale, evidence_bar, interval_bar
 from sarl_core.explaining.report.tally import Share, Tally

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
 from sarl_core.explaining.report.tally import Tally

@@ -212,4 +212,4 @@ def _shape(tag: str, places: dict[str, str], css: str = "", style: str = "") -> 
 
 
 def _picture(css: str, height: int, shapes: Sequence[Shape], label: str = "") -> Markup:
-    return render("svg", css=css, height=height, shapes=shapes, label=label)
+    return render("parts/svg", css=css, height=height, shapes=shapes, label=label)

@@ -12,7 +12,7 @@ import numpy as np
 
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError
-from sarl_core.explaining.figures.colours import layer_colour
+from sarl_core.explaining.colours import layer_colour
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.editing.edited_sets import edits_sentence

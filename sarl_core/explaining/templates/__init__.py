@@ -1,4 +1,4 @@
-"""HTML from the templates beside this file: every text escaped, and one style sheet for all of it.
+"""HTML from the templates in this folder: every text escaped, and one style sheet for all of it.
 
 A template is compiled when it is first asked for. What a piece looks like stands in the sheet, once
 on a page and not with each piece; a document that opens by itself has it in its head.
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from sarl_core.explaining.figures.colours import MARKER_COLOUR, MUTED_COLOUR, faded
+from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
 
 if TYPE_CHECKING:
     import jinja2
@@ -22,7 +22,7 @@ def render(name: str, **values: object) -> Markup:
     """Fill in a template.
 
     Args:
-        name: Of its file, without the ending.
+        name: Of its file, with its folder and without the ending, as "parts/note".
         **values: What it asks for; texts are escaped, `Markup` is not.
 
     Returns:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, MUTED_COLOUR
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.mining.language import counted, number_text, share_text
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.episode_counts import Influence

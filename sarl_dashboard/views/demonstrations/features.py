@@ -7,7 +7,7 @@ import streamlit as st
 
 from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.figures.colours import label_colour
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.demonstrations import feature_figure
 from sarl_core.explaining.figures.distributions import FeatureRow, histogram_by_label
 from sarl_core.explaining.html.step_card import legend

@@ -75,7 +75,7 @@ def show_overview(evidence: Evidence) -> None:
     with st.container(key="overview"):  # one piece: each element of its own takes its time
         st.html(
             render(
-                "evidence_overview",
+                "rules/evidence_overview",
                 numbers=number_cards(numbers),
                 plot=_overview(evidence),
                 verdicts=[(VERDICT_COLOURS[name], VERDICTS[name]) for name in told_apart],

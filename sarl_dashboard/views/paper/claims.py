@@ -71,4 +71,4 @@ def show_claims(claims: tuple[Claim, ...], *, beside: bool) -> None:
         beside: Whether they stand beside a figure, in a narrow column.
     """
     rows = [(one, _DOTS[one.verdict], how_decided(one)) for one in claims]
-    st.html(render("claims", rows=rows, beside=beside))
+    st.html(render("parts/claims", rows=rows, beside=beside))

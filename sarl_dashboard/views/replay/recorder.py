@@ -13,8 +13,8 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.decimals import digits_across
+from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.exports.steps import RecordedSteps, steps_to_csv, steps_to_parquet
-from sarl_core.explaining.figures.colours import label_colour
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.tables.recorder import (
     PAGE,

@@ -9,7 +9,7 @@ import streamlit as st
 from markupsafe import Markup
 from streamlit.errors import StreamlitAPIException
 
-from sarl_core.explaining.figures.colours import INTERVENTION_COLOUR, label_colour
+from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.figures.replay import (
     SHIELDED_COLOUR,
     UNSHIELDED_COLOUR,
