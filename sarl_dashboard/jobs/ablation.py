@@ -36,12 +36,12 @@ class Wanted:
     @property
     def known(self) -> Ablation | None:
         """What has been run of it, by whomever."""
-        record = records().get(self.row.key)
+        record = record_cache().get(self.row.key)
         return None if record is None else record.result(self.episodes, self.most)
 
 
 @st.cache_resource
-def records() -> BoundedCache[AblationRecord]:
+def record_cache() -> BoundedCache[AblationRecord]:
     """What has been run of each ablation so far, by the key of its row."""
     return BoundedCache(MOST_RECORDS)
 
@@ -52,24 +52,24 @@ def ablating(wanted: Wanted) -> Job[AblationRecord]:
     Args:
         wanted: What is asked for.
     """
-    kept, executor = records(), processes()
-    return Job(wanted.row.key, lambda job: _ablate(job, wanted, kept, executor), wanted.episodes)
+    cache, executor = record_cache(), processes()
+    return Job(wanted.row.key, lambda job: _ablate(job, wanted, cache, executor), wanted.episodes)
 
 
 def _ablate(
     job: Job[AblationRecord],
     wanted: Wanted,
-    kept: BoundedCache[AblationRecord],
+    cache: BoundedCache[AblationRecord],
     executor: Processes,
 ) -> None:
     row = wanted.row
-    record = kept.get(row.key)
+    record = cache.get(row.key)
     if record is None:
         job.text = "Making the agent …"
         shield = row.shield()
         assert shield is not None
         record = AblationRecord(row.env_id, row.agent(), shield, row.seed)
-        kept.put(row.key, record)
+        cache.put(row.key, record)
     work = record.run(wanted.episodes, wanted.most, partial(run_tasks, executor=executor))
     for job.done, job.total, job.text in work:
         if not job.wanted():

@@ -161,18 +161,18 @@ def run_batch(rows: Sequence[Row], episodes: int) -> Job[Batch]:
         episodes: How many of each.
     """
     batch = Batch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
-    kept, executor = results(), processes()
+    known_episodes, executor = results(), processes()
     return Job(
         None,
-        lambda job: _run(job, batch, kept, executor),
+        lambda job: _run(job, batch, known_episodes, executor),
         len(batch.rows) * episodes,
         batch,
     )
 
 
-def _run(job: Job[Batch], batch: Batch, kept: Results, executor: Processes) -> None:
+def _run(job: Job[Batch], batch: Batch, known_episodes: Results, executor: Processes) -> None:
     def count(row: Row) -> int:
-        have = kept.get(row.key, batch.episodes)
+        have = known_episodes.get(row.key, batch.episodes)
         return len(have) if have is not None else 0
 
     todo, tasks = [], []
@@ -196,7 +196,7 @@ def _run(job: Job[Batch], batch: Batch, kept: Results, executor: Processes) -> N
         if isinstance(outcome, SarlError):
             batch.problems[row.key] = outcome
             continue
-        kept.add(row, outcome)
+        known_episodes.add(row, outcome)
         job.done += len(outcome)
         job.text = f"{row.name}: {count(row)} of {batch.episodes} episodes"
         if not job.wanted():

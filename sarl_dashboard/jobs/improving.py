@@ -24,7 +24,7 @@ from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.memory_cache import BoundedCache
 
-KEPT = 6  # a finished run holds up to some ten megabytes of demonstrations
+MOST_OUTCOMES = 6  # a finished run holds up to some ten megabytes of demonstrations
 _SOON = 0.03  # share of the work from which on the rest can be guessed
 
 
@@ -78,9 +78,9 @@ class Outcome:
 
 
 @st.cache_resource
-def kept_outcomes() -> BoundedCache[Outcome]:
+def outcome_cache() -> BoundedCache[Outcome]:
     """Outcomes of finished runs by their order's key."""
-    return BoundedCache(KEPT)
+    return BoundedCache(MOST_OUTCOMES)
 
 
 @st.cache_resource
@@ -95,7 +95,7 @@ def improving(order: Order) -> Job[Outcome]:
     Args:
         order: What is asked for.
     """
-    kept, lock, executor = kept_outcomes(), _one_at_a_time(), processes()
+    cache, lock, executor = outcome_cache(), _one_at_a_time(), processes()
 
     def in_turn(job: Job[Outcome]) -> None:
         with _turn(job, lock) as mine:
@@ -105,7 +105,7 @@ def improving(order: Order) -> Job[Outcome]:
             outcome, finished = run.find_gaps() if order.expert is None else run.improve()
         job.result = outcome
         if finished:
-            kept.put(order.key, outcome)
+            cache.put(order.key, outcome)
 
     return Job(order.key, in_turn, order.plan.rounds * order.plan.episodes, Outcome(order))
 

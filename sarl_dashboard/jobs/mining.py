@@ -13,7 +13,7 @@ from sarl_dashboard.jobs.job import Job, Result
 from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.memory_cache import BoundedCache
 
-KEPT = 24
+MOST_RESULTS = 24
 
 Work = Callable[[Executor, Progress], Result]
 
@@ -21,7 +21,7 @@ Work = Callable[[Executor, Progress], Result]
 @st.cache_resource
 def mining_results() -> BoundedCache[Any]:
     """What such work gave, for all visitors."""
-    return BoundedCache(KEPT)
+    return BoundedCache(MOST_RESULTS)
 
 
 def mining(key: object, work: Work[Result], keep: Callable[[Result], None]) -> Job[Result]:

@@ -34,8 +34,8 @@ from sarl_dashboard.state.agents import ChosenAgent
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
-KEPT_REPLAYS, KEPT_COMPARISONS, KEPT_FORKS = 6, 8, 8
-KEPT_PICTURES = 64  # of a replay, some 30 kB each
+MOST_REPLAYS, MOST_COMPARISONS, MOST_FORKS = 6, 8, 8
+MOST_PICTURES = 64  # of a replay, some 30 kB each
 _LATEST = "_replay"
 
 
@@ -122,7 +122,7 @@ class Replay:
     @cached_property
     def png(self) -> Callable[[int], bytes]:
         """Gives the picture of a step as a file; the latest are kept."""
-        return lru_cache(KEPT_PICTURES)(self.film.png)
+        return lru_cache(MOST_PICTURES)(self.film.png)
 
     @cached_property
     def finder(self) -> PathFinder | None:
@@ -131,21 +131,21 @@ class Replay:
 
 
 @st.cache_resource
-def kept_replays() -> BoundedCache[Replay]:
+def replay_cache() -> BoundedCache[Replay]:
     """Replays by the key of their order."""
-    return BoundedCache(KEPT_REPLAYS)
+    return BoundedCache(MOST_REPLAYS)
 
 
 @st.cache_resource
-def kept_comparisons() -> BoundedCache[tuple[tuple[str, Episodes], ...]]:
+def comparison_cache() -> BoundedCache[tuple[tuple[str, Episodes], ...]]:
     """Comparisons by the key of their order, and number of episodes."""
-    return BoundedCache(KEPT_COMPARISONS)
+    return BoundedCache(MOST_COMPARISONS)
 
 
 @st.cache_resource
-def kept_forks() -> BoundedCache[Fork]:
+def fork_cache() -> BoundedCache[Fork]:
     """Forks by the key of their order, the step, and what the shield does after it."""
-    return BoundedCache(KEPT_FORKS)
+    return BoundedCache(MOST_FORKS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def latest_order() -> Order | None:
 def latest() -> Played | None:
     """The replay that the visitor ran last, while it is kept."""
     order = latest_order()
-    replay = None if order is None else kept_replays().get(order.key)
+    replay = None if order is None else replay_cache().get(order.key)
     return None if order is None or replay is None else Played(order, replay)
 
 

@@ -20,7 +20,7 @@ from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.memory_cache import BoundedCache
 
-KEPT = 8  # a report has about a megabyte
+MOST_REPORTS = 8  # a report has about a megabyte
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +53,9 @@ class Order:
 
 
 @st.cache_resource
-def kept_reports() -> BoundedCache[Report]:
+def report_cache() -> BoundedCache[Report]:
     """Finished reports by their order's key."""
-    return BoundedCache(KEPT)
+    return BoundedCache(MOST_REPORTS)
 
 
 def reporting(order: Order) -> Job[Report]:
@@ -64,11 +64,11 @@ def reporting(order: Order) -> Job[Report]:
     Args:
         order: What is asked for.
     """
-    kept = kept_reports()
-    return Job(order.key, lambda job: _make(job, order, kept), 100)
+    cache = report_cache()
+    return Job(order.key, lambda job: _make(job, order, cache), 100)
 
 
-def _make(job: Job[Report], order: Order, kept: BoundedCache[Report]) -> None:
+def _make(job: Job[Report], order: Order, cache: BoundedCache[Report]) -> None:
     job.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
 
     def progress(done: int, total: int) -> bool:
@@ -85,7 +85,7 @@ def _make(job: Job[Report], order: Order, kept: BoundedCache[Report]) -> None:
         trees=order.trees,
         progress=progress,
     )
-    kept.put(order.key, report)
+    cache.put(order.key, report)
 
 
 def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:

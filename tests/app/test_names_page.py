@@ -131,6 +131,6 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
 
 def kept(app: AppTest) -> Any:
     """The replay on screen."""
-    from sarl_dashboard.jobs.replays import kept_replays
+    from sarl_dashboard.jobs.replays import replay_cache
 
-    return kept_replays().get(app.session_state["_replay"].key)
+    return replay_cache().get(app.session_state["_replay"].key)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
-from sarl_dashboard.jobs.improving import Order, Outcome, improving, kept_outcomes
+from sarl_dashboard.jobs.improving import Order, Outcome, improving, outcome_cache
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.views.improve.outcome import show_outcome
 from sarl_dashboard.views.improve.shipped import show_shipped
@@ -23,7 +23,7 @@ def run_of(order: Order | None) -> None:
     """
 
     def outcome(at_work: bool) -> None:
-        finished = kept_outcomes().get(order.key) if order is not None and not at_work else None
+        finished = outcome_cache().get(order.key) if order is not None and not at_work else None
         latest = PLACE.job.result if PLACE.job is not None else None
         run_bar(PLACE, offer_of(order, latest, finished) if order is not None else None)
         known = finished or latest

@@ -25,7 +25,7 @@ from sarl_dashboard.jobs.replays import (
     Order,
     compare,
     compared,
-    kept_comparisons,
+    comparison_cache,
 )
 
 
@@ -46,7 +46,7 @@ def comparison(order: Order) -> None:
         )
         or EPISODES[0]
     )
-    runs = kept_comparisons().get((order.key, episodes))
+    runs = comparison_cache().get((order.key, episodes))
     if runs is None:
         st.caption("One episode may be luck. Run more of them, each on a seed of its own.")
         if st.button(
@@ -54,7 +54,7 @@ def comparison(order: Order) -> None:
         ):
             runs = waited_for(lambda tell: compare(order, episodes, tell))
             if runs is not None:
-                kept_comparisons().put((order.key, episodes), runs)
+                comparison_cache().put((order.key, episodes), runs)
                 st.session_state["_compared"] = (order, episodes)
                 st.rerun()
         return

@@ -9,7 +9,7 @@ from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.forking import Fork, Rest
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import waited_for
-from sarl_dashboard.jobs.replays import Played, kept_forks, run_fork
+from sarl_dashboard.jobs.replays import Played, fork_cache, run_fork
 from sarl_dashboard.text import escaped
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
@@ -43,7 +43,7 @@ def fork_section(played: Played, current: int) -> None:
         )
         rest = RESTS[chosen or next(iter(RESTS))]
         key = (order.key, current, rest)
-        branched = kept_forks().get(key)
+        branched = fork_cache().get(key)
         slot = st.empty()
         if branched is None and slot.button(
             f"Go on without the change at step {current:,}",
@@ -52,7 +52,7 @@ def fork_section(played: Played, current: int) -> None:
         ):
             branched = waited_for(lambda tell: run_fork(order, current, rest, tell))
             if branched is not None:
-                kept_forks().put(key, branched)
+                fork_cache().put(key, branched)
                 slot.empty()
     st.caption(
         f"{REST_TEXT[rest]} Up to step {current:,} both are the same episode, and the agent draws "

@@ -28,7 +28,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.jobs.replays import Played, Replay, compared, kept_comparisons
+from sarl_dashboard.jobs.replays import Played, Replay, compared, comparison_cache
 from sarl_dashboard.views.replay.run import jump_to
 
 CHANGED, OUTSIDE = "changed by the rules", "outside the data"
@@ -120,7 +120,7 @@ def source(played: Played) -> Recorded:
     replay, comparison = played.replay, compared(played.order)
     runs = None
     if comparison is not None:
-        runs = kept_comparisons().get((comparison[0].key, comparison[1]))
+        runs = comparison_cache().get((comparison[0].key, comparison[1]))
     if comparison is not None and runs is not None and runs[0][1].steps is not None:
         several = runs[0][1]
         if (

@@ -12,8 +12,8 @@ from sarl_dashboard.jobs.replays import (
     Order,
     Played,
     compared,
-    kept_replays,
     latest_order,
+    replay_cache,
     run,
     show_next,
 )
@@ -64,11 +64,11 @@ def run_bar(settings: Settings, jump: Jump | None) -> None:
     except SarlError as error:
         refuse(error)
         return
-    if kept_replays().get(order.key) is None:
+    if replay_cache().get(order.key) is None:
         replay = waited_for(lambda tell: run(order, tell))
         if replay is None:
             return
-        kept_replays().put(order.key, replay)
+        replay_cache().put(order.key, replay)
     show_next(order)
 
 

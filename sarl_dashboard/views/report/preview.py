@@ -11,7 +11,7 @@ from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.jobs.report import Order, kept_reports, reporting
+from sarl_dashboard.jobs.report import Order, report_cache, reporting
 from sarl_dashboard.text import escaped
 
 PLACE = Place[Report]("report")
@@ -27,7 +27,7 @@ def report_of(order: Order, name: str) -> None:
     """
 
     def outcome(at_work: bool) -> None:
-        report = kept_reports().get(order.key)
+        report = report_cache().get(order.key)
         in_full = min(order.wishes.in_full, len(order.rule_set))
         run_bar(
             PLACE,
