@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from benchmarks.measure import Row
 from sarl_core import Demonstrations, PolicyTree, grow_policy_trees
 from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.evidence import EpisodeCounts, HeldOut
 from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
 from sarl_core.mining.validation.cross_fitting import cross_fit
-from sarl_core.mining.validation.episode_counts import EpisodeCounts, count_applied
-from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.mining.validation.episode_counts import count_applied
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.seeds import POOLED
 

@@ -11,7 +11,7 @@ from sklearn.tree import DecisionTreeClassifier
 from benchmarks import data
 from benchmarks.measure import Row, duration, seconds, side_by_side
 from sarl_core import Landscape, grow_policy_trees, threshold_landscape
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
 
 CELLS = [(float(s), float(c)) for s in PAPER_SUPPORTS for c in PAPER_CONFIDENCES]
 

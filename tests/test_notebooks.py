@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, grow_policy_trees, rollout, threshold_landscape
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
 from sarl_core.notebooks import table_html
 
 

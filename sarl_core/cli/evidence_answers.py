@@ -13,12 +13,12 @@ from sarl_core.explaining.words.evidence import (
     shortfall_text,
     verdict_counts,
 )
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import counted, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.mining.validation.holding_out import Shortfall, Split, best_lower_bound
 
 

@@ -201,7 +201,7 @@ def landscape(
             parse_grid,
             save_landscape,
         )
-        from sarl_core.mining.landscape import threshold_landscape
+        from sarl_core.mining.thresholds.landscape import threshold_landscape
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")

@@ -15,10 +15,10 @@ from sarl_core.errors import InputError
 from sarl_core.explaining.colours import OUTSIDE_COLOUR
 from sarl_core.explaining.figures.replay import Track
 from sarl_core.explaining.markup import plain
+from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.written import value_text
 from sarl_core.rollouts.steps import StepTable
 
 

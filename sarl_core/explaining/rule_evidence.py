@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.splits import written_value
+from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.language import label_text, number_text, query_text
 from sarl_core.mining.rules import Bounds, Condition, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.mining.written import limit_texts
 
 _TAIL = 0.002  # of the states at either end, kept from flattening the rest of a histogram
 _BINS = 44

@@ -15,7 +15,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.mining.editing.edited_sets import reading_order
+from sarl_core.mining.edit_counts import reading_order
 from sarl_core.mining.language import conditions_text, counted, share_text
 from sarl_core.mining.rules import node_of
 from sarl_core.mining.tree import grow_policy_trees

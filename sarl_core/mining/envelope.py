@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.applying import Applications, applications
+from sarl_core.mining.applications import Applications, applications
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import splits_of
-from sarl_core.mining.validation.evidence import DataBox
 
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.mining.digits import amount_text, limit_texts
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rules import Bounds, Condition, Rule
-from sarl_core.mining.written import amount_text, limit_texts
-
-if TYPE_CHECKING:
-    from sarl_core.mining.rule_set import RuleSet
 
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
@@ -269,7 +266,7 @@ def label_text(label: int, dimension: LabelledDimension) -> str:
     return dimension.label_names[label]
 
 
-def conditions_text(rule: Rule, rule_set: RuleSet) -> str:
+def conditions_text(rule: Rule, rule_set: RuleContents) -> str:
     """All conditions of a rule in signs, for tables.
 
     Args:
@@ -286,7 +283,7 @@ def conditions_text(rule: Rule, rule_set: RuleSet) -> str:
 
 def sentence(
     rule: Rule,
-    rule_set: RuleSet,
+    rule_set: RuleContents,
     *,
     evidence: bool = True,
     state: Sequence[float] | NDArray[np.float32] | None = None,
@@ -326,7 +323,7 @@ def sentence(
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
 
 
-def limits_text(rule_set: RuleSet) -> str:
+def limits_text(rule_set: RuleContents) -> str:
     """The thresholds that a rule set was mined at.
 
     Args:

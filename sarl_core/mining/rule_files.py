@@ -7,7 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -28,13 +28,11 @@ from sarl_core.documents import (
     parse_json,
 )
 from sarl_core.errors import InputError, quoted
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
+from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.mining.validation.evidence import DataBox, HeldOut
-
-if TYPE_CHECKING:
-    from sarl_core.mining.rule_set import RuleSet
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
@@ -43,18 +41,7 @@ version 1, which is what it was before there was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
-class RuleFile(NamedTuple):
-    """What a rule file says, as `RuleSet` has it."""
-
-    rules: tuple[Rule, ...]
-    actions: tuple[LabelledDimension, ...]
-    source: Source
-    thresholds: Thresholds
-    divider: int
-    cut: Literal["thresholds", "leaves"]
-
-
-def write_rules(rule_set: RuleSet, path: Path) -> None:
+def write_rules(rule_set: RuleContents, path: Path) -> None:
     """Write a rule file without ever having it whole.
 
     Args:
@@ -65,7 +52,7 @@ def write_rules(rule_set: RuleSet, path: Path) -> None:
         file.writelines(file_parts(rule_set))
 
 
-def read_rules(text: str | bytes, name: str) -> RuleFile:
+def read_rules(text: str | bytes, name: str) -> RuleContents:
     """Read the text of a rule file.
 
     Args:
@@ -98,13 +85,13 @@ def read_rules(text: str | bytes, name: str) -> RuleFile:
         )
     kind: Any = _Document[_HeldOutPairs] if version == 1 else _Document[_HeldOut]
     try:
-        contents: RuleFile = conformed(document, kind).read()
+        contents: RuleContents = conformed(document, kind).read()
     except MisfitError as error:
         raise InputError(f"{name}: {error}; mend it or mine the rules again") from error
     return contents
 
 
-def file_parts(rule_set: RuleSet) -> Iterator[str]:
+def file_parts(rule_set: RuleContents) -> Iterator[str]:
     """The text of a rule file, so that nobody need have it whole.
 
     Args:
@@ -139,7 +126,7 @@ def _value(value: Any, depth: int, indented: bool) -> str:
     return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
 
 
-def _document(rule_set: RuleSet) -> dict[str, Any]:
+def _document(rule_set: RuleContents) -> dict[str, Any]:
     """What stands under each key: a value of JSON, or what makes those of a list one by one."""
     source, thresholds = rule_set.source, rule_set.thresholds
     by_feature: list[set[float]] = [set() for _ in source.features]
@@ -429,7 +416,7 @@ class _Document(_Part, Generic[_Held]):
     rules: list[_Rule[_Held]]
     cut: Literal["thresholds", "leaves"] = "thresholds"
 
-    def read(self) -> RuleFile:
+    def read(self) -> RuleContents:
         features = _each(self.features, "features", _Feature.read)
         actions = _each(self.actions, "actions", lambda action: action.read())
         if not features or not actions:
@@ -441,7 +428,7 @@ class _Document(_Part, Generic[_Held]):
         doubled = [one for one, count in Counter(rule.id for rule in rules).items() if count > 1]
         if doubled:
             raise MisfitError(f"the rule id {quoted(doubled[0])} stands twice")
-        return RuleFile(
+        return RuleContents(
             rules,
             actions,
             Source(self.env_id, features, mined.digest, mined.steps, mined.episodes),

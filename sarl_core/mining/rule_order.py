@@ -9,10 +9,10 @@ from typing import NamedTuple
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.feature_order import FeatureOrder, NamedFeatures, line_up
 from sarl_core.errors import InputError
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule
-from sarl_core.mining.validation.evidence import DataBox
 
 
 class Fitted(NamedTuple):

@@ -7,15 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
 from sarl_core.limits import limited_bytes
-from sarl_core.mining.editing.edited_sets import edits_counted, is_plain, reading_order
-from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     action_text,
     conditions_text,
@@ -26,10 +26,9 @@ from sarl_core.mining.language import (
     sentence,
     share_text,
 )
+from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rule_files import file_parts, read_rules, write_rules
-from sarl_core.mining.rules import Rule, Thresholds, name_at
-from sarl_core.mining.tree import Source
-from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.mining.rules import Rule, name_at
 from sarl_core.notebooks import MOST_ROWS, table_html
 
 if TYPE_CHECKING:
@@ -50,7 +49,7 @@ _NUMBERS = {
 
 
 @dataclass(frozen=True, repr=False)
-class RuleSet(Sequence[Rule]):
+class RuleSet(RuleContents, Sequence[Rule]):
     """Rules, with what they were mined from and how; a sequence of its rules.
 
     Attributes:
@@ -62,13 +61,6 @@ class RuleSet(Sequence[Rule]):
         cut: Where the paths were cut: at the first node that reaches the thresholds
             (Algorithm 1), or nowhere, so that every leaf is a rule and every state is covered.
     """
-
-    rules: tuple[Rule, ...]
-    actions: tuple[LabelledDimension, ...]
-    source: Source
-    thresholds: Thresholds
-    divider: int = 2
-    cut: Literal["thresholds", "leaves"] = "thresholds"
 
     def __len__(self) -> int:
         """Number of rules."""
@@ -310,7 +302,7 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
     Raises:
         InputError: If it is no rule file, or holds anything this version does not know.
     """
-    return RuleSet(*read_rules(text, name))
+    return RuleSet(**vars(read_rules(text, name)))
 
 
 def rules_to_json(rule_set: RuleSet) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
-from sarl_core.mining.validation.evidence import DataBox, HeldOut
+from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.landscape import (
+from sarl_core.mining.thresholds.landscape import (
     PAPER_CONFIDENCES,
     PAPER_SUPPORTS,
     Landscape,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
 from sarl_core.paper.claims import FIGURE_2, FIGURE_3, Rows, decided
 from sarl_core.paper.landscape_table import (
     COLUMNS,

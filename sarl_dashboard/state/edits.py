@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
-from sarl_core.mining.applying import labels_of
+from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rule_set import RuleSet

@@ -22,7 +22,7 @@ from sarl_core.explaining.words.difference import (
     what_text,
 )
 from sarl_core.explaining.words.edits import change_text, conflict_text, edit_text, state_text
-from sarl_core.mining.applying import labels_of
+from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.labels import LabelledDimension

@@ -14,8 +14,8 @@ from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.exports.rule_matrix_png import matrix_png
 from sarl_core.explaining.html.rule_matrix import matrix_document, matrix_html, rule_matrix
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.validation.evidence import HeldOut
 
 
 @pytest.fixture(scope="module")

@@ -31,10 +31,10 @@ from sarl_core.explaining.words.evidence import (
     told_by_episodes,
     verdict_counts,
 )
+from sarl_core.mining.evidence import HeldOut, Interval
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.contradictions import EpisodeContradictions, find_contradictions
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.evidence import HeldOut, Interval
 from sarl_core.mining.validation.holding_out import (
     Shortfall,
     hold_out,

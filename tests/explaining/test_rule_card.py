@@ -8,7 +8,7 @@ import pytest
 from sarl_core import Demonstrations, RuleSet, mine_rules
 from sarl_core.explaining.html.rule_card import rule_card
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS
-from sarl_core.mining.validation.evidence import HeldOut
+from sarl_core.mining.evidence import HeldOut
 
 
 @pytest.fixture(scope="module")

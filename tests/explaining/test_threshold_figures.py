@@ -8,9 +8,9 @@ import pytest
 from sarl_core import PolicyTree, threshold_landscape
 from sarl_core.explaining.figures import thresholds as figures
 from sarl_core.explaining.figures.pareto_front import front_figure, thin_front
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
-from sarl_core.mining.pareto import ParetoPoint, pareto_front
-from sarl_core.mining.threshold_steps import FINE_CONFIDENCES, FINE_SUPPORTS
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
+from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
+from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 
 
 @pytest.fixture(scope="module")

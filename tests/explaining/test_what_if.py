@@ -22,11 +22,11 @@ from sarl_core.explaining.words.what_if import (
     node_of_way,
     outside_texts,
 )
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.mining.validation.evidence import DataBox
 from sarl_core.shielding.near import FeatureChange, Neighbourhood
 from sarl_core.shielding.shield import Shield
 

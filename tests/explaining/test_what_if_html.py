@@ -12,11 +12,11 @@ from markupsafe import Markup
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.html.what_if import changes_html, decision_html, misses_html, way_html
 from sarl_core.explaining.templates import style_sheet
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.mining.validation.evidence import DataBox
 from sarl_core.shielding.near import Neighbourhood, decision_changes
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Shield

@@ -16,13 +16,13 @@ from sarl_core import (
     mine_rules,
     threshold_landscape,
 )
-from sarl_core.mining.landscape import (
+from sarl_core.mining.thresholds.landscape import (
     PAPER_CONFIDENCES,
     PAPER_SUPPORTS,
     next_changes,
     rule_rectangles,
 )
-from sarl_core.mining.pareto import pareto_front
+from sarl_core.mining.thresholds.pareto import pareto_front
 from tests.mining.oracle import algorithm_1, fit, paths_of
 from tests.mining.strategies import labelled_states
 

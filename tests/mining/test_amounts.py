@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sarl_core.mining.digits import amount_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.written import amount_text
 
 _finite = st.floats(width=32, allow_nan=False, allow_infinity=False)
 _near = st.integers(-3, 3)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged, cross_fit, judge, parts
 from sarl_core.mining.validation.episode_counts import (
@@ -20,7 +21,6 @@ from sarl_core.mining.validation.episode_counts import (
     episode_of_each,
     most_influential,
 )
-from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.progress import CancelledError
 from tests.mining.strategies import labelled_states
 

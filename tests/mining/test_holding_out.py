@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules, threshold_landscape
+from sarl_core.mining.evidence import HeldOut, held_out_of
 from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.validation.episode_counts import count_rules
-from sarl_core.mining.validation.evidence import HeldOut, held_out_of
 from sarl_core.mining.validation.holding_out import (
     best_lower_bound,
     count_held_out,
@@ -396,7 +396,7 @@ def test_many_episodes_are_taken_a_few_at_a_time(lander_like, monkeypatch):
     counts = count_held_out(trees, split.held_out)
     axes = np.linspace(0, 0.2, 7), np.linspace(0, 1, 9)
     whole = threshold_landscape(trees, *axes, held_out=counts)
-    monkeypatch.setattr("sarl_core.mining.landscape._CELLS_AT_ONCE", 150)
+    monkeypatch.setattr("sarl_core.mining.thresholds.landscape._CELLS_AT_ONCE", 150)
     parted = threshold_landscape(trees, *axes, held_out=counts)
     for name in ("held_out_fidelity", "held_out_low", "held_out_high"):
         np.testing.assert_allclose(getattr(parted, name), getattr(whole, name), rtol=1e-12)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
 from sarl_core.limits import READ_LIMIT
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.rule_set import rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition
-from sarl_core.mining.validation.evidence import DataBox, HeldOut
 from tests.mining.strategies import labelled_states
 
 

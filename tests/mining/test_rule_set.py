@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, PolicyTree, Rule, RuleSet, mine_rules
+from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import load_rules, rules_digest, rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition, Thresholds
-from sarl_core.mining.validation.evidence import DataBox, HeldOut
 from tests.mining.strategies import labelled_states
 
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sarl_core import PolicyTree, mine_rules
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.threshold_steps import (
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
+from sarl_core.mining.thresholds.steps import (
     CONFIDENCE_STEPS,
     FINE_CONFIDENCES,
     FINE_SUPPORTS,

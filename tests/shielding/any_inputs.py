@@ -8,11 +8,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.mining.validation.evidence import DataBox
 
 VALUES = (-1.0, -0.5, -0.25, 0.0, 0.1, 0.25, 0.5, 1.0, 1.5)
 DTYPES = ("<f4", ">f4", "f8", ">f8", "f2", "i1", "u1", "i4", ">i4", "i8", "u8", "?", "O", "g")

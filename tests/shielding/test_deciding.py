@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
-from sarl_core.mining.applying import labels_of
+from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Move, Pin, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.rules import Condition, Rule

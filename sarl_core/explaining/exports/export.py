@@ -18,6 +18,7 @@ from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
 from sarl_core.files import whole_file
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     counted,
     exact_condition,
@@ -26,7 +27,6 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid, Shield
 

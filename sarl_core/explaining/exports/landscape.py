@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
-from sarl_core.mining.landscape import LAYERS, Landscape
+from sarl_core.mining.thresholds.landscape import LAYERS, Landscape
 
 MAX_VALUES = 10_001  # an axis in steps of 0.0001
 MAX_CELLS = 4_000_000  # as a file, half a gigabyte

@@ -9,11 +9,11 @@ from html import escape
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.exports.program import one_line
 from sarl_core.explaining.words.evidence import held_out_text, interval_text
-from sarl_core.mining.editing.edited_sets import edits_counted, is_plain, reading_order
+from sarl_core.mining.digits import limit_texts
+from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
 from sarl_core.mining.language import action_text, counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
-from sarl_core.mining.written import limit_texts
 
 _SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
 _ORDINARY = re.compile(r"[A-Za-z0-9 ,;.+/²³°%-]*")

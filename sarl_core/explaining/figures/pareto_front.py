@@ -12,7 +12,7 @@ from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.figures.thresholds import layer_scale
 from sarl_core.mining.language import share_text
-from sarl_core.mining.pareto import ParetoPoint
+from sarl_core.mining.thresholds.pareto import ParetoPoint
 
 
 def thin_front(points: Sequence[ParetoPoint], most: int = 240) -> tuple[ParetoPoint, ...]:

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.markup import plain
-from sarl_core.mining.landscape import Landscape
 from sarl_core.mining.language import number_text, share_text
+from sarl_core.mining.thresholds.landscape import Landscape
 
 Layer = Literal["rule_count", "mean_length", "coverage", "fidelity", "held_out_fidelity"]
 Floats = NDArray[np.float64]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.markup import plain
+from sarl_core.mining.digits import limit_text
 from sarl_core.mining.language import label_text, query_text, share_text
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
-from sarl_core.mining.written import limit_text
 
 MAX_BOXES = 2000  # more take a browser the better part of a second
 _HOVERS = 400

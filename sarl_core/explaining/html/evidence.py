@@ -17,10 +17,10 @@ from sarl_core.explaining.words.evidence import (
     interval_text,
     verdict_counts,
 )
+from sarl_core.mining.evidence import Interval
 from sarl_core.mining.language import action_text, counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.validation.evidence import Interval
 from sarl_core.mining.validation.holding_out import verdict
 
 _ASIDE = 0.17  # of a rule's place: what it was mined from to the left, held out to the right

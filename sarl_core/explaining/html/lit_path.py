@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.state_path import PathFinder, StatePath
 from sarl_core.explaining.templates import render
+from sarl_core.mining.digits import value_text
 from sarl_core.mining.language import action_text, bounds_of, number_text, query_text
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.written import value_text
 
 
 def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup:

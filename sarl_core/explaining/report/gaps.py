@@ -13,10 +13,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.report.demonstrations import ActionShares, action_shares
 from sarl_core.explaining.report.svg import NEUTRAL, share_bar
 from sarl_core.explaining.report.tally import Tally
+from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.contradictions import NEAR, find_contradictions
-from sarl_core.mining.validation.evidence import FEWEST_EPISODES
 from sarl_core.mining.validation.holding_out import verdict
 from sarl_core.rendering.example_frames import Examples, PlayedEpisodes
 

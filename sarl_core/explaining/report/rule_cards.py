@@ -16,6 +16,8 @@ from sarl_core.explaining.figures.distributions import FeatureRow
 from sarl_core.explaining.report.svg import Scale, evidence_bar, interval_bar
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.evidence import what_tells
+from sarl_core.mining.digits import value_text
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     action_text,
     counted,
@@ -28,8 +30,6 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
-from sarl_core.mining.validation.evidence import HeldOut
-from sarl_core.mining.written import value_text
 from sarl_core.rendering.example_frames import ExampleFrame, Examples
 
 _MOST_VALUES = 3  # under a picture

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.editing.edited_sets import is_plain
+from sarl_core.mining.edit_counts import is_plain
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rule_order import Fitted, rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.episode_counts import count_applied
-from sarl_core.mining.validation.evidence import HeldOut
 from sarl_core.shielding.shield import Shield
 
 

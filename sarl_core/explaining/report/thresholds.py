@@ -15,11 +15,11 @@ from sarl_core.errors import InputError
 from sarl_core.explaining.colours import layer_colour
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.limits import limited_bytes
-from sarl_core.mining.editing.edited_sets import edits_sentence
-from sarl_core.mining.landscape import Landscape, threshold_landscape
+from sarl_core.mining.edit_counts import edits_sentence
 from sarl_core.mining.language import counted, number_text, share_text, threshold_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import FILTERED, NAMED_SETTINGS, UNFILTERED, Thresholds
+from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.tree import PolicyTree
 
 # Fine where the rules change fast: at small supports and high confidences.

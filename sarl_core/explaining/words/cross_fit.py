@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sarl_core.explaining.words.evidence import influence_text, range_text, what_tells
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.validation.cross_fitting import Judged, parts
-from sarl_core.mining.validation.evidence import HeldOut
 
 
 def elsewhere_text(held_out: HeldOut) -> str:

@@ -9,10 +9,11 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
+from sarl_core.mining.digits import limit_text
+from sarl_core.mining.evidence import HeldOut, Interval
 from sarl_core.mining.language import counted, number_text, share_text
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.evidence import HeldOut, Interval
 from sarl_core.mining.validation.holding_out import (
     Shortfall,
     Verdict,
@@ -21,7 +22,6 @@ from sarl_core.mining.validation.holding_out import (
     verdict,
 )
 from sarl_core.mining.validation.stability import Band
-from sarl_core.mining.written import limit_text
 
 VERDICTS: dict[Verdict, str] = {
     "below": "too low",

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.algorithm_1 import rules_at
+from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, is_flag, number_text, short_condition
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.mining.written import value_text
 from sarl_core.shielding.near import FeatureChange
 
 

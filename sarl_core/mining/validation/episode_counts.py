@@ -2,91 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.applying import applications, labels_of
+from sarl_core.mining.applications import applications, labels_of
+from sarl_core.mining.evidence import EpisodeCounts, Integers
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.mining.validation.evidence import EpisodeSums, HeldOut, held_outs
-
-Integers = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class EpisodeCounts:
-    """Things (rules, or nodes of a tree) in E episodes; K entries, where a thing applies at all.
-
-    Attributes:
-        size: Number of things.
-        thing: Which one, (K,), ascending.
-        episode: In which episode, 0 to E - 1, (K,), ascending within a thing.
-        samples: Pairs of the episode to which it applies, at least 1, (K,).
-        correct: Those of them that it is right about, (K,).
-        numbers: What the episodes are called, (E,).
-        lengths: Their steps, (E,).
-    """
-
-    size: int
-    thing: Integers
-    episode: Integers
-    samples: Integers
-    correct: Integers
-    numbers: Integers
-    lengths: Integers
-
-    def held_out(self) -> list[HeldOut]:
-        """What all episodes say of each thing.
-
-        Returns:
-            One entry a thing.
-        """
-        shares = self.correct / self.samples
-        samples, correct = (
-            np.bincount(self.thing, weights, minlength=self.size).astype(np.int64)
-            for weights in (self.samples, self.correct)
-        )
-        sums = EpisodeSums(
-            np.bincount(self.thing, minlength=self.size),
-            samples,
-            np.bincount(self.thing, shares, minlength=self.size).astype(np.float64),
-            np.bincount(self.thing, np.square(shares), minlength=self.size).astype(np.float64),
-        )
-        return held_outs(correct.tolist(), sums)
-
-    def together(self, chosen: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-        """Some things that do not overlap, taken as one.
-
-        Args:
-            chosen: Which, (size,).
-
-        Returns:
-            Pairs of each episode to which they apply, and those they are right about, (E,) each.
-        """
-        inside = chosen[self.thing]
-        samples, correct = (
-            np.bincount(self.episode[inside], weights[inside], minlength=len(self.numbers))
-            for weights in (self.samples, self.correct)
-        )
-        return samples.astype(np.int64), correct.astype(np.int64)
-
-    def of(self, thing: int) -> tuple[Integers, Integers]:
-        """One thing alone, as `together`.
-
-        Args:
-            thing: Which.
-
-        Returns:
-            Pairs of each episode to which it applies, and those it is right about, (E,) each.
-        """
-        first, last = np.searchsorted(self.thing, [thing, thing + 1]).tolist()
-        counts = np.zeros((2, len(self.numbers)), dtype=np.int64)
-        counts[:, self.episode[first:last]] = self.samples[first:last], self.correct[first:last]
-        return counts[0], counts[1]
 
 
 def episode_of_each(demonstrations: Demonstrations) -> Integers:

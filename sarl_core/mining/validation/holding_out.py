@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.evidence import FEWEST_EPISODES, EpisodeCounts, HeldOut, held_out_of, t_reach
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.mining.validation.episode_counts import EpisodeCounts, count_nodes, count_rules
-from sarl_core.mining.validation.evidence import FEWEST_EPISODES, HeldOut, held_out_of, t_reach
+from sarl_core.mining.validation.episode_counts import count_nodes, count_rules
 
 Verdict = Literal["below", "open", "reached", "unknown"]
 Floats = NDArray[np.float64]

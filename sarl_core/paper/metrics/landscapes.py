@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.landscape import Landscape
 from sarl_core.mining.language import counted
+from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.paper.criteria import InMost, Measurement, Sample
 from sarl_core.paper.landscape_table import landscapes_of
 from sarl_core.paper.replicates import environment_name

@@ -17,8 +17,8 @@ from sarl_core.explaining.words.evidence import (
     remedy_text,
     verdict_counts,
 )
+from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.language import share_text
-from sarl_core.mining.validation.evidence import FEWEST_EPISODES
 from sarl_core.mining.validation.holding_out import Verdict, shortfall
 from sarl_dashboard.cache import cached
 from sarl_dashboard.views.evidence.evidence import Evidence

@@ -9,10 +9,10 @@ import streamlit as st
 from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining.figures.thresholds import mark_place
-from sarl_core.mining.landscape import Landscape
 from sarl_core.mining.language import threshold_text
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
-from sarl_core.mining.threshold_steps import (
+from sarl_core.mining.thresholds.landscape import Landscape
+from sarl_core.mining.thresholds.steps import (
     CONFIDENCE_STEPS,
     SUPPORT_STEPS,
     neat_jumps,

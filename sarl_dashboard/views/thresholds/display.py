@@ -8,10 +8,10 @@ import numpy as np
 import streamlit as st
 
 from sarl_core.explaining.figures.thresholds import Layer
-from sarl_core.mining.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.threshold_steps import FINE_CONFIDENCES, FINE_SUPPORTS
+from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
+from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact

@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.explaining.colours import MARKER_COLOUR
 from sarl_core.explaining.figures import thresholds as figures
-from sarl_core.mining.landscape import Landscape
+from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.state.thresholds import chosen_thresholds
 from sarl_dashboard.views.thresholds.display import Display

@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.threshold_steps import neat_point
+from sarl_core.mining.thresholds.steps import neat_point
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits

@@ -7,10 +7,10 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.explaining.words.cross_fit import elsewhere_text
-from sarl_core.mining.landscape import Landscape
+from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import share_text
+from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.validation.cross_fitting import Judged
-from sarl_core.mining.validation.evidence import HeldOut
 
 
 def show_numbers(point: Landscape, judged: Judged | None) -> None:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.evidence import EpisodeCounts, EpisodeSums
 from sarl_core.mining.tree import PolicyTree, highest_above
-from sarl_core.mining.validation.episode_counts import EpisodeCounts
-from sarl_core.mining.validation.evidence import EpisodeSums
 from sarl_core.notebooks import table_html
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from sarl_core.mining.landscape import next_changes
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.thresholds.landscape import next_changes
 from sarl_core.mining.tree import PolicyTree
 
 # Most that is of interest happens below a support of 0.05, so the steps grow with the support.

@@ -2,49 +2,45 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from sarl_core.mining.rules import Rule
 
-if TYPE_CHECKING:
-    from sarl_core.mining.rule_set import RuleSet
 
-
-def is_plain(rule_set: RuleSet) -> bool:
+def is_plain(rules: Sequence[Rule]) -> bool:
     """Whether nobody edited a rule set: then its rules never overlap, and their counts add up.
 
     Args:
-        rule_set: Any.
+        rules: Of a set.
 
     Returns:
         True if every rule is switched on and none was written or put in its place by hand.
     """
-    return all(rule.enabled and not rule.placed for rule in rule_set.rules)
+    return all(rule.enabled and not rule.placed for rule in rules)
 
 
-def edits_counted(rule_set: RuleSet) -> str:
+def edits_counted(rules: Sequence[Rule]) -> str:
     """How a rule set was edited.
 
     Args:
-        rule_set: Any.
+        rules: Of a set.
 
     Returns:
         As "edited by hand: 1 off, 0 pinned, 2 added".
     """
-    off, pinned, added = edit_counts(rule_set)
+    off, pinned, added = edit_counts(rules)
     return f"edited by hand: {off:,} off, {pinned:,} pinned, {added:,} added"
 
 
-def edit_counts(rule_set: RuleSet) -> tuple[int, int, int]:
+def edit_counts(rules: Sequence[Rule]) -> tuple[int, int, int]:
     """How many rules were switched off, pinned, and written by hand.
 
     Args:
-        rule_set: Any.
+        rules: Of a set.
 
     Returns:
         The three numbers; one that was written by hand does not count as pinned.
     """
-    rules = rule_set.rules
     return (
         sum(not rule.enabled for rule in rules),
         sum(rule.pinned and rule.origin != "manual" for rule in rules),
@@ -52,17 +48,17 @@ def edit_counts(rule_set: RuleSet) -> tuple[int, int, int]:
     )
 
 
-def edits_sentence(rule_set: RuleSet) -> str:
+def edits_sentence(rules: Sequence[Rule]) -> str:
     """What was done to the rules after they were mined or built.
 
     Args:
-        rule_set: Any.
+        rules: Of a set.
 
     Returns:
         As "2 rules were then switched off, 1 written by hand."; "" for a plain set.
     """
     done = ("switched off", "pinned", "written by hand")
-    counts = edit_counts(rule_set)
+    counts = edit_counts(rules)
     parts = [f"{count:,} {what}" for count, what in zip(counts, done, strict=True) if count]
     if not parts:
         return ""
@@ -71,7 +67,7 @@ def edits_sentence(rule_set: RuleSet) -> str:
     return f"{', '.join([f'{count} {verb} then {rest}', *parts[1:]])}."
 
 
-def reading_order(rules: tuple[Rule, ...]) -> list[Rule]:
+def reading_order(rules: Sequence[Rule]) -> list[Rule]:
     """Rules as people read them.
 
     Args:

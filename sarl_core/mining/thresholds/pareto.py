@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.landscape import Landscape, rule_rectangles, threshold_landscape
+from sarl_core.mining.thresholds.landscape import Landscape, rule_rectangles, threshold_landscape
 from sarl_core.mining.tree import PolicyTree
 
 # Above this many edges an axis, the front is that of evenly chosen ones.
