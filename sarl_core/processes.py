@@ -22,7 +22,7 @@ _AHEAD = 16  # calls on their way to an executor that does not say how many it w
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it
 _PARENT_SECONDS = 2.0  # between two looks at whether the process that asked is still there
-_LOST = "a process that mined rules ended unexpectedly, as when memory runs out; run again"
+_LOST = "a process ended unexpectedly, as when memory runs out; run again"
 _NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
 
 Key = TypeVar("Key", bound=Hashable)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sarl_core.environments.description import describe_environment, make_environment
 
 _STEPS = 100  # where an environment does not say how fast it runs
@@ -61,22 +58,3 @@ def pace_of(env_id: str) -> Pace:
     fps = env.metadata.get("render_fps")
     env.close()
     return Pace(float(fps), "second") if fps else Pace(_STEPS, f"{_STEPS} steps")
-
-
-def count_flips(intervened: NDArray[np.bool_], episode: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How often the shield switched on or off in each episode.
-
-    A flip is a step at which the shield changes the action and at the one before it did not, or
-    the other way round. The first step of an episode is none.
-
-    Args:
-        intervened: Whether the shield changed the action, (T,), in the order of the steps.
-        episode: Number of each step's episode, counted from 0 without a gap, ascending, (T,).
-
-    Returns:
-        One number an episode.
-    """
-    if not len(episode):
-        return np.zeros(0, dtype=np.int64)
-    flips = (intervened[1:] != intervened[:-1]) & (episode[1:] == episode[:-1])
-    return np.bincount(episode[1:][flips], minlength=int(episode[-1]) + 1).astype(np.int64)

@@ -7,6 +7,7 @@ shield and say which rule is out, and a process keeps what it has unpacked.
 
 from __future__ import annotations
 
+import pickle
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -38,10 +39,10 @@ def pack(shield: Shield) -> bytes:
     Returns:
         What `PackedShield` takes as content.
     """
-    # As everything else is packed that goes to the processes, whatever script made it.
-    from loky.backend.reduction import dumps
+    from loky import wrap_non_picklable_objects
 
-    return bytes(dumps(shield))
+    # As everything else is packed that goes to the processes, whatever script made it.
+    return pickle.dumps(wrap_non_picklable_objects(shield, keep_wrapper=False))
 
 
 def unpack(packed: PackedShield) -> Shield:
@@ -60,9 +61,7 @@ def unpack(packed: PackedShield) -> Shield:
 
 @lru_cache(_MOST_KEPT)
 def _whole(content: bytes) -> Shield:
-    from loky.backend.reduction import loads
-
-    shield: Shield = loads(content)
+    shield: Shield = pickle.loads(content)
     return shield
 
 

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import platform
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.agents.policy_files import write_card
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import EpisodeArrays, play
-from sarl_core.rollouts.seeds import DEMONSTRATED
 from sarl_core.rollouts.steps import concatenate
 
 SHIPPED = {
@@ -118,55 +114,3 @@ def _bounds(env_id: str) -> dict[str, Any]:
     if low is None or high is None or not np.isfinite([*low, *high]).all():
         return {}
     return {"action_low": low, "action_high": high, "bounds_from": "action space"}
-
-
-def ship_demonstrations(
-    env_id: str, folder: Path, *, progress: Progress | None = None
-) -> dict[str, Any]:
-    """Record the demonstrations that are shipped for an environment, with their card.
-
-    Args:
-        env_id: One of `SHIPPED`.
-        folder: Where `<name>.parquet` and `<name>.json` go.
-        progress: As in `record`.
-
-    Returns:
-        The card.
-
-    Raises:
-        InputError: If nothing is shipped for the environment.
-    """
-    import gymnasium
-
-    from sarl_core.demonstrations.formats import save_demonstrations
-
-    if env_id not in SHIPPED:
-        raise InputError(
-            f"no demonstrations are shipped for {env_id!r}; choose from {', '.join(SHIPPED)}"
-        )
-    path = folder / f"{SHIPPED[env_id]}.parquet"
-    demos = record(
-        env_id, "expert", steps=SHIPPED_STEPS, seed=DEMONSTRATED, stochastic=True, progress=progress
-    )
-    save_demonstrations(demos, path)
-    summary, finished = demos.summary(), demos.episode_finished
-    card = {
-        "what": f"{SHIPPED_STEPS:,} steps of the shipped expert in {env_id}, actions sampled",
-        "from": f"data/experts/{SHIPPED[env_id]}.npz",
-        "command": f"python -m sarl_core record --env {env_id} --agent expert --stochastic "
-        f"--steps {SHIPPED_STEPS} --seed {DEMONSTRATED} --out data/demonstrations/{path.name}",
-        "env_id": env_id,
-        "steps": summary.steps,
-        "episodes": summary.episodes,
-        "episodes_finished": 0 if finished is None else int(finished.sum()),
-        "mean_return": None if summary.return_mean is None else round(summary.return_mean, 2),
-        "digest": demos.digest,
-        "versions": {
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "gymnasium": gymnasium.__version__,
-        },
-        "made": datetime.now(UTC).date().isoformat(),
-    }
-    write_card(path.with_suffix(".json"), card)
-    return card

@@ -5,8 +5,7 @@ import pytest
 
 from sarl_core.agents.agent import shipped_experts
 from sarl_core.demonstrations.formats import load_demonstrations
-from sarl_core.errors import InputError
-from sarl_core.rollouts.recording import SHIPPED, ship_demonstrations
+from sarl_core.rollouts.recording import SHIPPED
 
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
 
@@ -29,14 +28,3 @@ def test_shipped_demonstrations_are_what_their_cards_say(env_id: str) -> None:
 
 def test_what_is_shipped_has_an_expert() -> None:
     assert {env_id: path.stem for env_id, path in shipped_experts().items()} == SHIPPED
-
-
-def test_ships_a_file_and_its_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sarl_core.rollouts.recording.SHIPPED_STEPS", 120)
-    card = ship_demonstrations("CartPole-v1", tmp_path)
-    assert json.loads((tmp_path / "cartpole.json").read_text()) == card
-    demos = load_demonstrations(tmp_path / "cartpole.parquet")
-    assert (len(demos), demos.digest, card["steps"]) == (120, card["digest"], 120)
-    assert (card["episodes"], card["episodes_finished"]) == (1, 0)
-    with pytest.raises(InputError, match="no demonstrations are shipped"):
-        ship_demonstrations("Acrobot-v1", tmp_path)

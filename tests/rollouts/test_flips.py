@@ -4,13 +4,12 @@ import math
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.rendering.replay import render_episode
 from sarl_core.rollouts.episodes import join
-from sarl_core.rollouts.flips import Pace, count_flips, pace_of
+from sarl_core.rollouts.flips import Pace, pace_of
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
@@ -19,14 +18,6 @@ CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
 @pytest.fixture(scope="module")
 def shield() -> Shield:
     return Shield(mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0))
-
-
-def test_flips_are_counted_by_hand() -> None:
-    on = np.array([True, True, False, True, True, False, False, True], dtype=np.bool_)
-    episode = np.array([0, 0, 0, 0, 1, 1, 1, 3])
-    # On, off, on; then on, off; nothing; and a first step is no flip.
-    assert count_flips(on, episode).tolist() == [2, 1, 0, 0]
-    assert count_flips(on[:0], episode[:0]).tolist() == []
 
 
 def test_a_rollout_counts_the_flips_of_its_own_record(shield: Shield) -> None:
