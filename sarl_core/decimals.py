@@ -133,6 +133,22 @@ def decimal_text(value: float) -> str:
     return repr(float(value))
 
 
+def rounded_text(value: float, decimals: int = 0) -> str:
+    """A number for sentences, pictures and tables, with a true minus sign, and none before zero.
+
+    Args:
+        value: Any; NaN or infinite where there is none.
+        decimals: After the point.
+
+    Returns:
+        As "1,213", "−191" or "−1.20"; "–" where there is none.
+    """
+    if not math.isfinite(value):
+        return "–"
+    text = f"{abs(value):,.{decimals}f}"
+    return f"−{text}" if value < 0 and any(digit in text for digit in "123456789") else text
+
+
 def float32_around(value: float) -> tuple[float, float]:
     """The 32-bit numbers on either side of a number: no other pair is parted by it.
 

@@ -7,10 +7,9 @@ import re
 
 import streamlit as st
 
-_SIGNS = r"\`*_{}[]<>#$~|:&!^+-"
-# What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
-_JOINER = "\u2060"
-_BREAKS = re.compile(r"(?<=:)(?=//|[\w+-]+:)|(?<=@)|(?<=www)(?=\.)", re.IGNORECASE)
+from sarl_core.explaining.words.markdown import markdown_text
+
+escaped = markdown_text
 
 
 def in_full(text: str) -> str:
@@ -22,12 +21,6 @@ def in_full(text: str) -> str:
 def refuse(problem: Exception | str) -> None:
     """Say what is wrong, in its one sentence."""
     st.error(in_full(str(problem)), icon=":material/error:")
-
-
-def escaped(text: str) -> str:
-    """Text that Markdown leaves alone: names come from files."""
-    broken = _BREAKS.sub(_JOINER, text)
-    return "".join(f"\\{sign}" if sign in _SIGNS else sign for sign in broken)
 
 
 def together(text: str) -> str:

@@ -127,9 +127,9 @@ def _print(ablation: Ablation, out: Path | None) -> None:
     from sarl_core.cli.answers import print_notes
     from sarl_core.explaining.figures.ablation import (
         ablation_text,
-        interval_text,
+        difference_interval_text,
+        difference_text,
         left_out_text,
-        signed,
     )
 
     rule_set, known = ablation.shield.rule_set, ablation.failures_known
@@ -140,8 +140,8 @@ def _print(ablation: Ablation, out: Path | None) -> None:
                 (
                     rule_set.name_of(rule_set.rules[effect.rule]),
                     effect.verdict,
-                    signed(effect.difference.mean),
-                    interval_text(effect),
+                    difference_text(effect.difference.mean),
+                    difference_interval_text(effect),
                     f"{effect.failures} (with it {ablation.base_failures})" if known else "–",
                     f"{effect.changed:,}",
                 )

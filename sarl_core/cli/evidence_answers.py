@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 from sarl_core.explaining.words.cross_fit import parting_text
 from sarl_core.explaining.words.evidence import (
     evidence_text,
+    held_out_interval_text,
     influence_text,
-    interval_text,
     remedy_text,
     shortfall_text,
     verdict_counts,
@@ -223,7 +223,7 @@ def _facts(judged: Judged, where: str) -> list[tuple[str, str]]:
 
 def _share_and_interval(held_out: HeldOut) -> str:
     share = "none" if held_out.share is None else share_text(held_out.share)
-    return f"{share} ({interval_text(held_out)})"
+    return f"{share} ({held_out_interval_text(held_out)})"
 
 
 def rule_line(rule: Rule, rule_set: RuleSet) -> str:
@@ -233,4 +233,4 @@ def rule_line(rule: Rule, rule_set: RuleSet) -> str:
     text = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}"
     if not rule.held_out.samples:
         return f"{text}."
-    return f"{text}, {interval_text(rule.held_out)}."
+    return f"{text}, {held_out_interval_text(rule.held_out)}."

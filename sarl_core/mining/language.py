@@ -17,6 +17,7 @@ from sarl_core.mining.rules import Bounds, Condition, Rule
 
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
+_LONGEST = 120
 _FLAG_WORDS = ("contact",)
 
 
@@ -346,3 +347,16 @@ def limits_text(rule_set: RuleContents) -> str:
     if any(dimension.is_interval for dimension in rule_set.actions):
         limits.append(f"divider {rule_set.divider}")
     return ", ".join(limits)
+
+
+def one_line(text: str) -> str:
+    """Text from outside for a comment in code: one line, nothing invisible.
+
+    Args:
+        text: A name, a unit or a label, which may come from a file.
+
+    Returns:
+        The text, with a space for every sign that cannot be seen.
+    """
+    seen = "".join(sign if sign.isprintable() else " " for sign in text[: _LONGEST + 1])
+    return seen if len(seen) <= _LONGEST else f"{seen[:_LONGEST]}..."

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Generic, TypeVar
 
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import share_text
 from sarl_core.paper.criteria import Criterion, InMost, MeanBounds, Measurement, Together
-from sarl_core.paper.metrics import division, landscapes, learning, named_settings, shields
+from sarl_core.paper.metrics import dividing, landscapes, learning, named_settings, shields
 from sarl_core.paper.replicates import PAPER_DIVIDER
 from sarl_core.paper.shields import FILTERED, UNFILTERED, Runs
 from sarl_core.paper.verdicts import VERDICTS, Claim
-from sarl_core.paper.words import number, percent
+from sarl_core.paper.words import percent
 
 Data = TypeVar("Data")
 
@@ -165,7 +166,9 @@ FIGURE_3: Rows[landscapes.Environments] = (
         where="text on Figure 3",
         measured="The rank correlation over the cells.",
         metric=landscapes.number_and_length,
-        criterion=Together(MeanBounds("above", 0.8, 0.5, landscapes.signed), _EVERYWHERE),
+        criterion=Together(
+            MeanBounds("above", 0.8, 0.5, partial(rounded_text, decimals=2)), _EVERYWHERE
+        ),
     ),
 )
 
@@ -415,16 +418,16 @@ FIGURE_7: Rows[Runs] = (
     ),
 )
 
-DIVIDER: Rows[division.Environments] = (
+DIVIDER: Rows[dividing.Environments] = (
     ClaimRow(
         id="finer-division",
         paper="A finer division of the actions may have a positive effect (left open).",
         where="Conclusion and Prospects",
         measured=f"What all finer divisions bring on average, over that in {PAPER_DIVIDER} "
         "intervals.",
-        metric=division.finer,
+        metric=dividing.finer,
         criterion=Together(
-            MeanBounds("above", 0, 0, number),
+            MeanBounds("above", 0, 0, rounded_text),
             "{each} So in every environment with continuous actions; partly, if in some.",
         ),
     ),
@@ -435,7 +438,7 @@ DIVIDER: Rows[division.Environments] = (
         where="text on Figure 7",
         measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
         "its typical return with the better of the two, the centre and its own typical value.",
-        metric=division.kept_by_two_intervals,
+        metric=dividing.kept_by_two_intervals,
         criterion=MeanBounds("above", 0.5, 0.25),
     ),
 )

@@ -7,13 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import share_text
 from sarl_core.rollouts.statistics import MeanInterval
-
-
-def number(value: float) -> str:
-    """A return for people, without decimals."""
-    return f"{float(value):,.0f}".replace("-", "−") if abs(value) >= 0.5 else "0"
 
 
 def number_range(values: ArrayLike, decimals: int = 0) -> str:
@@ -25,8 +21,8 @@ def number_range(values: ArrayLike, decimals: int = 0) -> str:
 def interval(mean: MeanInterval) -> str:
     """A return with its 95 % interval, where there is one, for people."""
     if math.isnan(mean.low):
-        return number(mean.mean)
-    return f"{number(mean.mean)} ({number(mean.low)} to {number(mean.high)})"
+        return rounded_text(mean.mean)
+    return f"{rounded_text(mean.mean)} ({rounded_text(mean.low)} to {rounded_text(mean.high)})"
 
 
 def shares(mean: MeanInterval) -> str:
@@ -46,4 +42,4 @@ def percent(share: float) -> str:
     Returns:
         As "12 %".
     """
-    return f"{100 * share:.0f} %".replace("-", "−")
+    return f"{rounded_text(100 * share)} %"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.spaces import Actions
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text
 from sarl_core.rendering.canvas import INKS, PAPER_INDEX, TRACK_INDEX, Canvas, fitted, wrapped
@@ -98,7 +99,7 @@ class Panel:
             _MARGIN, 8, fitted(self.title, 18, width - 190, bold=True), 18, INKS.text, bold=True
         )
         canvas.text(_MARGIN, 32, fitted(self.subtitle, 13, width - 190), 13, INKS.quiet)
-        gained = signed(float(self._gained[number]), 1)
+        gained = rounded_text(float(self._gained[number]), 1)
         canvas.text_right(right, 10, f"return {gained}", 15, INKS.text)
         canvas.text_right(right, 32, f"step {number} of {len(self.steps)}", 13, INKS.quiet)
 
@@ -127,7 +128,7 @@ class Panel:
     def _write_end(self, canvas: Canvas) -> None:
         top, count = canvas.pixels.shape[0] - BOTTOM, len(self.steps)
         left = canvas.label(_MARGIN, top + 12, "ENDED", 12, INKS.text, INKS.on_text) + 10
-        gained = signed(float(self._gained[-1]), 1)
+        gained = rounded_text(float(self._gained[-1]), 1)
         canvas.text(
             left, top + 12, f"after {count} steps, return {gained}", 16, INKS.text, bold=True
         )
@@ -280,17 +281,3 @@ def typeset(text: str) -> str:
         As "torque −1.2".
     """
     return _MINUS.sub("−", text)
-
-
-def signed(value: float, digits: int) -> str:
-    """A number with a true minus sign, and none before zero.
-
-    Args:
-        value: The number.
-        digits: After the point.
-
-    Returns:
-        As "−1.20".
-    """
-    text = f"{abs(value):,.{digits}f}"
-    return f"−{text}" if value < 0 and float(text.replace(",", "")) else text

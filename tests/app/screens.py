@@ -28,7 +28,7 @@ def open_page(name: str, **query: str) -> AppTest:
 def texts(app: AppTest) -> str:
     """Everything a visitor reads, Markdown's escapes undone."""
     parts = [*app.title, *app.markdown, *app.caption, *app.info, *app.error, *app.subheader]
-    return "\n".join(str(part.value).replace("\\", "") for part in parts)
+    return "\n".join(unescape(str(part.value).replace("\\", "")) for part in parts)
 
 
 def html(app: AppTest) -> str:
@@ -40,7 +40,7 @@ def html(app: AppTest) -> str:
 
 def errors(app: AppTest) -> list[str]:
     """The sentences of errors, Markdown's escapes undone."""
-    return [str(error.value).replace("\\", "") for error in app.error]
+    return [unescape(str(error.value).replace("\\", "")) for error in app.error]
 
 
 def metrics(app: AppTest) -> dict[str, str]:

@@ -21,7 +21,7 @@ from sarl_core.explaining.words.difference import (
     said_text,
     what_text,
 )
-from sarl_core.explaining.words.edits import change_text, conflict_text, edit_text, state_text
+from sarl_core.explaining.words.edits import conflict_text, edit_text, edits_change_text, state_text
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
@@ -29,7 +29,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.shielding.decisions import ground_of
+from sarl_core.shielding.deciding import ground_of
 from sarl_core.shielding.disagreement import disagreement
 from sarl_core.shielding.effects import change, verdicts
 
@@ -81,11 +81,11 @@ def test_a_change_and_a_conflict_in_words():
     before = verdicts(ground, RULES, expert)
     after = verdicts(ground, apply(RULES, [Add(HAND)]), expert)
     # Above 0.3 are 7 states: 5 had no rule, 2 (0.35 and 0.45) the other one.
-    assert change_text(change(before, after), before, after, states="state") == (
+    assert edits_change_text(change(before, after), before, after, states="state") == (
         "7 of 10 states are decided differently (5 had no rule and now have one). Coverage rises "
         "from 50 % to 100 % and fidelity falls from 100 % to 80 %."
     )
-    assert change_text(change(before, before), before, before, states="state") == (
+    assert edits_change_text(change(before, before), before, before, states="state") == (
         "None of 10 states is decided differently."
     )
     assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (

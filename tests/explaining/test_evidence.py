@@ -20,9 +20,9 @@ from sarl_core.explaining.tables.evidence import (
 from sarl_core.explaining.words.evidence import (
     band_text,
     evidence_text,
+    held_out_interval_text,
     held_out_text,
     influence_text,
-    interval_text,
     more_text,
     never_text,
     range_text,
@@ -74,9 +74,9 @@ def test_a_rule_says_its_shares_and_counts():
 
 
 def test_an_interval_is_said_or_why_there_is_none():
-    assert interval_text(HeldOut(*SURE)) == "78 to 99.1 %"
-    assert interval_text(HeldOut(4, 4, 4, 1.0, None, None)) == "too few episodes"
-    assert interval_text(None) == ""
+    assert held_out_interval_text(HeldOut(*SURE)) == "78 to 99.1 %"
+    assert held_out_interval_text(HeldOut(4, 4, 4, 1.0, None, None)) == "too few episodes"
+    assert held_out_interval_text(None) == ""
     assert range_text(Interval(0.0, 1.0)) == "0 to 100 %"
     assert range_text(Interval(0.5, 0.99996)) == "50 to > 99.99 %"
     assert range_text(Interval(0.496, 0.502)) == "49.60 to 50.20 %"

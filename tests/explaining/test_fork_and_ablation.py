@@ -12,8 +12,8 @@ from sarl_core.explaining.figures.ablation import (
     ablation_columns,
     ablation_figure,
     ablation_text,
+    difference_text,
     left_out_text,
-    signed,
 )
 from sarl_core.explaining.words.fork import ending_text, fork_text
 from sarl_core.rendering.forking import fork
@@ -78,7 +78,7 @@ def test_the_sentences_count(found: Ablation) -> None:
 
 
 def test_differences_have_their_signs() -> None:
-    assert [signed(value) for value in (1234.56, -3.41, 0.0, -0.04)] == [
+    assert [difference_text(value) for value in (1234.56, -3.41, 0.0, -0.04)] == [
         "+1,234.6",
         "-3.4",
         "0",

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sarl_core.decimals import rounded_text
 from sarl_core.explaining.figures.learning import (
     afterwards_figure,
     arm_colour,
     curves_figure,
     outcome_figure,
 )
-from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, value_text, verdict
+from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, verdict
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.curves import LearningEpisodes, Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
@@ -159,7 +160,7 @@ def test_the_table_has_a_row_an_arm_under_its_headings(study: LearningStudy) -> 
     [(-191.4, "−191"), (0.2, "0"), (-0.2, "0"), (1234.5, "1,234"), (float("nan"), "–")],
 )
 def test_values_for_people(value: float, text: str) -> None:
-    assert value_text(value) == text
+    assert rounded_text(value) == text
 
 
 def test_each_arm_has_a_colour() -> None:

@@ -9,7 +9,7 @@ from PIL import Image
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.exports.markdown import markdown_text, rules_to_markdown
+from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.exports.rule_matrix_png import matrix_png
 from sarl_core.explaining.html.rule_matrix import (
     OFF_LEGEND,
@@ -19,6 +19,7 @@ from sarl_core.explaining.html.rule_matrix import (
     matrix_html,
     rule_matrix,
 )
+from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.rules import Condition
 
 HOSTILE = '<img src=x onerror="alert(1)">|`*_\n# & "\'</td>'

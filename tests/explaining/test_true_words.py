@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from sarl_core import Demonstrations, Rule, RuleSet, grow_policy_trees, mine_rules
-from sarl_core.decimals import digits_across, digits_telling
+from sarl_core.decimals import digits_across, digits_telling, rounded_text
 from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.figures.tree import path_queries
 from sarl_core.explaining.html.lit_path import lit_path_table
 from sarl_core.explaining.report.report import make_report
+from sarl_core.explaining.rule_evidence import example_columns
 from sarl_core.explaining.state_path import PathFinder
-from sarl_core.explaining.tables.rule_evidence import example_columns
 from sarl_core.explaining.words.what_if import condition_views
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_splits
@@ -410,3 +410,9 @@ def test_rules_that_came_without_it_learn_what_was_demonstrated() -> None:
     assert all(text.split()[-1] in report for text in said)
     assert bare.rules[0].conditions[0].threshold != float(said[0].split()[-1])
     assert conditions_text(bare.rules[0], bare).split()[-1] not in report
+
+
+def test_a_rounded_number_has_a_true_minus_sign_and_none_before_zero() -> None:
+    numbers = (1213.4, -191.0, -0.4, 0.0, float("nan"), -float("inf"))
+    assert [rounded_text(number) for number in numbers] == ["1,213", "−191", "0", "0", "–", "–"]
+    assert (rounded_text(-0.04, 1), rounded_text(-1.25, 2)) == ("0.0", "−1.25")

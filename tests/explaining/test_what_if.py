@@ -14,10 +14,10 @@ from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.what_if_bars import lines_html, stretches
 from sarl_core.explaining.words.what_if import (
     by_use,
-    change_text,
     condition_views,
-    exact_text,
     executed_text,
+    feature_change_text,
+    float32_text,
     near_miss_text,
     node_of_way,
     outside_texts,
@@ -27,7 +27,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.shielding.neighbourhood import FeatureChange, Neighbourhood
+from sarl_core.shielding.near import FeatureChange, Neighbourhood
 from sarl_core.shielding.shield import Shield
 
 FEATURES = (Feature("pole angle", "rad"), Feature("left leg contact", ""), Feature("speed <b>", ""))
@@ -80,7 +80,7 @@ def test_where_a_state_leaves_the_data_is_said():
     ],
 )
 def test_a_change_in_words(change, text):
-    assert change_text(change, FEATURES[change.feature]) == text
+    assert feature_change_text(change, FEATURES[change.feature]) == text
 
 
 def test_a_near_miss_in_words():
@@ -92,7 +92,7 @@ def test_a_near_miss_in_words():
 
 def test_an_exact_number_reads_back_as_the_same():
     for value in np.float32([0.1, 1 / 3, 1e-30, -123456.78, 0.0]):
-        assert np.float32(exact_text(float(value))) == value
+        assert np.float32(float32_text(float(value))) == value
 
 
 def test_actions_in_words():

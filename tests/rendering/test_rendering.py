@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from sarl_core.decimals import rounded_text
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -19,7 +20,7 @@ from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.language import done_text, sentence
 from sarl_core.progress import CancelledError
 from sarl_core.rendering.canvas import INKS, OVERLAY_COLOURS, fitted, text_width, wrapped
-from sarl_core.rendering.overlay import BOTTOM, GAP, TOP, signed
+from sarl_core.rendering.overlay import BOTTOM, GAP, TOP
 from sarl_core.rendering.replay import (
     Replay,
     check_picture_path,
@@ -352,7 +353,7 @@ def test_actions_in_words() -> None:
         "torque 0.5 → torque 0.5004",
         "torque 0 → torque 0.0004",
     ]
-    assert (signed(-0.001, 2), signed(-1234.5, 1)) == ("0.00", "−1,234.5")
+    assert (rounded_text(-0.001, 2), rounded_text(-1234.5, 1)) == ("0.00", "−1,234.5")
 
 
 def test_text_is_wrapped_and_shortened_to_what_there_is() -> None:

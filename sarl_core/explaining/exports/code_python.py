@@ -9,11 +9,10 @@ from sarl_core.explaining.exports.program import (
     DimensionProgram,
     Program,
     Replacement,
-    one_line,
     parts_of,
     program_of,
 )
-from sarl_core.mining.language import action_text, conditions_text, counted
+from sarl_core.mining.language import action_text, conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule

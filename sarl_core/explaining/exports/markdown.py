@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
-from html import escape
 
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.explaining.exports.program import one_line
-from sarl_core.explaining.words.evidence import held_out_text, interval_text
+from sarl_core.explaining.words.evidence import held_out_interval_text, held_out_text
+from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
-from sarl_core.mining.language import action_text, counted, share_text
+from sarl_core.mining.language import action_text, counted, one_line, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
-
-_SIGNS = re.compile(r"([\\`*_{}\[\]()#!|~$^:@])")
-_ORDINARY = re.compile(r"[A-Za-z0-9 ,;.+/²³°%-]*")
 
 
 def rules_to_markdown(rule_set: RuleSet) -> str:
@@ -40,7 +35,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         else f"The set was {edits_counted(rule_set)}."
     )
     lines = [
-        f"# Rules for {markdown_text(source.env_id) or 'an unnamed environment'}",
+        f"# Rules for {_text(source.env_id) or 'an unnamed environment'}",
         "",
         f"{counted(rule_set.rule_count, 'rule')}, mined from {counted(source.steps, 'step')} in "
         f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. {summary}",
@@ -54,7 +49,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         rules = reading_order(rule_set.of_dimension(index))
         lines += [
             "",
-            f"## {markdown_text(dimension.name)}: {counted(len(rules), 'rule')}",
+            f"## {_text(dimension.name)}: {counted(len(rules), 'rule')}",
             "",
             f"| {' | '.join(headings)} |",
             "|" + " --- |" * len(headings),
@@ -65,25 +60,14 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
     return "\n".join(lines) + "\n"
 
 
-def markdown_text(text: str) -> str:
-    """Text from outside that Markdown, and the HTML in it, leave alone.
-
-    Args:
-        text: A name, a unit or a label, which may come from a file.
-
-    Returns:
-        One line.
-    """
-    seen = one_line(text)
-    if _ORDINARY.fullmatch(seen):
-        return seen
-    return escape(_SIGNS.sub(r"\\\1", seen), quote=False)
+def _text(text: str) -> str:
+    return markdown_text(one_line(text))
 
 
 def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     features = rule_set.source.features
     asked = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
-    action = markdown_text(action_text(rule.action, rule_set.actions[rule.dimension]))
+    action = _text(action_text(rule.action, rule_set.actions[rule.dimension]))
     name = rule_set.name_of(rule)
     if rule.origin == "manual":
         name += ", by hand"
@@ -99,14 +83,16 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     if held_out:
         counts = rule.held_out
         text = "–" if counts is None or not counts.samples else held_out_text(counts)
-        cells.append(f"{text} ({interval_text(counts)})" if counts and counts.episodes else text)
+        cells.append(
+            f"{text} ({held_out_interval_text(counts)})" if counts and counts.episodes else text
+        )
     return cells
 
 
 def _interval(bounds: Bounds, feature: Feature) -> str:
     """What is asked of one feature."""
-    name = markdown_text(feature.name)
-    unit = f" {markdown_text(feature.unit)}" if feature.unit else ""
+    name = _text(feature.name)
+    unit = f" {_text(feature.unit)}" if feature.unit else ""
     limits = limit_texts(bounds, feature)
     if math.isinf(bounds.low):
         return f"{name} ≤ {limits[0]}{unit}"

@@ -23,7 +23,6 @@ from sarl_core.shielding.shield import OnInvalid
 
 # Nested deeper than this, code goes on in a function of its own: Python ends at a hundred levels.
 _MOST_LEVELS = 20
-_LONGEST = 120
 
 
 class Replacement(NamedTuple):
@@ -214,19 +213,6 @@ def largest_float32(number: float) -> np.float32:
         nearest = np.float32(number)
     lower = np.float32(-np.inf)
     return np.nextafter(nearest, lower) if float(nearest) > number else nearest
-
-
-def one_line(text: str) -> str:
-    """Text from outside for a comment in code: one line, nothing invisible.
-
-    Args:
-        text: A name, a unit or a label, which may come from a file.
-
-    Returns:
-        The text, with a space for every sign that cannot be seen.
-    """
-    seen = "".join(sign if sign.isprintable() else " " for sign in text[: _LONGEST + 1])
-    return seen if len(seen) <= _LONGEST else f"{seen[:_LONGEST]}..."
 
 
 def _order(rule_set: RuleSet, index: int) -> DimensionProgram:

@@ -6,9 +6,8 @@ import io
 from collections.abc import Sequence
 
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.exports.program import one_line
 from sarl_core.explaining.html.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
-from sarl_core.mining.language import label_text, number_text, share_text
+from sarl_core.mining.language import label_text, number_text, one_line, share_text
 from sarl_core.mining.rules import Rule
 
 _SCALE = 2  # pixels a unit, for sharp print

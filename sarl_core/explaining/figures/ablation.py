@@ -55,7 +55,7 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "Verdict": [effect.verdict.capitalize() for effect in ablation.effects],
         "Return without it": [effect.difference.mean for effect in ablation.effects],
-        "95 % interval": [interval_text(effect) for effect in ablation.effects],
+        "95 % interval": [difference_interval_text(effect) for effect in ablation.effects],
         "Failures without it": [
             effect.failures if known else math.nan for effect in ablation.effects
         ],
@@ -66,7 +66,7 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
     }
 
 
-def interval_text(effect: RuleEffect) -> str:
+def difference_interval_text(effect: RuleEffect) -> str:
     """The interval of a rule's difference.
 
     Args:
@@ -75,10 +75,10 @@ def interval_text(effect: RuleEffect) -> str:
     Returns:
         As "-50.1 to -18.4".
     """
-    return f"{signed(effect.difference.low)} to {signed(effect.difference.high)}"
+    return f"{difference_text(effect.difference.low)} to {difference_text(effect.difference.high)}"
 
 
-def signed(value: float) -> str:
+def difference_text(value: float) -> str:
     """A difference with its sign.
 
     Args:
@@ -207,7 +207,8 @@ def _hover(ablation: Ablation, effect: RuleEffect) -> str:
     lines = [
         f"<b>{rule_set.name_of(rule)}: "
         f"{plain(action_text(rule.action, rule_set.actions[rule.dimension]))}</b>",
-        f"{signed(effect.difference.mean)} without it, 95 % interval {interval_text(effect)}",
+        f"{difference_text(effect.difference.mean)} without it, 95 % interval "
+        f"{difference_interval_text(effect)}",
         effect.verdict,
     ]
     if ablation.failures_known:

@@ -11,9 +11,9 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from sarl_core.decimals import rounded_text
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
-from sarl_core.explaining.words.learning import value_text
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import LearningArm
 from sarl_core.learning.study_files import LearningRun, LearningStudy
@@ -242,9 +242,9 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
                 legendgroup=words,
                 showlegend=row == 0,
                 hovertemplate=(
-                    f"{one.arm.title}, {words}: <b>{value_text(returns.iqm)}</b><br>95 % interval "
-                    f"{value_text(returns.low)} to {value_text(returns.high)}<br>mean "
-                    f"{value_text(returns.mean)}<extra></extra>"
+                    f"{one.arm.title}, {words}: <b>{rounded_text(returns.iqm)}</b><br>95 % "
+                    f"interval {rounded_text(returns.low)} to {rounded_text(returns.high)}<br>mean "
+                    f"{rounded_text(returns.mean)}<extra></extra>"
                 ),
             )
     rows = len(summaries)

@@ -14,7 +14,7 @@ from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
     VERDICTS,
     evidence_text,
-    interval_text,
+    held_out_interval_text,
     verdict_counts,
 )
 from sarl_core.mining.evidence import Interval
@@ -106,7 +106,11 @@ def _within(share: float, interval: Interval) -> str:
 
 def _tip(rule: Rule, rule_set: RuleSet) -> str:
     does = action_text(rule.action, rule_set.actions[rule.dimension])
-    lines = (f"{rule_set.name_of(rule)}: {does}", evidence_text(rule), interval_text(rule.held_out))
+    lines = (
+        f"{rule_set.name_of(rule)}: {does}",
+        evidence_text(rule),
+        held_out_interval_text(rule.held_out),
+    )
     return "\n".join(line for line in lines if line)
 
 

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.html.plot import Scale
 from sarl_core.explaining.templates import render
-from sarl_core.explaining.words.evidence import VERDICT_COLOURS, interval_text
+from sarl_core.explaining.words.evidence import VERDICT_COLOURS, held_out_interval_text
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import verdict
@@ -55,7 +55,9 @@ def evidence_bar(rule: Rule, threshold: float) -> Markup:
     if share is not None:
         whisker = interval and (scale.place(interval.low), scale.length(*interval))
         colour = VERDICT_COLOURS[verdict(rule, threshold)]
-        lines.append(_Line("held out", scale.place(share), whisker, colour, interval_text(held)))
+        lines.append(
+            _Line("held out", scale.place(share), whisker, colour, held_out_interval_text(held))
+        )
     return render(
         "rules/evidence_bar", lines=lines, threshold=scale.place(threshold), floor=share_text(floor)
     )

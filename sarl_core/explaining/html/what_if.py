@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import (
-    change_text,
     condition_views,
-    exact_text,
     executed_text,
+    feature_change_text,
+    float32_text,
     near_miss_text,
     outside_texts,
     with_unit,
@@ -22,7 +22,7 @@ from sarl_core.explaining.words.what_if import (
 from sarl_core.mining.language import action_text, counted, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.neighbourhood import DecisionChange, NearMiss
+from sarl_core.shielding.near import DecisionChange, NearMiss
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Decision, Outside
 
@@ -157,11 +157,11 @@ def _change_row(
     feature, span = rule_set.source.features[moved.feature], spans[moved.feature]
     rules = [rule_set.name_of(rule_set.rules[rule]) for rule in change.rules.tolist() if rule >= 0]
     return (
-        change_text(moved, feature),
+        feature_change_text(moved, feature),
         executed_text(tuple(change.executed.astype(float).tolist()), rule_set.actions),
         ", ".join(rules) or "none",
         number_text(change.distance),
-        with_unit(exact_text(moved.after), feature),
+        with_unit(float32_text(moved.after), feature),
         _yes(span.low <= moved.after <= span.high),
     )
 
@@ -191,7 +191,8 @@ def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
         number_text(miss.distance),
         _yes(miss.in_force),
         ", ".join(
-            with_unit(exact_text(change.after), features[change.feature]) for change in miss.changes
+            with_unit(float32_text(change.after), features[change.feature])
+            for change in miss.changes
         ),
     )
 

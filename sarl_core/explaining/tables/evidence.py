@@ -10,8 +10,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.evidence import (
     VERDICTS,
     band_text,
+    held_out_interval_text,
     held_out_text,
-    interval_text,
     mined_text,
     more_text,
     moved_text,
@@ -74,7 +74,7 @@ def enough_columns(
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "Still missing": [more_text(more) for more in missing],
         "Held out": [held_out_text(rule.held_out) for rule in rules],
-        "Interval": [interval_text(rule.held_out) for rule in rules],
+        "Interval": [held_out_interval_text(rule.held_out) for rule in rules],
         "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
         "Mined from": [mined_text(rule) for rule in rules],
         "Moved most by": [moved_text(one) for one in influences],

@@ -54,7 +54,10 @@ def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = Fa
         was = conditions_text(before, difference.first)
         now = conditions_text(after, difference.second)
         if was == now:  # they differ beyond what is shown
-            was, now = exact_text(before, difference.first), exact_text(after, difference.second)
+            was, now = (
+                exact_rule_text(before, difference.first),
+                exact_rule_text(after, difference.second),
+            )
         parts.append(f"was {was}" if beside else f"{now} instead of {was}")
     if "action" in what:
         dimension = difference.first.actions[before.dimension]
@@ -73,7 +76,7 @@ def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = Fa
     return "; ".join(parts)
 
 
-def exact_text(rule: Rule, rule_set: RuleSet) -> str:
+def exact_rule_text(rule: Rule, rule_set: RuleSet) -> str:
     """The conditions of a rule at full precision.
 
     Args:

@@ -55,7 +55,7 @@ def state_text(rule: Rule) -> str:
     return kind if rule.enabled else f"{kind}, off"
 
 
-def change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, states: str) -> str:
+def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, states: str) -> str:
     """What edits change at once, as a sentence.
 
     Args:

@@ -108,7 +108,7 @@ def evidence_text(rule: Rule) -> str:
     return f"{mined_text(rule)}; held out: {held}{states}"
 
 
-def interval_text(held_out: HeldOut | None) -> str:
+def held_out_interval_text(held_out: HeldOut | None) -> str:
     """The 95 % interval of a mean over episodes.
 
     Args:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import counted
 from sarl_core.rendering.forking import Branch, Ending, Fork, Rest
 
@@ -53,15 +54,11 @@ def fork_text(fork: Fork) -> str:
     gain = fork.difference
     compared = f"{abs(gain):,.1f} {'more' if gain > 0 else 'less'}" if gain else "the same"
     return (
-        f"With the change the return is {_number(with_it.gained)} and "
-        f"{_ended(with_it, env_id)}. Without it the return is {_number(without.gained)} "
+        f"With the change the return is {rounded_text(with_it.gained, 1)} and "
+        f"{_ended(with_it, env_id)}. Without it the return is {rounded_text(without.gained, 1)} "
         f"({compared}) and {_ended(without, env_id)}."
     )
 
 
 def _ended(branch: Branch, env_id: str) -> str:
     return f"{ending_text(branch.ending, env_id)}, after {counted(branch.steps, 'step')}"
-
-
-def _number(value: float) -> str:
-    return f"{value:,.1f}".replace("-", "−")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sarl_core.decimals import rounded_text
 from sarl_core.environments.failures import failure_known, no_failures_text
 from sarl_core.files import whole_file
 from sarl_core.learning.study_files import LearningStudy
@@ -35,21 +36,6 @@ HEADINGS = (
     "Crashed after",
     "Shield on",
 )
-
-
-def value_text(value: float) -> str:
-    """A return or a count for people.
-
-    Args:
-        value: Any; NaN where there is none.
-
-    Returns:
-        As "213" or "−191"; "–" for NaN.
-    """
-    if not np.isfinite(value):
-        return "–"
-    text = f"{value:,.0f}"
-    return ("0" if text == "-0" else text).replace("-", "−")
 
 
 def verdict(summary: ArmSummary) -> str:
@@ -84,7 +70,7 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
     for summary in summaries:
         alone, shielded, known = summary.alone, summary.shielded, summary.failures_known
         spread = (
-            f" ({value_text(min(summary.crashes))}–{value_text(max(summary.crashes))})"
+            f" ({rounded_text(min(summary.crashes))}–{rounded_text(max(summary.crashes))})"
             if len(summary.crashes) > 1
             else ""
         )
@@ -92,15 +78,15 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
             (
                 summary.arm.title,
                 verdict(summary),
-                value_text(summary.mean_crashes) + spread if known else "–",
-                value_text(float(np.mean(summary.episodes))),
+                rounded_text(summary.mean_crashes) + spread if known else "–",
+                rounded_text(float(np.mean(summary.episodes))),
                 share_text(summary.intervention_rate) if summary.arm.shielded else "–",
-                value_text(summary.learning_return),
+                rounded_text(summary.learning_return),
                 _with_worst(alone.mean, alone.means),
-                f"{value_text(alone.returns.iqm)} ({value_text(alone.returns.low)} to "
-                f"{value_text(alone.returns.high)})",
+                f"{rounded_text(alone.returns.iqm)} ({rounded_text(alone.returns.low)} to "
+                f"{rounded_text(alone.returns.high)})",
                 _crash_share(alone) if known else "–",
-                "–" if shielded is None else value_text(shielded.mean),
+                "–" if shielded is None else rounded_text(shielded.mean),
             )
         )
     return rows
@@ -157,13 +143,13 @@ def _answer(
         )
     alone = reference(summaries, safest.arm)
     assert alone is not None  # else it were not judged
-    after = value_text(safest.alone.halves[1])
+    after = rounded_text(safest.alone.halves[1])
     return (
         f"Safe while learning and good afterwards: “{safest.arm.title}”. While learning it crashed "
         f"{_times(safest.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
         f"crashes in {_crash_share(safest.alone)} of the episodes; the same learner "
-        f"that never had a shield returns {value_text(alone.alone.halves[1])} and crashes in "
+        f"that never had a shield returns {rounded_text(alone.alone.halves[1])} and crashes in "
         f"{_crash_share(alone.alone)}. (It was chosen by the first half of the episodes "
         "afterwards; these returns are of the second.)"
     )
@@ -176,7 +162,7 @@ def _others(judged: Sequence[ArmSummary], safest: ArmSummary | None) -> list[str
         return _listed(
             [
                 f"“{summary.arm.title}” ({_times(summary.mean_crashes)}; afterwards "
-                f"{value_text(summary.alone.mean)})"
+                f"{rounded_text(summary.alone.mean)})"
                 for summary in judged
                 if (summary.safe, summary.good) == (safe, good) and summary is not safest
             ]
@@ -252,7 +238,7 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
         crashes = ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "
-        f"whatever was learned: return {value_text(covered[0].mean)}{crashes}."
+        f"whatever was learned: return {rounded_text(covered[0].mean)}{crashes}."
     )
 
 
@@ -305,13 +291,13 @@ def _conditions(study: LearningStudy) -> str:
 
 
 def _times(count: float) -> str:
-    return "once" if count == 1 else f"{value_text(count)} times"
+    return "once" if count == 1 else f"{rounded_text(count)} times"
 
 
 def _with_worst(mean: float, means: Sequence[float]) -> str:
     if len(means) < 2:
-        return value_text(mean)
-    return f"{value_text(mean)} ({value_text(min(means))} to {value_text(max(means))})"
+        return rounded_text(mean)
+    return f"{rounded_text(mean)} ({rounded_text(min(means))} to {rounded_text(max(means))})"
 
 
 def _listed(parts: Sequence[str]) -> str:

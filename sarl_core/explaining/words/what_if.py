@@ -18,7 +18,7 @@ from sarl_core.mining.language import done_text, is_flag, number_text, short_con
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.shielding.neighbourhood import FeatureChange
+from sarl_core.shielding.near import FeatureChange
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def outside_texts(
     return tuple(texts)
 
 
-def change_text(change: FeatureChange, feature: Feature) -> str:
+def feature_change_text(change: FeatureChange, feature: Feature) -> str:
     """A change of one feature, after "if".
 
     Args:
@@ -122,10 +122,10 @@ def near_miss_text(changes: tuple[FeatureChange, ...], features: tuple[Feature, 
     Returns:
         As "pole angle were 0.03 rad less and there were left leg contact", after "would apply if".
     """
-    return " and ".join(change_text(change, features[change.feature]) for change in changes)
+    return " and ".join(feature_change_text(change, features[change.feature]) for change in changes)
 
 
-def exact_text(value: float) -> str:
+def float32_text(value: float) -> str:
     """A float32 number with every digit it needs to be read back.
 
     Args:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import counted
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.paper.criteria import InMost, Measurement, Sample
@@ -192,8 +193,8 @@ def number_and_length(environments: Environments) -> Measurement:
     return Measurement(
         tuple(samples.values()),
         "Over the grid, number and length rank alike with a correlation of "
-        f"{signed(means[_PAPER_ENVIRONMENT])} on Cart Pole (1 is the same order); the least is "
-        f"{signed(means[least])}, on {environment_name(least)}.",
+        f"{rounded_text(means[_PAPER_ENVIRONMENT], 2)} on Cart Pole (1 is the same order); the "
+        f"least is {rounded_text(means[least], 2)}, on {environment_name(least)}.",
         means,
     )
 
@@ -204,11 +205,6 @@ def _rank_correlation(one: Landscape) -> float:
 
     ranks = rankdata(np.array([one.rule_count.ravel(), one.mean_length.ravel()]), axis=1)
     return float(np.corrcoef(ranks)[0, 1])
-
-
-def signed(correlation: float) -> str:
-    """A correlation for people."""
-    return f"{correlation:.2f}".replace("-", "−")
 
 
 def _is_corner(values: NDArray[Any]) -> bool:

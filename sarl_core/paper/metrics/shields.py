@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import share_text
 from sarl_core.paper.criteria import Measurement, Sample
 from sarl_core.paper.shields import (
@@ -22,7 +23,7 @@ from sarl_core.paper.shields import (
 )
 from sarl_core.paper.study import Frames
 from sarl_core.paper.verdicts import Floats, Truths, over_recordings, share_over_recordings
-from sarl_core.paper.words import interval, number, percent, shares
+from sarl_core.paper.words import interval, percent, shares
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +86,7 @@ def novice_range(runs: Runs) -> Measurement:
     inside = (values >= _NOVICE_RANGE[0]) & (values <= _NOVICE_RANGE[1])
     return Measurement(
         (Sample(inside, runs.experts),),
-        f"It varies between {number(values.min())} and {number(values.max())}; "
+        f"It varies between {rounded_text(values.min())} and {rounded_text(values.max())}; "
         f"{share_text(float(inside.mean()))} of {values.size} episodes are within the paper's "
         "range.",
         {"least": float(values.min()), "greatest": float(values.max())},
@@ -99,7 +100,7 @@ def reaching_the_expert(runs: Runs, arm: str) -> Measurement:
     return Measurement(
         (reached,),
         f"{shares(reached.interval)} of its episodes reach what three quarters of the expert's do "
-        f"({number(levels.mean())}); it has {runs.in_words(arm)}, the expert "
+        f"({rounded_text(levels.mean())}); it has {runs.in_words(arm)}, the expert "
         f"{runs.in_words(EXPERT)}.",
         {"level": float(levels.mean())},
     )
@@ -117,9 +118,9 @@ def dips(runs: Runs) -> Measurement:
     lowest = float(runs.returns[UNFILTERED].min())
     return Measurement(
         (Sample(np.any(dipped, axis=1), runs.experts),),
-        f"The lowest return is {number(lowest)}; "
+        f"The lowest return is {rounded_text(lowest)}; "
         f"{shares(share_over_recordings(dipped, runs.experts))} of the episodes are below "
-        f"{number(deep.mean())}, half of the expert's typical return.",
+        f"{rounded_text(deep.mean())}, half of the expert's typical return.",
         {"lowest": lowest, "share": float(dipped.mean()), "paper": _PAPERS_DIP},
     )
 
@@ -137,15 +138,15 @@ def dips_beat_the_novice(runs: Runs) -> Measurement:
         ]
     )
     middle = (
-        f"in the middle to {number(float(np.nanmedian(middles)))}"
+        f"in the middle to {rounded_text(float(np.nanmedian(middles)))}"
         if there.any()
         else "so there is nothing to judge"
     )
     return Measurement(
         (Sample(middles > tops, runs.experts, in_part=middles > means, judged=there),),
         f"There are dips in {int(there.sum())} of {there.size} recordings, {middle}; alone the "
-        f"novice has {number(alone.mean())} on average, and less than "
-        f"{number(float(tops.mean()))} in 95 % of the episodes.",
+        f"novice has {rounded_text(alone.mean())} on average, and less than "
+        f"{rounded_text(float(tops.mean()))} in 95 % of the episodes.",
         {"recordings_with_dips": float(there.sum()), "alone": float(alone.mean())},
     )
 
@@ -260,7 +261,7 @@ def expert_drops(runs: Runs) -> Measurement:
     return Measurement(
         (dropped,),
         f"Our experts have a typical return of {runs.in_words(EXPERT)}, a mean of "
-        f"{number(values.mean())} and at least {number(values.min())}; "
+        f"{rounded_text(values.mean())} and at least {rounded_text(values.min())}; "
         f"{shares(dropped.interval)} of their episodes are below half of the typical return.",
         {"mean_return": float(values.mean()), "lowest": float(values.min())},
     )
@@ -295,8 +296,8 @@ def half_of_the_way(runs: Runs) -> Measurement:
     return Measurement(
         (reached,),
         f"With divider {runs.divider}, the best of {both.size} episodes with rules returns "
-        f"{number(both.max())}; {shares(reached.interval)} of them get half of the way from the "
-        f"lone novice to the expert, to {number(float(levels.mean()))}.",
+        f"{rounded_text(both.max())}; {shares(reached.interval)} of them get half of the way from "
+        f"the lone novice to the expert, to {rounded_text(float(levels.mean()))}.",
         {"best": float(both.max()), "level": float(levels.mean())},
     )
 

@@ -12,7 +12,7 @@ from typing import cast
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.explaining.words.edits import change_text, conflict_text
+from sarl_core.explaining.words.edits import conflict_text, edits_change_text
 from sarl_core.mining.editing.edits import Add, Change, next_manual_id
 from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
 from sarl_core.mining.language import action_text, number_text, sentence
@@ -290,7 +290,7 @@ def preview(filling: Filling, edit: Add | Change) -> None:
         sentences.append(f"The expert did as it says in {int(then.right[index]):,} of them.")
     sentences.append(
         "Against the set as it is now: "
-        + _lower(change_text(change(now, then), now, then, states=noun))
+        + _lower(edits_change_text(change(now, then), now, then, states=noun))
     )
     st.markdown(escaped(" ".join(sentences)))
     own = [one for one in then.conflicts if one.rule == index]

@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.html.number_cards import Number, number_cards
-from sarl_core.explaining.words.edits import change_text, edit_text
+from sarl_core.explaining.words.edits import edit_text, edits_change_text
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.shielding.effects import Verdicts, change
@@ -77,7 +77,7 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
         "States of which the edited set says something else than the unedited one",
         "States in which a placed rule overrules another that says something else",
     )
-    sentence = change_text(changed, before, after, states=noun)
+    sentence = edits_change_text(changed, before, after, states=noun)
     cards = [
         Number(label, value, meaning, was if was != value else "")
         for (label, value, was), meaning in zip(totals, meanings, strict=True)
