@@ -46,7 +46,7 @@ class SpaceAdapter:
         Returns:
             Shape (d,), float32; all NaN where it is no observation of the space.
         """
-        from sarl_core.shielding.reading import state_vector
+        from sarl_core.shielding.readers import state_vector
 
         vector = state_vector(observation, None if self.is_vector else self.observation_space)
         whole = type(vector) is np.ndarray and vector.shape == (self.n_features,)

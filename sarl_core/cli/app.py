@@ -14,14 +14,14 @@ from sarl_core.cli import terminal
 from sarl_core.cli.ablate import ablate
 from sarl_core.cli.aggregate import aggregate
 from sarl_core.cli.dashboard import app as dashboard
+from sarl_core.cli.demonstrations import check, record
 from sarl_core.cli.diff import diff
-from sarl_core.cli.evaluate_and_render import evaluate, render, train_expert
+from sarl_core.cli.episodes import evaluate, render
 from sarl_core.cli.export import export
-from sarl_core.cli.learn import learn
-from sarl_core.cli.mine_and_landscape import landscape, mine
-from sarl_core.cli.record_and_check import check, record
+from sarl_core.cli.learning import learn, train_expert
 from sarl_core.cli.report import report
 from sarl_core.cli.reproduce import reproduce
+from sarl_core.cli.rules import landscape, mine
 
 app = typer.Typer(
     name="sarl_core",

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import share_text
 from sarl_core.paper.criteria import Criterion, InMost, MeanBounds, Measurement, Together
-from sarl_core.paper.metrics import dividing, landscapes, learning, named_settings, shields
+from sarl_core.paper.metrics import division, landscapes, learning, named_settings, shields
 from sarl_core.paper.replicates import PAPER_DIVIDER
 from sarl_core.paper.shields import FILTERED, UNFILTERED, Runs
 from sarl_core.paper.verdicts import VERDICTS, Claim
@@ -418,14 +418,14 @@ FIGURE_7: Rows[Runs] = (
     ),
 )
 
-DIVIDER: Rows[dividing.Environments] = (
+DIVIDER: Rows[division.Environments] = (
     ClaimRow(
         id="finer-division",
         paper="A finer division of the actions may have a positive effect (left open).",
         where="Conclusion and Prospects",
         measured=f"What all finer divisions bring on average, over that in {PAPER_DIVIDER} "
         "intervals.",
-        metric=dividing.finer,
+        metric=division.finer,
         criterion=Together(
             MeanBounds("above", 0, 0, rounded_text),
             "{each} So in every environment with continuous actions; partly, if in some.",
@@ -438,7 +438,7 @@ DIVIDER: Rows[dividing.Environments] = (
         where="text on Figure 7",
         measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
         "its typical return with the better of the two, the centre and its own typical value.",
-        metric=dividing.kept_by_two_intervals,
+        metric=division.kept_by_two_intervals,
         criterion=MeanBounds("above", 0.5, 0.25),
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.errors import InputError
 from sarl_core.paper.claims import FIGURE_5, FIGURE_6, FIGURE_7, decided
-from sarl_core.paper.dividing import DIVIDING
+from sarl_core.paper.division import DIVIDING
 from sarl_core.paper.landscapes import COUNT, LENGTH
 from sarl_core.paper.learning import LEARNING
 from sarl_core.paper.metrics.shields import first_runs, lander_runs, walker_runs

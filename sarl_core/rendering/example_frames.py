@@ -21,8 +21,8 @@ from sarl_core.agents.spaces import Actions
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError, Progress, report
+from sarl_core.rendering.camera import no_display, picture_of, picture_speed
 from sarl_core.rendering.film import Palette
-from sarl_core.rendering.filming import no_display, picture_of, picture_speed
 from sarl_core.rollouts.episodes import rollout, run_seeds
 from sarl_core.rollouts.player import View, check_environment
 from sarl_core.rollouts.seeds import FRESH

@@ -19,9 +19,9 @@ from sarl_core.errors import InputError
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.progress import Progress, report
+from sarl_core.rendering.camera import film_episode, picture_speed
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
-from sarl_core.rendering.filming import film_episode, picture_speed
 from sarl_core.rendering.gif_and_mp4 import gif_bytes
 from sarl_core.rendering.overlay import Caption, Panel, side_by_side_picture
 from sarl_core.rendering.replay import DescribeRule, Replay, sentences

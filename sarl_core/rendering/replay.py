@@ -20,9 +20,9 @@ from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence
 from sarl_core.progress import Progress, report
+from sarl_core.rendering.camera import film_episode, picture_speed
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
-from sarl_core.rendering.filming import film_episode, picture_speed
 from sarl_core.rendering.gif_and_mp4 import encode_gif, encode_mp4, gif_bytes
 from sarl_core.rendering.overlay import Panel, side_by_side_picture
 from sarl_core.rollouts.episodes import Episodes

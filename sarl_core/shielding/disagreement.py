@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.deciding import Ground, deciding, ground_of, labels_at, regions
+from sarl_core.shielding.decisions import Ground, deciding, ground_of, labels_at, regions
 
 SAMPLED_STATES = 10_000
 _MARGIN = 0.1  # of the thresholds' range, on either side

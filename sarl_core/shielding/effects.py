@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.deciding import Ground, deciding, labels_at
+from sarl_core.shielding.decisions import Ground, deciding, labels_at
 
 
 class Conflict(NamedTuple):

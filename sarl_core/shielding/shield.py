@@ -18,7 +18,7 @@ from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.shielding.boxes import Boxes, leaves_out
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements
-from sarl_core.shielding.reading import ActionForm, ActionReader, StateReader, UnreadableError
+from sarl_core.shielding.readers import ActionForm, ActionReader, StateReader, UnreadableError
 
 __all__ = ["BatchDecision", "Decision", "OnInvalid", "Outside", "Projection", "Shield"]
 

@@ -21,7 +21,7 @@ from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.holding_out import with_untried_held_out
-from sarl_core.shielding.deciding import Ground, ground_of
+from sarl_core.shielding.decisions import Ground, ground_of
 from sarl_core.shielding.disagreement import sampled_states
 from sarl_core.shielding.effects import Verdicts, verdicts
 from sarl_dashboard.cache import cached

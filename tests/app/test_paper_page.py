@@ -10,7 +10,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core.paper.chance import with_chance
-from sarl_core.paper.dividing import continuous
+from sarl_core.paper.division import continuous
 from sarl_core.paper.replicates import environments, fingerprints
 from sarl_core.paper.report import PaperReport, write_report
 from sarl_core.paper.studies import STUDIES
@@ -20,7 +20,7 @@ from sarl_core.paper.verdicts import enough
 from sarl_dashboard.views.paper import report_files as paper
 from tests.app.screens import errors, open_page, texts
 from tests.paper.frames import landscapes, learning
-from tests.paper.test_dividing import table
+from tests.paper.test_division import table
 from tests.paper.test_landscapes import AS_THE_PAPER, SMALL
 from tests.paper.test_learning import A_LITTLE, DOWN
 from tests.paper.test_report import ENTRY

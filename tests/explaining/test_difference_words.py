@@ -29,7 +29,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.shielding.deciding import ground_of
+from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import disagreement
 from sarl_core.shielding.effects import change, verdicts
 

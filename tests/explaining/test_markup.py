@@ -13,7 +13,7 @@ from sarl_core.explaining.figures.replay import Timeline, Track, intervention_st
 from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.html.tree import place_html
 from sarl_core.explaining.markup import plain
-from sarl_core.explaining.rule_evidence import feature_evidence
+from sarl_core.explaining.tables.rule_evidence import feature_evidence
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import node_of

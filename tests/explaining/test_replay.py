@@ -18,14 +18,9 @@ from sarl_core.explaining.figures.replay import (
     intervention_strip,
     return_figure,
     shortened,
-)
-from sarl_core.explaining.replay import (
-    margin_text,
-    named_description,
-    step_texts,
-    step_view,
     tracks,
 )
+from sarl_core.explaining.words.replay import margin_text, named_description, step_texts, step_view
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.steps import StepTable

@@ -8,7 +8,7 @@ import pytest
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.html.rule_features import MOST, features_html
-from sarl_core.explaining.rule_evidence import FeatureEvidence
+from sarl_core.explaining.tables.rule_evidence import FeatureEvidence
 from sarl_core.explaining.ticks import round_ticks
 from sarl_core.mining.rules import Bounds
 

@@ -11,7 +11,7 @@ import pytest
 from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
 from sarl_core.explaining.figures import tree as figures
 from sarl_core.explaining.html.path import path_table
-from sarl_core.explaining.rule_evidence import (
+from sarl_core.explaining.tables.rule_evidence import (
     example_columns,
     example_rows,
     feature_evidence,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.step_card import legend, picture, step_card
-from sarl_core.explaining.replay import ActionView, StepView
+from sarl_core.explaining.words.replay import ActionView, StepView
 
 ACTION = ActionView(
     "engine", "left", "right", 0, 1, True, "If the angle > 0, then right.", "7", "R8"

@@ -21,8 +21,8 @@ from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.figures.tree import path_queries
 from sarl_core.explaining.html.lit_path import lit_path_table
 from sarl_core.explaining.report.report import make_report
-from sarl_core.explaining.rule_evidence import example_columns
 from sarl_core.explaining.state_path import PathFinder
+from sarl_core.explaining.tables.rule_evidence import example_columns
 from sarl_core.explaining.words.what_if import condition_views
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.envelope import with_splits

@@ -27,7 +27,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.shielding.near import FeatureChange, Neighbourhood
+from sarl_core.shielding.neighbourhood import FeatureChange, Neighbourhood
 from sarl_core.shielding.shield import Shield
 
 FEATURES = (Feature("pole angle", "rad"), Feature("left leg contact", ""), Feature("speed <b>", ""))

@@ -17,7 +17,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
-from sarl_core.shielding.near import Neighbourhood, decision_changes
+from sarl_core.shielding.neighbourhood import Neighbourhood, decision_changes
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Shield
 

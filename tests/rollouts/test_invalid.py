@@ -14,8 +14,8 @@ from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules, r
 from sarl_core.cli.app import main
 from sarl_core.environments.description import describe_environment
 from sarl_core.explaining.html.step_card import step_card
-from sarl_core.explaining.replay import step_texts, step_view
 from sarl_core.explaining.tables.recorder import recorder_columns
+from sarl_core.explaining.words.replay import step_texts, step_view
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.rendering.replay import render_episode
 

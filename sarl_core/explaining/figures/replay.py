@@ -10,9 +10,15 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR, label_colour
+from sarl_core.explaining.colours import (
+    INTERVENTION_COLOUR,
+    MUTED_COLOUR,
+    OUTSIDE_COLOUR,
+    label_colour,
+)
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.rollouts.steps import StepTable
 
 SHIELDED_COLOUR = "#7A4FBF"  # no action of the usual few has it
 UNSHIELDED_COLOUR = MUTED_COLOUR
@@ -116,6 +122,39 @@ class Timeline:
         """Where a step stands between the two rooms, 0 to 1."""
         low, high = self.range
         return (step - low) / (high - low)
+
+
+def tracks(
+    steps: StepTable, dimensions: tuple[LabelledDimension, ...], *, shielded: bool
+) -> tuple[Track, ...]:
+    """The rows of the intervention strip.
+
+    Args:
+        steps: Of one episode, T of them.
+        dimensions: The m action dimensions.
+        shielded: Whether a shield was there; without one there is one row a dimension.
+
+    Returns:
+        For each dimension what the agent wanted and what was done, then the interventions, and
+        at last, where there are any, those outside the data of their rules.
+    """
+    found = []
+    for index, dimension in enumerate(dimensions):
+        name = f"{dimension.name}: " if len(dimensions) > 1 else ""
+        executed = dimension.labels_of(steps.executed[:, index]).astype(np.float64)
+        if not shielded:
+            found.append(Track(f"{name}action", executed, dimension))
+            continue
+        wanted = dimension.labels_of(steps.proposed[:, index]).astype(np.float64)
+        found.append(Track(f"{name}wanted", wanted, dimension))
+        found.append(Track(f"{name}done", executed, dimension))
+    if shielded:
+        marks = np.where(steps.intervened, 0.0, np.nan)
+        found.append(Track("changed", marks, None))
+        if steps.outside.any():
+            beyond = np.where(steps.outside, 0.0, np.nan)
+            found.append(Track("outside data", beyond, None, OUTSIDE_COLOUR))
+    return tuple(found)
 
 
 def shortened(name: str) -> str:

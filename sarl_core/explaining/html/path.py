@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.rule_evidence import PathStep
+from sarl_core.explaining.tables.rule_evidence import PathStep
 from sarl_core.explaining.templates import render
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, share_text

@@ -7,7 +7,7 @@ from markupsafe import Markup
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.html.table import Column, table_html
-from sarl_core.explaining.rule_evidence import example_columns
+from sarl_core.explaining.tables.rule_evidence import example_columns
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
 from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
-from sarl_core.explaining.rule_evidence import FeatureEvidence
+from sarl_core.explaining.tables.rule_evidence import FeatureEvidence
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.mining.language import condition_text, number_text, share_text, short_condition

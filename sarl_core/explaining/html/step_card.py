@@ -9,8 +9,8 @@ from markupsafe import Markup
 
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.table import Column, table_html
-from sarl_core.explaining.replay import StepView, margin_text
 from sarl_core.explaining.templates import render
+from sarl_core.explaining.words.replay import StepView, margin_text
 
 _STATE = (Column("State"), Column("Value", "n"), Column("Unit"))
 

@@ -22,7 +22,7 @@ from sarl_core.explaining.words.what_if import (
 from sarl_core.mining.language import action_text, counted, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.near import DecisionChange, NearMiss
+from sarl_core.shielding.neighbourhood import DecisionChange, NearMiss
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Decision, Outside
 

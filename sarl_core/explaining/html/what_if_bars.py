@@ -17,7 +17,7 @@ from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.near import FeatureLine
+from sarl_core.shielding.neighbourhood import FeatureLine
 
 _PALE = 0.32
 

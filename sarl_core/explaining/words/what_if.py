@@ -18,7 +18,7 @@ from sarl_core.mining.language import done_text, is_flag, number_text, short_con
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.shielding.near import FeatureChange
+from sarl_core.shielding.neighbourhood import FeatureChange
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.deciding import ground_of
+from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height

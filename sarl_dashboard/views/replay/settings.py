@@ -9,7 +9,7 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
-from sarl_core.explaining.replay import named_description
+from sarl_core.explaining.words.replay import named_description
 from sarl_core.rollouts.player import shield_for
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside, Shield

@@ -17,10 +17,11 @@ from sarl_core.explaining.figures.replay import (
     Timeline,
     intervention_strip,
     return_figure,
+    tracks,
 )
 from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.html.step_card import legend, picture, step_card
-from sarl_core.explaining.replay import StepView, step_texts, step_view, tracks
+from sarl_core.explaining.words.replay import StepView, step_texts, step_view
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, label_text, number_text
 from sarl_core.rollouts.episodes import Episodes

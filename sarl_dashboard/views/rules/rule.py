@@ -18,7 +18,7 @@ from sarl_core.explaining.html.path import path_table
 from sarl_core.explaining.html.rule_card import measures_text, rule_card
 from sarl_core.explaining.html.rule_examples import examples_html
 from sarl_core.explaining.html.rule_features import features_html
-from sarl_core.explaining.rule_evidence import feature_evidence, path_steps
+from sarl_core.explaining.tables.rule_evidence import feature_evidence, path_steps
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, node_of

@@ -24,7 +24,7 @@ from sarl_core.explaining.html.what_if_bars import lines_html
 from sarl_core.explaining.words.what_if import node_of_way
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.near import DecisionChange, FeatureLine, decision_changes
+from sarl_core.shielding.neighbourhood import DecisionChange, FeatureLine, decision_changes
 from sarl_dashboard.components.tree_picture import PathInTree, show_tree
 from sarl_dashboard.views.what_if.proposal import proposal
 from sarl_dashboard.views.what_if.rules import RulesOnTrees

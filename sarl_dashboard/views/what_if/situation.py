@@ -11,7 +11,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.state_path import PathFinder
 from sarl_core.explaining.words.what_if import by_use
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.near import Neighbourhood, feature_spreads
+from sarl_core.shielding.neighbourhood import Neighbourhood, feature_spreads
 from sarl_core.shielding.sampling import Span, feature_spans
 from sarl_core.shielding.shield import Outside, Projection, Shield
 from sarl_dashboard.cache import cached

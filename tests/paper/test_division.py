@@ -9,9 +9,9 @@ import pytest
 
 from sarl_core import rollout
 from sarl_core.mining.quantisation import quantise
-from sarl_core.paper import dividing
+from sarl_core.paper import division
 from sarl_core.paper.divider_table import episodes_of, quantisations_of
-from sarl_core.paper.dividing import DIVIDING
+from sarl_core.paper.division import DIVIDING
 from sarl_core.paper.replicates import demonstrations_of, replicates_of
 from sarl_core.paper.study import Effort
 from sarl_core.paper.tables import read_table, write_table
@@ -114,7 +114,7 @@ def test_without_the_walker_one_claim_is_left() -> None:
 def test_the_table_holds_what_the_expert_brings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(dividing, "continuous", lambda: (PENDULUM,))
+    monkeypatch.setattr(division, "continuous", lambda: (PENDULUM,))
     effort = Effort(
         quick=True, recordings=2, phases=1, test_steps=1, episodes=1, snapped_episodes=2
     )

@@ -13,7 +13,7 @@ from sarl_core.environments.failures import failure_known
 from sarl_core.mining.quantisation import SNAPPINGS, STUDIED_DIVIDERS
 from sarl_core.paper.claims import DIVIDER, decided
 from sarl_core.paper.divider_table import episodes_of, failures_of, quantisations_of, typical_of
-from sarl_core.paper.metrics.dividing import divided_in
+from sarl_core.paper.metrics.division import divided_in
 from sarl_core.paper.replicates import (
     demonstrations_of,
     environment_name,

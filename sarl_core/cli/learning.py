@@ -1,4 +1,4 @@
-"""The command that lets agents learn under a shield."""
+"""Commands that let agents learn: under a shield, and as the shipped experts did."""
 
 from __future__ import annotations
 
@@ -117,6 +117,52 @@ def learn(
 
     _print_study(study, summaries, out)
     print_notes(notes)
+
+
+def train_expert(
+    env: Env,
+    out: Annotated[
+        Path,
+        out_option("The policy to write; its card stands beside it as .json.", metavar="FILE.npz"),
+    ],
+    seed: Seed = 0,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            "--steps",
+            min=1,
+            help="Environment steps.",
+            show_default="the recipe's",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Train an expert as the shipped ones were, and write its weights and its card.
+
+    Example: `python -m sarl_core train-expert --env CartPole-v1 --seed 0 --out expert.npz`
+    """
+    terminal.check_output(out, (".npz",))
+    with terminal.working("Training") as advance:
+        from sarl_core.learning.experts import train_expert as train
+
+        card = train(
+            env,
+            out=out,
+            seed=seed,
+            steps=steps,
+            progress=lambda done, total, _: advance(done, total),
+        )
+    if as_json:
+        terminal.print_json(card)
+        return
+    returns = card["returns_deterministic"]
+    terminal.print_lines(
+        [
+            f"Wrote {out}: mean return {returns['mean']:.1f} over {returns['episodes']} episodes "
+            f"({returns['min']:.1f} to {returns['max']:.1f}), after "
+            f"{card['kept_after_steps']:,} steps."
+        ]
+    )
 
 
 @contextmanager

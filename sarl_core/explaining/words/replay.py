@@ -12,8 +12,6 @@ from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
-from sarl_core.explaining.colours import OUTSIDE_COLOUR
-from sarl_core.explaining.figures.replay import Track
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
@@ -114,39 +112,6 @@ def named_description(
         if found is not None:
             return found
     return description
-
-
-def tracks(
-    steps: StepTable, dimensions: tuple[LabelledDimension, ...], *, shielded: bool
-) -> tuple[Track, ...]:
-    """The rows of the intervention strip.
-
-    Args:
-        steps: Of one episode, T of them.
-        dimensions: The m action dimensions.
-        shielded: Whether a shield was there; without one there is one row a dimension.
-
-    Returns:
-        For each dimension what the agent wanted and what was done, then the interventions, and
-        at last, where there are any, those outside the data of their rules.
-    """
-    found = []
-    for index, dimension in enumerate(dimensions):
-        name = f"{dimension.name}: " if len(dimensions) > 1 else ""
-        executed = dimension.labels_of(steps.executed[:, index]).astype(np.float64)
-        if not shielded:
-            found.append(Track(f"{name}action", executed, dimension))
-            continue
-        wanted = dimension.labels_of(steps.proposed[:, index]).astype(np.float64)
-        found.append(Track(f"{name}wanted", wanted, dimension))
-        found.append(Track(f"{name}done", executed, dimension))
-    if shielded:
-        marks = np.where(steps.intervened, 0.0, np.nan)
-        found.append(Track("changed", marks, None))
-        if steps.outside.any():
-            beyond = np.where(steps.outside, 0.0, np.nan)
-            found.append(Track("outside data", beyond, None, OUTSIDE_COLOUR))
-    return tuple(found)
 
 
 def step_view(

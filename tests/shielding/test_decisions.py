@@ -12,7 +12,7 @@ from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Move, Pin, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.rules import Condition, Rule
-from sarl_core.shielding.deciding import deciding, ground_of, labels_at, regions
+from sarl_core.shielding.decisions import deciding, ground_of, labels_at, regions
 from sarl_core.shielding.disagreement import disagreement, sampled_states
 from sarl_core.shielding.effects import change, verdicts
 

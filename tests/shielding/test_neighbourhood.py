@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import InputError, Shield, mine_rules
-from sarl_core.shielding.near import (
+from sarl_core.shielding.neighbourhood import (
     Neighbourhood,
     after,
     at_least,
