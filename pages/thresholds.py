@@ -11,9 +11,9 @@ import streamlit as st
 
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state.compact_set import chosen_compact
-from sarl_dashboard.state.data import require_demonstrations
+from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
 from sarl_dashboard.state.mined import grown_trees
-from sarl_dashboard.state.thresholds import chosen_divider
+from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
 from sarl_dashboard.views.thresholds.controls import NARROW_JUMPS, show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
 from sarl_dashboard.views.thresholds.divider import show_divider
@@ -32,10 +32,11 @@ st.caption(
     "have done the same in at least a certain share of those (confidence)."
 )
 top = st.container()
-display = chosen_display(trees, compact)
-landscape = display.landscape()
+display = chosen_display(trees, compact, held_out_demonstrations())
+thresholds = chosen_thresholds()
+landscape = display.landscape(thresholds)
 if display.surfaces:
-    show_surfaces(display, landscape)
+    show_surfaces(display, landscape, thresholds)
 else:
     show_maps(display, landscape)
 largest, trade_offs, *divider = st.tabs(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import streamlit as st
 
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.thresholds import Layer
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
@@ -15,9 +16,8 @@ from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact
-from sarl_dashboard.state.data import held_out_demonstrations
 from sarl_dashboard.state.mined import mined_landscape
-from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT, chosen_thresholds
+from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT
 
 MAPS, SURFACES = "Maps", "3-D"
 FINE, PAPER = "Fine grid", "Paper's grid"
@@ -38,6 +38,7 @@ class Display:
     Attributes:
         trees: One an action dimension.
         compact: The compact rules where they are in force; None for thresholds.
+        held_out: The episodes held out; None where there are none.
         dimension: Which action dimension is looked at; None for all.
         layers: What the two figures show.
         surfaces: Whether as the paper's surfaces, and not as maps.
@@ -46,6 +47,7 @@ class Display:
 
     trees: tuple[PolicyTree, ...]
     compact: Compact | None
+    held_out: Demonstrations | None
     dimension: int | None
     layers: tuple[Layer, Layer]
     surfaces: bool
@@ -56,12 +58,16 @@ class Display:
         """Whether the actions are continuous, and the divider says what labels there are."""
         return self.trees[0].dimension.is_interval
 
-    def landscape(self) -> Landscape:
-        """The landscape over the grid, at the lift and depth in force."""
+    def landscape(self, thresholds: Thresholds) -> Landscape:
+        """The landscape over the grid.
+
+        Args:
+            thresholds: Those in force; only lift and depth count.
+        """
         supports, confidences = FINE_SUPPORTS, FINE_CONFIDENCES
         if self.paper_grid:
             supports, confidences = tuple(PAPER_SUPPORTS), tuple(PAPER_CONFIDENCES)
-        return self._part(supports, confidences, chosen_thresholds())
+        return self._part(supports, confidences, thresholds)
 
     def point(self, thresholds: Thresholds) -> Landscape:
         """The numbers in force, in the shape of a landscape of one point.
@@ -82,7 +88,7 @@ class Display:
             confidences,
             lift=limits.lift,
             depth=limits.max_depth,
-            held_out=held_out_demonstrations(),
+            held_out=self.held_out,
         )
         return whole if self.dimension is None else whole.dimensions[self.dimension]
 
@@ -102,15 +108,18 @@ def _compact_point(rules: RuleSet, dimension: int | None) -> Landscape:
     )
 
 
-def chosen_display(trees: tuple[PolicyTree, ...], compact: Compact | None) -> Display:
+def chosen_display(
+    trees: tuple[PolicyTree, ...], compact: Compact | None, held_out: Demonstrations | None
+) -> Display:
     """The choices above the figures.
 
     Args:
         trees: One an action dimension.
         compact: The compact rules where they are in force.
+        held_out: The episodes held out; None where there are none.
     """
     with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
-        pairs = [SIZE, QUALITY] if held_out_demonstrations() is None else list(LAYERS)
+        pairs = [SIZE, QUALITY] if held_out is None else list(LAYERS)
         pair = switch("Show", "layer", pairs, "What the two figures show")
         view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
         grid = switch(
@@ -121,7 +130,9 @@ def chosen_display(trees: tuple[PolicyTree, ...], compact: Compact | None) -> Di
         )
         more()
         dimension = chosen_dimension([tree.dimension.name for tree in trees])
-    return Display(trees, compact, dimension, LAYERS[pair], view == SURFACES, grid == PAPER)
+    return Display(
+        trees, compact, held_out, dimension, LAYERS[pair], view == SURFACES, grid == PAPER
+    )
 
 
 def switch(label: str, key: str, options: list[str], hint: str | None = None) -> str:

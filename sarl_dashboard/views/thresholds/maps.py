@@ -6,9 +6,9 @@ import streamlit as st
 
 from sarl_core.explaining.colours import MARKER_COLOUR
 from sarl_core.explaining.figures import thresholds as figures
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_dashboard.session import is_dark
-from sarl_dashboard.state.thresholds import chosen_thresholds
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
@@ -63,14 +63,15 @@ def show_maps(display: Display, landscape: Landscape) -> None:
     )
 
 
-def show_surfaces(display: Display, landscape: Landscape) -> None:
+def show_surfaces(display: Display, landscape: Landscape, thresholds: Thresholds) -> None:
     """The same two layers as the paper draws them.
 
     Args:
         display: What is looked at.
         landscape: On its grid.
+        thresholds: Those in force.
     """
-    thresholds, marked = chosen_thresholds(), display.compact is None
+    marked = display.compact is None
     point = display.point(thresholds)
     for column, layer in zip(st.columns(2), display.layers, strict=True):
         with column:
