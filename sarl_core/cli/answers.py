@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sarl_core.cli import terminal
-from sarl_core.demonstrations.checks import find_warnings
+from sarl_core.demonstrations.warnings import find_warnings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

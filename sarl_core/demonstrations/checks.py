@@ -1,17 +1,17 @@
-"""What must hold for demonstrations (errors) and what is merely odd (warnings)."""
+"""What must hold for demonstrations."""
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
-from sarl_core.demonstrations.giveaways import find_giveaways
+from sarl_core.demonstrations.fields import DemonstrationFields
 from sarl_core.demonstrations.requirements import (
     LARGEST,
     as_numbers,
@@ -29,15 +29,11 @@ from sarl_core.demonstrations.requirements import (
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES
 
-if TYPE_CHECKING:
-    from sarl_core.demonstrations.dataset import Demonstrations
-
 MAX_LABELS = 10_000  # of one action dimension whose space is not known
 MAX_ALL_LABELS = 100_000  # of all action dimensions together
-_SHOWN_WARNINGS = 5  # of one kind; the rest is counted
 
 
-def normalise(raw: Demonstrations) -> dict[str, Any]:
+def normalise(raw: DemonstrationFields) -> dict[str, Any]:
     """Convert and check the fields of a `Demonstrations`, and fill in what was not given.
 
     Args:
@@ -87,78 +83,6 @@ def normalise(raw: Demonstrations) -> dict[str, Any]:
     return fields | _bounds(raw, actions, action_names)
 
 
-def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
-    """What is odd about demonstrations and yet no error.
-
-    Args:
-        demonstrations: To look at.
-
-    Returns:
-        One sentence each: notes from reading, constant or doubled features, features that give
-        the action or the time, labels that never occur, a single action.
-    """
-    return (
-        *demonstrations.notes,
-        *_feature_warnings(demonstrations),
-        *_shortened(find_giveaways(demonstrations), "features tell what they should not"),
-        *_action_warnings(demonstrations),
-    )
-
-
-def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
-    constant: list[str] = []
-    doubled: list[str] = []
-    seen: dict[bytes, str] = {}
-    for name, column in zip(
-        (feature.name for feature in demonstrations.features),
-        demonstrations.observations.T,
-        strict=True,
-    ):
-        if np.all(column == column[0]):
-            constant.append(
-                f"feature {name!r} has the same value in every step, so no rule can use it"
-            )
-            continue
-        key = hashlib.blake2b(np.ascontiguousarray(column).data, digest_size=16).digest()
-        if key in seen:
-            doubled.append(f"feature {name!r} repeats feature {seen[key]!r} in every step")
-        seen.setdefault(key, name)
-    return [
-        *_shortened(constant, "features never change"),
-        *_shortened(doubled, "features repeat another one"),
-    ]
-
-
-def _action_warnings(demonstrations: Demonstrations) -> list[str]:
-    warnings: list[str] = []
-    columns = demonstrations.action_columns.T
-    for dimension, column in zip(demonstrations.action_dimensions, columns, strict=True):
-        if np.all(column == column[0]):
-            warnings.append(
-                f"action {dimension.name!r} is {decimal_text(column[0])} in every step, so the "
-                "only rule is to do that always"
-            )
-        elif dimension.kind == "discrete":
-            counts = np.bincount(column - dimension.first, minlength=len(dimension.labels))
-            warnings += _shortened(
-                [
-                    f"label {label!r} of action {dimension.name!r} never occurs"
-                    for label, count in zip(dimension.labels, counts, strict=True)
-                    if count == 0
-                ],
-                f"labels of action {dimension.name!r} never occur",
-            )
-    return warnings
-
-
-def _shortened(sentences: list[str], rest: str) -> list[str]:
-    """The first few sentences, and the number of the others."""
-    more = len(sentences) - _SHOWN_WARNINGS
-    if more <= 1:
-        return sentences
-    return [*sentences[:_SHOWN_WARNINGS], f"{more:,} more {rest}"]
-
-
 def _observations(given: Any) -> NDArray[np.float32]:
     observations = as_numbers(given, "observations")
     if observations.ndim > 2:
@@ -189,7 +113,7 @@ def _observations(given: Any) -> NDArray[np.float32]:
     return frozen(observations, np.float32)
 
 
-def _actions(raw: Demonstrations, n: int) -> NDArray[Any]:
+def _actions(raw: DemonstrationFields, n: int) -> NDArray[Any]:
     """Discrete: (n,) or (n, m) int64. Continuous: (n, m) float32."""
     actions = as_numbers(raw.actions, "actions")
     if actions.dtype.kind == "b":
@@ -240,7 +164,7 @@ def _counted(episodes: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _labels(
-    raw: Demonstrations, columns: NDArray[np.int64], action_names: tuple[str, ...]
+    raw: DemonstrationFields, columns: NDArray[np.int64], action_names: tuple[str, ...]
 ) -> dict[str, Any]:
     m = columns.shape[1]
     first = (0,) * m if raw.label_first is None else tuple(map(int, raw.label_first))
@@ -281,7 +205,7 @@ def _require_few_labels(m: int, labels: int) -> None:
 
 
 def _bounds(
-    raw: Demonstrations, actions: NDArray[np.float32], action_names: tuple[str, ...]
+    raw: DemonstrationFields, actions: NDArray[np.float32], action_names: tuple[str, ...]
 ) -> dict[str, Any]:
     m = actions.shape[1]
     least, most = actions.min(axis=0).astype(np.float64), actions.max(axis=0).astype(np.float64)

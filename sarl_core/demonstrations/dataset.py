@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, cast
 
@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations import checks
+from sarl_core.demonstrations.fields import Actions, DemonstrationFields
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError
-
-Actions = NDArray[np.int64] | NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -60,21 +59,6 @@ class ActionDimension:
 
 
 @dataclass(frozen=True)
-class ColumnUse:
-    """What one column of a file was taken for.
-
-    Attributes:
-        column: As the file calls it.
-        use: As "feature", "action", "episode number" or "not used".
-        why: In words.
-    """
-
-    column: str
-    use: str
-    why: str
-
-
-@dataclass(frozen=True)
 class Summary:
     """What a set of demonstrations contains, in numbers.
 
@@ -101,7 +85,7 @@ class Summary:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Demonstrations:
+class Demonstrations(DemonstrationFields):
     """N state-action pairs of an expert, in episodes.
 
     Arrays are copied where needed, converted and made read-only; whatever is inconsistent is
@@ -134,28 +118,6 @@ class Demonstrations:
     Raises:
         InputError: If anything above does not hold.
     """
-
-    observations: NDArray[np.float32]
-    actions: Actions
-    episodes: NDArray[np.int64]
-    rewards: NDArray[np.float64] | None = None
-    _: KW_ONLY
-    terminated: NDArray[np.bool_] | None = None
-    truncated: NDArray[np.bool_] | None = None
-    steps: NDArray[np.int64] | None = None
-    feature_names: tuple[str, ...] | None = None
-    feature_units: tuple[str, ...] | None = None
-    action_names: tuple[str, ...] | None = None
-    label_names: tuple[tuple[str, ...], ...] | None = None
-    label_first: tuple[int, ...] | None = None
-    action_low: tuple[float, ...] | None = None
-    action_high: tuple[float, ...] | None = None
-    bounds_from: Literal["action space", "demonstrated values"] | None = None
-    env_id: str = ""
-    agent: str = ""
-    seed: int | None = None
-    notes: tuple[str, ...] = ()
-    columns: tuple[ColumnUse, ...] = ()
 
     def __post_init__(self) -> None:
         """Convert, complete and check every field."""

@@ -8,16 +8,14 @@ not a border on a scale, but values that stand apart from each other, each with 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.requirements import rises_steadily
-
-if TYPE_CHECKING:
-    from sarl_core.demonstrations.dataset import Demonstrations
 
 _LEAST_ROWS = 20
 _LOOKED_AT = 1_000  # rows, at first

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sarl_core.demonstrations.checks import find_warnings
+from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import load_demonstrations, read_demonstrations
 from sarl_core.errors import InputError

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from sarl_core.demonstrations.dataset import ColumnUse
+from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.vocabulary import (
     ACTIONS,

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.archives import Promise, array_of, arrays_in, opened, promise_of
-from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats.columns import USE_WORDS, listed
 from sarl_core.demonstrations.formats.metadata import (
     KEY,

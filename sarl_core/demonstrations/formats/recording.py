@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.checks import MAX_LABELS
-from sarl_core.demonstrations.dataset import ColumnUse, Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (

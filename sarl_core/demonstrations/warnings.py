@@ -1,0 +1,85 @@
+"""What is merely odd about demonstrations."""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.giveaways import find_giveaways
+
+_SHOWN_WARNINGS = 5  # of one kind; the rest is counted
+
+
+def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
+    """What is odd about demonstrations and yet no error.
+
+    Args:
+        demonstrations: To look at.
+
+    Returns:
+        One sentence each: notes from reading, constant or doubled features, features that give
+        the action or the time, labels that never occur, a single action.
+    """
+    return (
+        *demonstrations.notes,
+        *_feature_warnings(demonstrations),
+        *_shortened(find_giveaways(demonstrations), "features tell what they should not"),
+        *_action_warnings(demonstrations),
+    )
+
+
+def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
+    constant: list[str] = []
+    doubled: list[str] = []
+    seen: dict[bytes, str] = {}
+    for name, column in zip(
+        (feature.name for feature in demonstrations.features),
+        demonstrations.observations.T,
+        strict=True,
+    ):
+        if np.all(column == column[0]):
+            constant.append(
+                f"feature {name!r} has the same value in every step, so no rule can use it"
+            )
+            continue
+        key = hashlib.blake2b(np.ascontiguousarray(column).data, digest_size=16).digest()
+        if key in seen:
+            doubled.append(f"feature {name!r} repeats feature {seen[key]!r} in every step")
+        seen.setdefault(key, name)
+    return [
+        *_shortened(constant, "features never change"),
+        *_shortened(doubled, "features repeat another one"),
+    ]
+
+
+def _action_warnings(demonstrations: Demonstrations) -> list[str]:
+    warnings: list[str] = []
+    columns = demonstrations.action_columns.T
+    for dimension, column in zip(demonstrations.action_dimensions, columns, strict=True):
+        if np.all(column == column[0]):
+            warnings.append(
+                f"action {dimension.name!r} is {decimal_text(column[0])} in every step, so the "
+                "only rule is to do that always"
+            )
+        elif dimension.kind == "discrete":
+            counts = np.bincount(column - dimension.first, minlength=len(dimension.labels))
+            warnings += _shortened(
+                [
+                    f"label {label!r} of action {dimension.name!r} never occurs"
+                    for label, count in zip(dimension.labels, counts, strict=True)
+                    if count == 0
+                ],
+                f"labels of action {dimension.name!r} never occur",
+            )
+    return warnings
+
+
+def _shortened(sentences: list[str], rest: str) -> list[str]:
+    """The first few sentences, and the number of the others."""
+    more = len(sentences) - _SHOWN_WARNINGS
+    if more <= 1:
+        return sentences
+    return [*sentences[:_SHOWN_WARNINGS], f"{more:,} more {rest}"]
