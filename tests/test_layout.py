@@ -148,6 +148,10 @@ def test_imports_go_one_way():
     ("crossing", "name"),
     [
         ("sarl_core.errors", "streamlit"),
+        ("sarl_core.__main__", "sarl_dashboard.text"),
+        ("sarl_core.demonstrations.checks", "sarl_core.demonstrations.dataset"),
+        ("sarl_core.mining.rules", "sarl_core.mining.editing.edits"),
+        ("sarl_core.explaining.words.fork", "sarl_core.explaining.figures.gaps"),
         ("sarl_dashboard.state.url", "pages.evidence"),
         ("sarl_dashboard.views.edit.table", "sarl_dashboard.views.replay.steps"),
         ("pages.edit", "pages.replay"),
@@ -155,19 +159,37 @@ def test_imports_go_one_way():
 )
 def test_the_contracts_would_notice_who_crosses_a_line(tmp_path, crossing, name):
     """The lines are drawn where the design draws them: a copy that crosses one is refused."""
-    (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
-    for path in [path for name in (*PACKAGES, "pages") for path in (ROOT / name).rglob("*.py")]:
-        copy = tmp_path / path.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_text(path.read_text())
+    copy_of_the_product(tmp_path)
     with tmp_path.joinpath(*crossing.split(".")).with_suffix(".py").open("a") as file:
         file.write(f"\nimport {name}\n")
+    assert f"{crossing} -> {name}" in refused(tmp_path)
+
+
+@pytest.mark.parametrize("package", ["sarl_core", "sarl_core/mining", "sarl_dashboard"])
+def test_the_contracts_would_notice_a_folder_without_a_place(tmp_path, package):
+    copy_of_the_product(tmp_path)
+    folder = tmp_path / package / "elsewhere"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    assert f"{package.replace('/', '.')}.elsewhere" in refused(tmp_path)
+
+
+def copy_of_the_product(folder):
+    (folder / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
+    for path in [path for name in (*PACKAGES, "pages") for path in (ROOT / name).rglob("*.py")]:
+        copy = folder / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(path.read_text())
+
+
+def refused(folder):
+    """What the linter says against a copy."""
     linter = Path(sys.executable).with_name("lint-imports")
     done = subprocess.run(
-        [linter, "--no-cache"], cwd=tmp_path, capture_output=True, text=True, check=False
+        [linter, "--no-cache"], cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode != 0
-    assert f"{crossing} -> {name}" in done.stdout
+    return done.stdout
 
 
 def test_no_folder_holds_more_files_than_one_finds_something_in():

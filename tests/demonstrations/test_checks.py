@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations
+from sarl_core.demonstrations.warnings import find_warnings
 from tests.bad_inputs import csv_bytes
 
 

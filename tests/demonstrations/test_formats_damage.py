@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations
+from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.errors import InputError
 from tests.bad_inputs import ROWS, csv_bytes, good_arrays, npz_bytes, parquet_bytes
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.agents.sb3_zip import load_sb3_zip
-from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations, table_columns
+from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.language import sentence

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
+from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.explaining.figures.distributions import FeatureRow, feature_rows
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.hold_out import leave_out_choice, parting_lines
