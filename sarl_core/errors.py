@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from codecs import getincrementaldecoder
 from collections.abc import Mapping
+from numbers import Integral, Number
+from os import PathLike
 
 _LONGEST = 480  # characters of a message; nobody reads more
 _QUOTED = 40  # of what a message repeats from a file
@@ -62,6 +64,49 @@ def quoted(value: object, longest: int = _QUOTED) -> str:
     if isinstance(value, int) and abs(value) > 10**longest:  # Python may refuse to write it
         return "far too large"
     return _short(_seen(repr(value)), longest)
+
+
+def require(value: object, kind: type | tuple[type, ...], must: str, advice: str) -> None:
+    """Refuse an argument of another type, where a public name takes it in.
+
+    Args:
+        value: As it was given.
+        kind: What it has to be an instance of.
+        must: What has to be what, as "the shield must be a Shield".
+        advice: What to do, as "wrap the rules: Shield(rules)".
+
+    Raises:
+        InputError: If it is something else.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{must} and is {_kind_of(value)}; {advice}")
+
+
+def require_whole(name: str, value: int, least: int) -> None:
+    """Refuse what is no whole number, or too small.
+
+    Args:
+        name: Of the argument.
+        value: As it was given.
+        least: The smallest that is allowed.
+
+    Raises:
+        InputError: If it is something else.
+    """
+    require(value, Integral, f"{name} must be a whole number", "give one")
+    if value < least:
+        raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+
+
+def _kind_of(value: object) -> str:
+    """What was given, in a few words."""
+    if isinstance(value, PathLike):
+        return quoted(str(value))
+    if value is None or isinstance(value, (str, bytes, Number)):
+        return quoted(value)
+    if isinstance(value, (list, tuple)) and value:
+        return f"a {type(value).__name__} of {type(value[0]).__name__}"
+    return f"of type {type(value).__name__}"
 
 
 def _seen(text: str) -> str:

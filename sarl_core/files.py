@@ -12,10 +12,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from sarl_core.errors import InputError, WorkError
+from sarl_core.errors import InputError, WorkError, require
 
 _TEMPORARY = ".sarl"
 _LONGEST_STEM = 60  # of a file's name, so that what is put around it fits
+
+
+def as_path(path: str | Path, *, ending: str = "") -> Path:
+    """A path as a public name takes it.
+
+    Args:
+        path: Text, or a path.
+        ending: What the name of a file to write has to end in; "" for anything.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: If it is neither, or ends in something else.
+    """
+    require(path, (str, os.PathLike), "the path of a file must be text or a Path", "give one")
+    if ending and Path(path).suffix.lower() != ending:
+        raise InputError(f"{path} does not end in {ending}; give it this ending")
+    return Path(path)
 
 
 @contextmanager

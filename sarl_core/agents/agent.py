@@ -17,7 +17,7 @@ from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require
 from sarl_core.shipped import DATA
 
 EXPERT_FOLDER = DATA / "experts"
@@ -168,8 +168,17 @@ def make_agent(
     Raises:
         InputError: If there is no such agent, or it does not fit the environment.
     """
+    require(env_id, str, "the environment must be text", "give its id, as 'CartPole-v1'")
     if isinstance(spec, Agent):
         return spec
+    require(
+        spec,
+        (str, Path),
+        "an agent must be novice, untrained, expert, the path of an .npz policy or of a "
+        "Stable-Baselines3 .zip, or an object with name, n_uniforms and "
+        "act(observations, uniforms),",
+        "give one of these",
+    )
     if normalise is not None and Path(spec).suffix.lower() != ".zip":
         raise InputError(
             f"statistics to normalise by belong to a Stable-Baselines3 .zip, and the agent is "

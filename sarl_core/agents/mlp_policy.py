@@ -73,7 +73,7 @@ class Normalisation:
         return result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MlpPolicy:
     """A trained policy: hidden layers, an output layer, and what its output means.
 
@@ -122,6 +122,12 @@ class MlpPolicy:
             raise InputError("the policy has no layers; export the policy again")
         self._check_layers()
         self._check_vectors()
+
+    def __repr__(self) -> str:
+        """Its shape, as `MlpPolicy('CartPole-v1', layers=4x64x64x2, head='categorical')`."""
+        widths = [self.n_features, *(len(bias) for bias in self.biases)]
+        layers = "x".join(map(str, widths))
+        return f"MlpPolicy({self.env_id!r}, layers={layers}, head={self.head!r})"
 
     def _check_layers(self) -> None:
         width = self.n_features

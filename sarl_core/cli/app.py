@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from sarl_core import __version__
 from sarl_core.cli import terminal
 from sarl_core.cli.ablate import ablate
 from sarl_core.cli.aggregate import aggregate
@@ -76,6 +77,10 @@ def _start(
             help="After an error, show where it came from. Also after a command.",
         ),
     ] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
+    if version:
+        terminal.print_lines([__version__])
+        raise typer.Exit
     if context.invoked_subcommand is None:
         terminal.print_lines([context.get_help()])

@@ -13,7 +13,7 @@ from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
 from sarl_core.mining.thresholds.landscape import confidence_above
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees, source_of
+from sarl_core.mining.tree import PolicyTree, grow_policy_trees, several_trees, source_of
 
 
 def cut_nodes(
@@ -45,38 +45,52 @@ def cut_nodes(
 
 
 def mine_rules(
-    demonstrations_or_trees: Demonstrations | Sequence[PolicyTree],
+    demonstrations_or_trees: Demonstrations | PolicyTree | Sequence[PolicyTree],
     *,
     supp_min: float,
     conf_min: float,
     lift_min: float = 0.0,
     max_depth: int | None = None,
-    divider: int = 2,
+    divider: int | None = None,
 ) -> RuleSet:
     """Mine a rule set (the paper's Algorithm 1).
 
     Args:
-        demonstrations_or_trees: N pairs, or trees grown from them.
+        demonstrations_or_trees: N pairs, or the tree or trees grown from them.
         supp_min: Minimum support of a rule, 0 to 1.
         conf_min: Minimum confidence, 0 to 1.
-        lift_min: Minimum lift.
-        max_depth: Longest rule; needs no new tree.
-        divider: Number of intervals of continuous dimensions; trees carry their own.
+        lift_min: Minimum lift, 0 or more: how many times as frequent the label is where the rule
+            applies as among all pairs.
+        max_depth: Longest rule, in queries; needs no new tree.
+        divider: Number of intervals of continuous dimensions; 2 where not given, or what the
+            trees were grown with.
 
     Returns:
         The rules, by action dimension and node; with their data boxes where demonstrations were
         given, since trees alone do not hold the states.
 
     Raises:
-        InputError: If a threshold is out of range or there is nothing to mine.
+        InputError: If a threshold is out of range, there is nothing to mine, or the trees were
+            grown with another divider.
     """
     thresholds = Thresholds(supp_min, conf_min, lift_min, max_depth)
     if isinstance(demonstrations_or_trees, Demonstrations):
-        trees: Sequence[PolicyTree] = grow_policy_trees(demonstrations_or_trees, divider=divider)
+        trees = grow_policy_trees(
+            demonstrations_or_trees, divider=2 if divider is None else divider
+        )
     else:
-        trees = tuple(demonstrations_or_trees)
+        trees = several_trees(
+            demonstrations_or_trees,
+            "what rules are mined from must be Demonstrations, or trees grown from them,",
+            "load some: load_demonstrations(path)",
+        )
     if not trees:
         raise InputError("there is no tree to mine; give demonstrations, or grow the trees first")
+    if divider not in (None, trees[0].divider):
+        raise InputError(
+            f"the divider is {divider} and the trees were grown with {trees[0].divider}; leave it "
+            f"out, or grow them again: grow_policy_trees(demonstrations, divider={divider})"
+        )
     rules = []
     for tree in trees:
         nodes = cut_nodes(

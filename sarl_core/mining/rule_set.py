@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from sarl_core.errors import InputError
-from sarl_core.files import whole_file
+from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
 from sarl_core.mining.evidence import HeldOut
@@ -216,18 +216,11 @@ class RuleSet(RuleContents, Sequence[Rule]):
             dimension: those that a person placed in their order, then the most general first.
         """
         source = self.source
-        summary = (
-            f"they cover {share_text(self.coverage)} of the states and are right in "
-            f"{share_text(self.fidelity)} of those."
-            if is_plain(self)
-            else f"{edits_counted(self)}."
-        )
         lines = [
             f"Rules for {source.env_id or 'an unnamed environment'}",
             f"Mined from {counted(source.steps, 'step')} in "
             f"{counted(source.episodes, 'episode')}: {limits_text(self)}.",
-            f"{counted(self.rule_count, 'rule')}, {self.mean_length:.2f} conditions on "
-            f"average; {summary}",
+            self._counts_text(),
             "They were learned from examples and guarantee nothing.",
         ]
         for index, dimension in enumerate(self.actions):
@@ -240,17 +233,38 @@ class RuleSet(RuleContents, Sequence[Rule]):
             lines += ["", "Rules written by hand or pinned come before the others, in their order."]
         return "\n".join(lines) + "\n"
 
+    def _counts_text(self) -> str:
+        """How many rules there are, how long they are, and how far they hold."""
+        rules, one = counted(self.rule_count, "rule"), self.rule_count == 1
+        if not self.rules:
+            return f"{rules}; no state is covered."
+        length = (
+            counted(self.rules[0].length, "condition")
+            if one
+            else f"{self.mean_length:.2f} conditions on average"
+        )
+        rest = edits_counted(self)
+        if is_plain(self):
+            they, are = ("it covers", "is") if one else ("they cover", "are")
+            rest = (
+                f"{they} {share_text(self.coverage)} of the states and {are} right in "
+                f"{share_text(self.fidelity)} of those"
+            )
+        return f"{rules}, {length}; {rest}."
+
     def save(self, path: str | Path) -> None:
         """Write the rule file; it appears whole or not at all.
+
+        It has version 2 where rules were tried on episodes held out, else version 1.
 
         Args:
             path: A `.json` file.
 
         Raises:
-            InputError: If the folder does not exist.
+            InputError: If it has another ending, or the folder does not exist.
             WorkError: If it cannot be written to.
         """
-        with whole_file(Path(path)) as unfinished:
+        with whole_file(as_path(path, ending=".json")) as unfinished:
             write_rules(self, unfinished)
 
     @classmethod
@@ -270,7 +284,7 @@ def load_rules(path: str | Path) -> RuleSet:
     """Read a rule file.
 
     Args:
-        path: A `.json` file.
+        path: A `.json` file, of version 1 or 2.
 
     Returns:
         The rule set.
@@ -279,7 +293,7 @@ def load_rules(path: str | Path) -> RuleSet:
         InputError: If it cannot be read, is no rule file, or holds anything this version does not
             know.
     """
-    path = Path(path)
+    path = as_path(path)
     try:
         text = limited_bytes(path)
     except InputError as error:

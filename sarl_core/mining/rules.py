@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral, Real
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require
 from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
@@ -182,11 +183,18 @@ class Thresholds:
             InputError: If a threshold is out of range.
         """
         for name, value in (("support", self.support), ("confidence", self.confidence)):
+            must = f"the minimum {name} must be a number"
+            require(value, Real, must, "give a share from 0 to 1")
             if not 0.0 <= value <= 1.0:
                 raise InputError(f"the minimum {name} is {value}; give a share from 0 to 1")
+        require(self.lift, Real, "the minimum lift must be a number", "give 0 or more")
         if not (np.isfinite(self.lift) and self.lift >= 0.0):
             raise InputError(f"the minimum lift is {self.lift}; give 0 or more")
-        if self.max_depth is not None and self.max_depth < 0:
+        if self.max_depth is None:
+            return
+        must = "the maximum depth must be a whole number"
+        require(self.max_depth, Integral, must, "give 0 or more, or none")
+        if self.max_depth < 0:
             raise InputError(f"the maximum depth is {self.max_depth}; give 0 or more, or none")
 
 

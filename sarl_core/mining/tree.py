@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.splits import Splits
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 
 LEAF = -1
@@ -318,6 +319,29 @@ def walk(
     return nodes
 
 
+def several_trees(
+    trees: PolicyTree | Sequence[PolicyTree], must: str, advice: str
+) -> tuple[PolicyTree, ...]:
+    """The trees that a public function was given.
+
+    Args:
+        trees: One tree, or several.
+        must: What has to be trees, for errors.
+        advice: What to do where they are none, likewise.
+
+    Returns:
+        Those.
+
+    Raises:
+        InputError: If they are something else.
+    """
+    if isinstance(trees, PolicyTree):
+        return (trees,)
+    if not isinstance(trees, (list, tuple)) or not all(isinstance(t, PolicyTree) for t in trees):
+        require(trees, PolicyTree, must, advice)
+    return tuple(trees)
+
+
 def grow_policy_trees(
     demonstrations: Demonstrations,
     *,
@@ -342,8 +366,10 @@ def grow_policy_trees(
     """
     from sklearn.tree import DecisionTreeClassifier
 
-    if max_depth is not None and max_depth < 1:
-        raise InputError(f"the maximum depth is {max_depth}; give 1 or more, or none")
+    must = "what trees are grown from must be Demonstrations"
+    require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+    if max_depth is not None and not (isinstance(max_depth, Integral) and max_depth >= 1):
+        raise InputError(f"the maximum depth is {quoted(max_depth)}; give 1 or more, or none")
     trees = []
     for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
         labels = dimension.labels_of(demonstrations.action_columns[:, index])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment, make_environment
-from sarl_core.errors import InputError, WorkError
+from sarl_core.errors import InputError, WorkError, require_whole
 from sarl_core.rendering.film import Film
 from sarl_core.rollouts.episodes import Episodes, run_seeds
 from sarl_core.rollouts.player import View
@@ -39,8 +39,7 @@ def picture_speed(env_id: str, max_steps: int | None = None) -> tuple[float, int
         InputError: If it draws no pictures, or there are to be no steps.
     """
     most = MAX_STEPS if max_steps is None else max_steps
-    if most < 1:
-        raise InputError(f"max_steps is {most} and must be at least 1; give a larger one")
+    require_whole("max_steps", most, 1)
     describe_environment(env_id)
     env = make_environment(env_id)
     modes, fps = env.metadata.get("render_modes", []), env.metadata.get("render_fps")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.description import describe_environment
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require_whole
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.progress import Progress, report
@@ -151,8 +151,7 @@ def fork(
         WorkError: If drawing fails.
         CancelledError: If `progress` returned False.
     """
-    if seed < 0:
-        raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
+    require_whole("seed", seed, 0)
     if rest not in get_args(Rest):
         raise InputError(f"the rest {rest!r} is neither shielded nor alone; choose one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)

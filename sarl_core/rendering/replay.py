@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.description import describe_environment
-from sarl_core.errors import InputError
-from sarl_core.files import whole_file
+from sarl_core.errors import InputError, require_whole
+from sarl_core.files import as_path, whole_file
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence
@@ -140,7 +140,7 @@ class Replay:
             InputError: If the ending is another, or the folder does not exist.
             WorkError: If it cannot be written.
         """
-        target = Path(path)
+        target = as_path(path)
         check_picture_path(target)
         if target.suffix.lower() == ".mp4":
             encode_mp4(self.animation(), self.fps, target, count=len(self), progress=progress)
@@ -246,8 +246,7 @@ def _replay(
     max_steps: int | None,
     progress: Progress | None,
 ) -> Replay:
-    if seed < 0:
-        raise InputError(f"seed is {seed} and must be at least 0; give a larger one")
+    require_whole("seed", seed, 0)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     fps, limit = picture_speed(env_id, max_steps)
     # Whose words are used for the panel without rules, too.

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.failures import failed, failure_known
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import SarlError, require_whole
 from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
@@ -393,14 +393,15 @@ def rollout(
         agent: An agent, or what `make_agent` takes.
         shield: Checks every action; None for none.
         episodes: How many.
-        seed: Episode i uses ``env.reset(seed=seed + i)`` and random numbers of that seed.
+        seed: At least 0; episode i uses ``env.reset(seed=seed + i)`` and random numbers of that
+            seed.
         stochastic: Whether a trained policy is sampled.
         batch: Environments side by side; changes the speed, never the result.
         jobs: Processes; likewise. Starting one takes about a second.
         executor: Whose processes they are, as a Dask client's; this machine's where not given.
         keep_steps: Whether to keep the record of every step (about 60 bytes and 4 d a step).
         max_steps: An episode that has not ended by then is cut off, and `Episodes.cut` says so;
-            `MAX_STEPS` where not given.
+            100,000 where not given.
         progress: Called with (episodes done, in all); returning False stops.
 
     Returns:
@@ -420,8 +421,7 @@ def rollout(
         ("jobs", jobs, 1),
         ("max_steps", most, 1),
     ):
-        if value < least:
-            raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+        require_whole(name, value, least)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     seeds = np.arange(seed, seed + episodes, dtype=np.int64)
     done = 0

@@ -10,7 +10,7 @@ import numpy as np
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
-from sarl_core.errors import InputError
+from sarl_core.errors import require_whole
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import EpisodeArrays, play
 from sarl_core.rollouts.steps import concatenate
@@ -54,9 +54,8 @@ def record(
         InputError: If a number is out of range or the agent does not fit the environment.
         CancelledError: If `progress` returned False.
     """
-    if steps < 1 or seed < 0:
-        name, value, least = ("steps", steps, 1) if steps < 1 else ("seed", seed, 0)
-        raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+    require_whole("steps", steps, 1)
+    require_whole("seed", seed, 0)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     outcomes: list[EpisodeArrays] = []
     episodes = done = 0

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple, Self, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.shielding.boxes import Boxes, leaves_out
@@ -27,6 +27,7 @@ Outside = Literal["act", "abstain"]
 OnInvalid = Literal["raise", "pass"]
 """What becomes of a step whose state is no state, or whose action is none of the space."""
 
+_RULES = "mine one: mine_rules(...), or load one: load_rules(path)"
 _ARRAY, _FLOAT32 = np.ndarray, np.dtype(np.float32)
 
 
@@ -117,9 +118,10 @@ class Shield:
                 (``raise``) or lets the action ``pass`` unchecked, with the reason in the record.
 
         Raises:
-            InputError: If one of the choices is unknown, or the rules hold no demonstrated
-                values that ``expert`` could use.
+            InputError: If it is no rule set, one of the choices is unknown, or the rules hold no
+                demonstrated values that ``expert`` could use.
         """
+        require(rule_set, RuleSet, "what a shield holds to must be a RuleSet", _RULES)
         if projection not in get_args(Projection):
             raise InputError(
                 f"the projection {projection!r} is none of centre, clip, expert; choose one"
@@ -157,6 +159,13 @@ class Shield:
         self._n_features = len(rule_set.source.features)
         self._match_label = self._matchers[0].match
         self._take_form(ActionForm.of_rules(rule_set))
+
+    def __repr__(self) -> str:
+        """Its rules and what was chosen, as `Shield(RuleSet(...), projection='centre', ...)`."""
+        return (
+            f"Shield({self.rule_set!r}, projection={self.projection!r}, "
+            f"outside={self.outside!r}, on_invalid={self.on_invalid!r})"
+        )
 
     def _take_form(self, form: ActionForm) -> None:
         """Execute actions of this form from now on."""

@@ -9,6 +9,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from sarl_core.errors import require
 from sarl_core.shielding.observation_layers import (
     Layer,
     Observed,
@@ -19,7 +20,7 @@ from sarl_core.shielding.observation_layers import (
 )
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import BatchDecision, Shield
-from sarl_core.shielding.wrappers import StepRecord, fitted, is_flat
+from sarl_core.shielding.wrappers import StepRecord, check_penalty, fitted, is_flat
 
 
 class ShieldedVecEnv(VecEnvWrapper):
@@ -42,9 +43,13 @@ class ShieldedVecEnv(VecEnvWrapper):
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment, its features
-                have other names than theirs, or its observations are normalised.
+            InputError: If the penalty is no number, the rules are not for the spaces of this
+                environment, its features have other names than theirs, or its observations are
+                normalised.
         """
+        must = "what is shielded must be a VecEnv of Stable-Baselines3"
+        require(venv, VecEnv, must, "make one: DummyVecEnv([lambda: env])")
+        check_penalty(penalty)
         super().__init__(venv)
         self.shield, self.notes = fitted(
             shield, venv.observation_space, venv.action_space, _observed(venv)

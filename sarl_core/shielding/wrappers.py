@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+from numbers import Real
 from typing import Any, NamedTuple, SupportsFloat
 
 import gymnasium
@@ -9,7 +11,7 @@ import numpy as np
 
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import NamedFeatures
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.rule_order import fitted_rules
 from sarl_core.shielding.observation_layers import Observed, observed
 from sarl_core.shielding.readers import state_vector
@@ -46,6 +48,9 @@ class StepRecord(NamedTuple):
     invalid: str | None = None
 
 
+_MAKE = "make one: gymnasium.make('CartPole-v1')"
+
+
 class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
     """An environment whose every action passes through a shield.
 
@@ -69,10 +74,13 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             penalty: Taken off the reward at every intervention.
 
         Raises:
-            InputError: If the rules are not for the spaces of this environment, its features
-                have other names than theirs, or its observations are normalised. So does `step`,
+            InputError: If the penalty is no number, the rules are not for the spaces of this
+                environment, its features have other names than theirs, or its observations are
+                normalised. So does `step`,
                 at an observation or an action that is none, unless the shield lets them pass.
         """
+        require(env, gymnasium.Env, "what is shielded must be a gymnasium.Env", _MAKE)
+        check_penalty(penalty)
         gymnasium.utils.RecordConstructorArgs.__init__(self, shield=shield, penalty=penalty)
         super().__init__(env)
         self.shield, self.notes = fitted(
@@ -125,6 +133,19 @@ class ShieldedEnv(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
     def _remember(self, observation: Any) -> None:
         # A copy: an environment may write the next observation into the same array.
         self._observation = state_vector(observation, self._space)
+
+
+def check_penalty(penalty: float) -> None:
+    """Refuse a penalty that cannot be taken off a reward.
+
+    Args:
+        penalty: As it was given.
+
+    Raises:
+        InputError: If it is no finite number.
+    """
+    if not (isinstance(penalty, Real) and isfinite(penalty)):
+        raise InputError(f"the penalty is {quoted(penalty)}; give a finite number")
 
 
 def is_flat(space: gymnasium.Space[Any]) -> bool:
@@ -202,6 +223,7 @@ def check_fit(
     Raises:
         InputError: If the number of features or the kind and number of actions differ.
     """
+    require(shield, Shield, "the shield must be a Shield", "wrap the rules: Shield(rules)")
     spaces = gymnasium.spaces
     source, actions = shield.rule_set.source, shield.rule_set.actions
     rules_of = f"the rules (of {source.env_id or 'an unnamed environment'})"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, require_whole
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
@@ -311,8 +311,7 @@ def ablate(
         ("jobs", jobs, 1),
         ("max_steps", MAX_STEPS if max_steps is None else max_steps, 1),
     ):
-        if value < least:
-            raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+        require_whole(name, value, least)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     record = AblationRecord(env_id, actor, shield, seed, max_steps)
     runner = partial(run_tasks, executor=executor_of(jobs, executor))

@@ -104,10 +104,10 @@ def test_random_landscapes_are_the_oracle_in_every_cell_edges_included(demonstra
 
 
 def _edges(values):
-    """Every value at which something changes, and its two neighbours among the floats."""
+    """Every value at which something changes, and its two neighbours among the shares."""
     values = np.unique(values)
     around = [np.nextafter(values, -np.inf), values, np.nextafter(values, np.inf), [0.0, 1.0]]
-    return np.unique(np.concatenate(around))
+    return np.unique(np.clip(np.concatenate(around), 0.0, 1.0))
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -26,8 +26,8 @@ from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, w
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.tables import Table, recording_from_table
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
-from sarl_core.errors import InputError
-from sarl_core.files import whole_file
+from sarl_core.errors import InputError, require
+from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 
 Content = bytes | bytearray | memoryview | BinaryIO
@@ -90,8 +90,11 @@ def load_demonstrations(
     Raises:
         InputError: If the file cannot be used: one sentence with file, column and first row.
     """
+    if columns is not None:
+        must = "the map of columns must be a ColumnMap"
+        require(columns, ColumnMap, must, "make one, of sarl_core.demonstrations.formats")
     description = describe_environment(env_id) if env_id else None
-    path = Path(path)
+    path = as_path(path)
     with naming(str(path)):
         if path.is_dir():
             pair = pair_in_folder(path)
@@ -165,7 +168,9 @@ def save_demonstrations(demonstrations: Demonstrations, path: str | Path) -> Non
     Raises:
         InputError: If the extension is unknown or the path cannot be written.
     """
-    path = Path(path)
+    must = "what is saved must be Demonstrations"
+    require(demonstrations, Demonstrations, must, "call save_demonstrations(demonstrations, path)")
+    path = as_path(path)
     with naming(str(path)):
         form = _format(path.name)
         if path.is_dir():

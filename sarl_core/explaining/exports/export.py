@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require
 from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
-from sarl_core.files import whole_file
+from sarl_core.files import as_path, whole_file
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
@@ -87,7 +87,7 @@ def prepare(
     """Round and merge rules, as asked.
 
     Args:
-        rule_set: To carry away.
+        rule_set: The rules.
         merged: Whether several conditions on one feature become one interval.
         demonstrations: Round the thresholds to what changes no decision on these; None for not.
 
@@ -101,6 +101,8 @@ def prepare(
     notes: tuple[str, ...] = ()
     rounding, changed = None, 0
     if demonstrations is not None:
+        must = "what thresholds are rounded on must be Demonstrations"
+        require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
         rule_set, notes = rules_for(rule_set, demonstrations)
         rounding = rounded_rules(rule_set, demonstrations)
         changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)
@@ -145,7 +147,7 @@ def export_content(
     """A rule set in one of the formats.
 
     Args:
-        rule_set: To carry away.
+        rule_set: The rules.
         suffix: One of `FORMATS`.
         projection: What a continuous action that breaks a rule becomes; for code.
         on_invalid: What becomes of a step whose state is no state, or whose action is none; for
@@ -213,8 +215,8 @@ def export_rules(
     """Write rules for other programs or for reading, and test vectors beside them.
 
     Args:
-        rule_set: To carry away.
-        path: Its ending says the format, one of `FORMATS`.
+        rule_set: The rules.
+        path: Its ending says the format: .json, .csv, .md, .py, .c or .onnx.
         merged: Whether several conditions on one feature become one interval.
         demonstrations: Round the thresholds to what changes no decision on these; None for not.
         projection: What a continuous action that breaks a rule becomes.
@@ -229,7 +231,7 @@ def export_rules(
             folder does not exist.
         WorkError: If it cannot be written to, or a package is missing that the format needs.
     """
-    path = Path(path)
+    path = as_path(path)
     prepared = prepare(rule_set, merged=merged, demonstrations=demonstrations)
     content = export_content(prepared.rule_set, path.suffix.lower(), projection, on_invalid)
     vectors = export_vectors(prepared.rule_set, projection, on_invalid)

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, require
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
@@ -114,14 +114,15 @@ class CodeLine(NamedTuple):
 
 
 def require_rules(rule_set: RuleSet) -> None:
-    """Refuse a rule set without rules.
+    """Refuse what is no rule set, or one without rules.
 
     Args:
-        rule_set: To carry away.
+        rule_set: To export.
 
     Raises:
         InputError: If there is nothing in it.
     """
+    require(rule_set, RuleSet, "what is exported must be a RuleSet", "load one: load_rules(path)")
     if not rule_set.rules:
         raise InputError(
             "the rule set has no rules, so there is nothing to export; lower the minimum support "

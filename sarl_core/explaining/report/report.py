@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 from sarl_core.agents.agent import Agent, shipped_experts
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.comparison import Result, compared
 from sarl_core.explaining.report.demonstrations import shown
 from sarl_core.explaining.report.gaps import gaps
@@ -25,7 +26,7 @@ from sarl_core.explaining.report.tally import Tally, report_rules, same_environm
 from sarl_core.explaining.report.thresholds import kept
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
-from sarl_core.files import whole_file
+from sarl_core.files import as_path, whole_file
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import counted, share_text
@@ -77,6 +78,7 @@ class Wishes:
             ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, 2**31 - 1),
             ("the seed", self.seed, 0, 2**31 - 1 - self.episodes),
         ):
+            require(value, Integral, f"{name} must be a whole number", "give one")
             if not least <= value <= most:
                 raise InputError(f"{name} is {value}; give one from {least} to {most:,}")
 
@@ -108,10 +110,10 @@ class Report:
             path: An `.html` file.
 
         Raises:
-            InputError: If the folder does not exist.
+            InputError: If it has another ending, or the folder does not exist.
             WorkError: If it cannot be written to.
         """
-        with whole_file(Path(path)) as unfinished:
+        with whole_file(as_path(path, ending=".html")) as unfinished:
             unfinished.write_text(self.html, encoding="utf-8", newline="\n")
 
 
@@ -146,7 +148,7 @@ def make_report(
             not come by or there is none, a novice that the rules shield.
         seed: Of the first episode that is played.
         episodes: How many each player plays.
-        max_steps: After which one is cut off; `episodes.MAX_STEPS` where None.
+        max_steps: After which one is cut off; 100,000 where None.
         commands: How the rules and the report are made again, one line each.
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
@@ -164,6 +166,10 @@ def make_report(
             than the rules, or an agent that was named cannot play.
         CancelledError: If `progress` returned False.
     """
+    call = "call make_report(rules, demonstrations)"
+    require(rule_set, RuleSet, "what a report is about must be a RuleSet", call)
+    must = "what a report shows the rules on must be Demonstrations"
+    require(demonstrations, Demonstrations, must, call)
     wishes = Wishes(
         in_full=in_full,
         frames=frames,

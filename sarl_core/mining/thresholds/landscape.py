@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.mining.evidence import EpisodeCounts, EpisodeSums
-from sarl_core.mining.tree import PolicyTree, highest_above
+from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import PolicyTree, highest_above, several_trees
 from sarl_core.notebooks import table_html
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class Rectangles(NamedTuple):
     confidence: Floats
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Landscape:
     """Sums over the rule set, for every pair of thresholds of a grid.
 
@@ -84,6 +85,14 @@ class Landscape:
     held_out_fidelity: Floats | None = None
     held_out_low: Floats | None = None
     held_out_high: Floats | None = None
+
+    def __repr__(self) -> str:
+        """Its size, as `Landscape(supports=11, confidences=21, rules=0 to 312, dimensions=1)`."""
+        return (
+            f"Landscape(supports={len(self.supports)}, confidences={len(self.confidences)}, "
+            f"rules={self.rule_count.min()} to {self.rule_count.max()}, "
+            f"dimensions={len(self.dimensions)})"
+        )
 
     def to_frame(self, *, by_dimension: bool = False) -> pd.DataFrame:
         """One row a cell, by support, then by confidence.
@@ -167,7 +176,7 @@ def confidence_above(tree: PolicyTree, *, lift_min: float = 0.0) -> Floats:
 
 
 def threshold_landscape(
-    trees: Sequence[PolicyTree],
+    trees: PolicyTree | Sequence[PolicyTree],
     supports: ArrayLike,
     confidences: ArrayLike,
     *,
@@ -180,9 +189,9 @@ def threshold_landscape(
     Exact: every cell equals mining at its thresholds (the paper's Figures 2 and 3).
 
     Args:
-        trees: One an action dimension.
-        supports: Minimum supports, ascending, shape (S,).
-        confidences: Minimum confidences, ascending, shape (C,).
+        trees: One an action dimension, or a single one.
+        supports: Minimum supports, 0 to 1, ascending, shape (S,).
+        confidences: Minimum confidences, 0 to 1, ascending, shape (C,).
         lift_min: Minimum lift of a rule.
         max_depth: Longest rule.
         held_out: What `count_held_out` counted at the nodes of these trees; None for nothing.
@@ -191,8 +200,15 @@ def threshold_landscape(
         Layers of shape (S, C), for all dimensions and for each.
 
     Raises:
-        InputError: If there is no tree, or a grid is empty, not ascending or not finite.
+        InputError: If there is no tree, a grid is empty, not ascending or not from 0 to 1, or
+            another threshold is out of range.
     """
+    Thresholds(0.0, 0.0, lift_min, max_depth)
+    trees = several_trees(
+        trees,
+        "what a landscape is drawn of must be trees",
+        "grow them: grow_policy_trees(demonstrations)",
+    )
     if not trees:
         raise InputError("there is no tree to draw a landscape of; grow the trees first")
     supports = _axis(supports, "supports")
@@ -218,10 +234,18 @@ def threshold_landscape(
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:
-    axis = np.asarray(values, dtype=np.float64)
+    try:
+        axis = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        axis = np.zeros(0)
     usable = axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all()
     if not usable or (np.diff(axis) <= 0).any():
         raise InputError(f"the {name} of a landscape must be finite numbers in ascending order")
+    if axis[0] < 0.0 or axis[-1] > 1.0:
+        raise InputError(
+            f"the {name} of a landscape go from {axis[0]:g} to {axis[-1]:g}; "
+            "give shares from 0 to 1"
+        )
     return axis
 
 
