@@ -12,7 +12,7 @@ FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
 	  $$name -c 'import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	    2>/dev/null && echo $$name && break; done
 
-.PHONY: app test lint format docs bench fuzz clean
+.PHONY: app test lint format docs lowest bench fuzz clean
 .DELETE_ON_ERROR:
 
 app: $(VENV)/runtime.stamp  ## start the dashboard
@@ -36,6 +36,14 @@ docs: $(VENV)/development.stamp $(BROWSER) $(COMPILER)  ## the guide, in out/doc
 	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --quiet
 	$(PYTHON) -m pytest tests/test_docs.py tests/test_examples.py
 	@echo "The guide is in out/docs/index.html."
+
+LOWEST := .venv-lowest/bin/python
+LIBRARY := mining shielding demonstrations environments agents rollouts rendering explaining cli
+
+lowest: requirements-lowest.txt $(COMPILER)  ## test the library at the lower ends of its dependencies' ranges
+	test -x $(LOWEST) || $$($(FIND_PYTHON)) -m venv .venv-lowest
+	$(LOWEST) -m pip install --requirement requirements-lowest.txt
+	$(LOWEST) -m pytest $(addprefix tests/,$(LIBRARY))
 
 bench: $(VENV)/development.stamp $(BROWSER)  ## measure, and compare with what is to be reached
 	$(PYTHON) -m benchmarks

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from importlib import metadata
 from pathlib import Path
@@ -97,10 +98,23 @@ def test_what_tests_and_benchmarks_import_is_pinned():
     assert set(pins("requirements-dev.txt")) <= brought | TOOLS
 
 
+def test_the_lower_ends_that_are_tested_are_those_of_the_ranges():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    ranges = [*project["dependencies"], *extras["learning"], *extras["onnx"], *extras["video"]]
+    lowest = pins("requirements-lowest.txt")
+    for line in ranges:
+        name, least = re.match(r"([\w-]+)(?:\[\w+\])?>=([\d.]+)", line).groups()
+        tested = lowest[normal(name)]
+        assert tested.startswith(least), line
+        assert set(tested[len(least) :]) <= {".", "0"}, line
+
+
 @pytest.mark.parametrize(
     "name",
     [
         "requirements.txt",
+        "requirements-lowest.txt",
         "requirements-dev.txt",
         "pyproject.toml",
         "Makefile",

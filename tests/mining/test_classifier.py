@@ -14,9 +14,9 @@ from tests.mining.strategies import labelled_states
 def test_scikit_learns_own_checks_pass():
     results = check_estimator(RuleClassifier(), on_skip=None)
     assert len(results) > 30
-    # The one it skips by itself asks for an optional array library.
+    # One it may skip by itself asks for an optional array library.
     others = [r for r in results if r["status"] != "passed"]
-    assert [r["check_name"] for r in others] == ["check_array_api_input"]
+    assert {r["check_name"] for r in others} <= {"check_array_api_input"}
 
 
 def test_where_no_rule_applies_it_predicts_the_most_frequent_label():
