@@ -144,4 +144,6 @@ def test_markdown_escapes_names(lander_trees: tuple[PolicyTree, ...]) -> None:
     assert columns == {6}
     assert "<img" not in text
     assert not re.search(r"(?<!\\)`", text)
-    assert markdown_text("plain words 2.5 m/s") == "plain words 2.5 m/s"
+    # As the label of a slider it is read aloud as it is written.
+    for plain in ("plain words 2.5 m/s", "pole angle (rad)"):
+        assert markdown_text(plain) == plain

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html import escape
 
-_SIGNS = re.compile(r"([\\`*_{}\[\]()#~|$:!^@+-])")
+_SIGNS = re.compile(r"([\\`*_{}\[\]#~|$:!^@+-])")
 _ORDINARY = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ,;.+/²³°%-]*")
 # What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
 _JOINER = "\u2060"
