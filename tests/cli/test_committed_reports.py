@@ -14,11 +14,11 @@ from sarl_core.cli.app import main
 from sarl_core.mining.rule_set import rules_digest
 
 ROOT = Path(__file__).resolve().parents[2]
-REPORTS = sorted((ROOT / "docs").glob("report_*.html"))
+REPORTS = sorted((ROOT / "docs" / "reports").glob("*.html"))
 
 
 def test_there_are_two() -> None:
-    assert [path.name for path in REPORTS] == ["report_cartpole.html", "report_lunar_lander.html"]
+    assert [path.name for path in REPORTS] == ["cartpole.html", "lunar_lander.html"]
 
 
 @pytest.mark.parametrize("report", REPORTS, ids=lambda path: path.stem)
