@@ -155,7 +155,7 @@ def rules(quick: bool) -> Iterable[Row]:
         ),
         Control(
             "Rules, lower bound at least, unfiltered",
-            f"rules?{UNFILTERED}&lower=0.5",
+            f"rules?{UNFILTERED}&holdout=0.4&lower=0.5",
             partial(_step, label="Lower bound at least"),
             ("[data-testid=stCaptionContainer]", TABLES),
         ),
