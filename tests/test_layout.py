@@ -235,3 +235,14 @@ def test_a_page_is_the_order_of_its_screen_and_nothing_else(page):
     ]
     assert defined == []
     assert len(text.splitlines()) <= 150
+
+
+def test_a_class_name_is_one_thing():
+    homes = Counter(
+        node.name
+        for path in python_files()
+        if path.relative_to(ROOT).parts[0] in PRODUCT
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+    )
+    assert {name for name, count in homes.items() if count > 1} == set()

@@ -10,7 +10,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted
-from sarl_dashboard.jobs.episodes import Batch, Row, known, run_batch
+from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known, run_batch
 from sarl_dashboard.jobs.job import Job, Place, Result, Tell
 from sarl_dashboard.text import refuse
 
@@ -104,7 +104,7 @@ def watched(place: Place[Any], draw: Callable[[bool], None], *, seconds: float =
     watch()
 
 
-def episodes_bar(place: Place[Batch], rows: Sequence[Row], episodes: int) -> None:
+def episodes_bar(place: Place[EpisodeBatch], rows: Sequence[Row], episodes: int) -> None:
     """Run what is missing of some episodes.
 
     Args:

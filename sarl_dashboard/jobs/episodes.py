@@ -136,7 +136,7 @@ def results() -> Results:
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class EpisodeBatch:
     """Rows that were asked for together.
 
     Attributes:
@@ -150,17 +150,17 @@ class Batch:
     problems: dict[object, SarlError] = field(default_factory=dict)
 
 
-COMPARISON = Place[Batch]("comparison")  # of the page Shield
+COMPARISON = Place[EpisodeBatch]("comparison")  # of the page Shield
 
 
-def run_batch(rows: Sequence[Row], episodes: int) -> Job[Batch]:
+def run_batch(rows: Sequence[Row], episodes: int) -> Job[EpisodeBatch]:
     """Run what is missing of the episodes of several rows, one row after the other.
 
     Args:
         rows: What is looked at.
         episodes: How many of each.
     """
-    batch = Batch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
+    batch = EpisodeBatch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
     known_episodes, executor = results(), processes()
     return Job(
         None,
@@ -170,7 +170,9 @@ def run_batch(rows: Sequence[Row], episodes: int) -> Job[Batch]:
     )
 
 
-def _run(job: Job[Batch], batch: Batch, known_episodes: Results, executor: Processes) -> None:
+def _run(
+    job: Job[EpisodeBatch], batch: EpisodeBatch, known_episodes: Results, executor: Processes
+) -> None:
     def count(row: Row) -> int:
         have = known_episodes.get(row.key, batch.episodes)
         return len(have) if have is not None else 0

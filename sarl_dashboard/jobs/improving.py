@@ -29,7 +29,7 @@ _SOON = 0.03  # share of the work from which on the rest can be guessed
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class ImprovementOrder:
     """Everything that a run depends on.
 
     Attributes:
@@ -66,7 +66,7 @@ class Outcome:
         gaps: States that need a demonstration, where nobody was asked.
     """
 
-    order: Order
+    order: ImprovementOrder
     rounds: tuple[AggregationRound, ...] = ()
     improved: Aggregation | None = None
     gaps: Gaps | None = None
@@ -89,7 +89,7 @@ def _one_at_a_time() -> Lock:
     return Lock()
 
 
-def improving(order: Order) -> Job[Outcome]:
+def improving(order: ImprovementOrder) -> Job[Outcome]:
     """Improve rules, or find their gaps where there is nobody to ask.
 
     Args:
@@ -101,7 +101,7 @@ def improving(order: Order) -> Job[Outcome]:
         with _turn(job, lock) as mine:
             if not mine:
                 return
-            run = _Run(job, order, executor, time.monotonic())
+            run = _ImprovementRun(job, order, executor, time.monotonic())
             outcome, finished = run.find_gaps() if order.expert is None else run.improve()
         job.result = outcome
         if finished:
@@ -125,11 +125,11 @@ def _turn(job: Job[Outcome], lock: Lock) -> Iterator[bool]:
 
 
 @dataclass
-class _Run:
+class _ImprovementRun:
     """A run, and what it tells of itself meanwhile."""
 
     job: Job[Outcome]
-    order: Order
+    order: ImprovementOrder
     executor: Processes
     began: float
     rounds: tuple[AggregationRound, ...] = ()

@@ -50,7 +50,7 @@ _NICE = 10  # the dashboard answers first
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class LearningOrder:
     """A study that a visitor asks for.
 
     Attributes:
@@ -94,7 +94,7 @@ def base() -> Path:
     return Path(os.environ.get("SARL_LEARNING", "") or shared_temporary_folder() / name)
 
 
-def study_of(order: Order) -> LearningStudy | None:
+def study_of(order: LearningOrder) -> LearningStudy | None:
     """What there is of a study.
 
     Args:
@@ -116,7 +116,7 @@ def study_of(order: Order) -> LearningStudy | None:
 class Training:
     """The process of one study, and how many wait for it."""
 
-    def __init__(self, order: Order, keep: set[Path]) -> None:
+    def __init__(self, order: LearningOrder, keep: set[Path]) -> None:
         """Start it.
 
         Args:
@@ -193,7 +193,7 @@ class Trainings:
         self._lock = Lock()
         self._at_work: dict[Path, Training] = {}
 
-    def join(self, order: Order) -> Training:
+    def join(self, order: LearningOrder) -> Training:
         """Wait for a study with others, or start it.
 
         Raises:
@@ -210,7 +210,7 @@ class Trainings:
                     return training
             time.sleep(_LOOKED_AT_EVERY)  # it is stopping; two must not write into a folder
 
-    def _start(self, order: Order) -> Training:
+    def _start(self, order: LearningOrder) -> Training:
         busy = sum(other.running for other in self._at_work.values())
         if busy >= MOST_TRAININGS:
             raise WorkError(
@@ -242,7 +242,7 @@ def trainings() -> Trainings:
     return Trainings()
 
 
-def learning(order: Order) -> Job[LearningStudy]:
+def learning(order: LearningOrder) -> Job[LearningStudy]:
     """Wait for a study, which begins or goes on; what there is of it is the result so far.
 
     Args:
@@ -254,13 +254,13 @@ def learning(order: Order) -> Job[LearningStudy]:
     )
 
 
-def _so_far(order: Order) -> LearningStudy | None:
+def _so_far(order: LearningOrder) -> LearningStudy | None:
     with suppress(SarlError):
         return study_of(order)
     return None
 
 
-def _wait(job: Job[LearningStudy], order: Order, everyone: Trainings) -> None:
+def _wait(job: Job[LearningStudy], order: LearningOrder, everyone: Trainings) -> None:
     began, already = time.monotonic(), _steps_made(job.result)
     training = everyone.join(order)
     try:
@@ -280,7 +280,7 @@ def _steps_made(study: LearningStudy | None) -> int:
     return sum(run.done for run in study.runs) if study is not None else 0
 
 
-def _progress_text(job: Job[LearningStudy], order: Order, made: int, seconds: float) -> str:
+def _progress_text(job: Job[LearningStudy], order: LearningOrder, made: int, seconds: float) -> str:
     """Who learns, and how long it may still take.
 
     Args:
@@ -308,7 +308,7 @@ def _progress_text(job: Job[LearningStudy], order: Order, made: int, seconds: fl
     return who + left
 
 
-def _take_over_finished(order: Order) -> None:
+def _take_over_finished(order: LearningOrder) -> None:
     """Copy finished runs of other studies under the same conditions; they would be the same."""
     for sibling in sorted(base().glob(f"{order.conditions}-*")):
         if sibling == order.folder:

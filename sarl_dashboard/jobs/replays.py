@@ -40,7 +40,7 @@ _LATEST = "_replay"
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class ReplayOrder:
     """A replay that is asked for.
 
     Attributes:
@@ -79,16 +79,16 @@ class Order:
             return None
         return Shield(self.rule_set, projection=self.projection, outside=self.outside)
 
-    def of_seed(self, seed: int) -> Order:
+    def of_seed(self, seed: int) -> ReplayOrder:
         """The same agent and rules on another seed, as in a comparison over several."""
         return replace(self, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class ReplayPair:
     """One episode without the rules and, where there are any, one with them."""
 
-    order: Order
+    order: ReplayOrder
     film: Film
     dimensions: tuple[LabelledDimension, ...]
     features: tuple[Feature, ...]
@@ -131,7 +131,7 @@ class Replay:
 
 
 @st.cache_resource
-def replay_cache() -> BoundedCache[Replay]:
+def replay_cache() -> BoundedCache[ReplayPair]:
     """Replays by the key of their order."""
     return BoundedCache(MOST_REPLAYS)
 
@@ -152,13 +152,13 @@ def fork_cache() -> BoundedCache[Fork]:
 class Played:
     """A replay, and the order that it fulfils."""
 
-    order: Order
-    replay: Replay
+    order: ReplayOrder
+    replay: ReplayPair
 
 
-def latest_order() -> Order | None:
+def latest_order() -> ReplayOrder | None:
     """What asked for the replay that the visitor ran last."""
-    order: Order | None = st.session_state.get(_LATEST)
+    order: ReplayOrder | None = st.session_state.get(_LATEST)
     return order
 
 
@@ -169,12 +169,12 @@ def latest() -> Played | None:
     return None if order is None or replay is None else Played(order, replay)
 
 
-def show_next(order: Order) -> None:
+def show_next(order: ReplayOrder) -> None:
     """Make the replay of an order, which is kept, the latest."""
     st.session_state[_LATEST] = order
 
 
-def compared(order: Order) -> tuple[Order, int] | None:
+def compared(order: ReplayOrder) -> tuple[ReplayOrder, int] | None:
     """The comparison that the visitor ran last, if an order is one of its episodes.
 
     Args:
@@ -183,7 +183,7 @@ def compared(order: Order) -> tuple[Order, int] | None:
     Returns:
         Its own order and number of episodes, or None.
     """
-    latest: tuple[Order, int] | None = st.session_state.get("_compared")
+    latest: tuple[ReplayOrder, int] | None = st.session_state.get("_compared")
     if latest is None:
         return None
     first, episodes = latest
@@ -195,7 +195,7 @@ def compared(order: Order) -> tuple[Order, int] | None:
 # --- running -----------------------------------------------------------------------------------
 
 
-def run(order: Order, tell: Tell) -> Replay:
+def run(order: ReplayOrder, tell: Tell) -> ReplayPair:
     """Run the episode, without the rules and with them, and draw it.
 
     Raises:
@@ -227,7 +227,7 @@ def run(order: Order, tell: Tell) -> Replay:
     dimensions = environment_dimensions(description, rule_set)
     film = film.named(dimensions)
     film.gif(progress=encoding)
-    return Replay(
+    return ReplayPair(
         order=order,
         film=film,
         dimensions=dimensions,
@@ -238,7 +238,7 @@ def run(order: Order, tell: Tell) -> Replay:
     )
 
 
-def compare(order: Order, episodes: int, tell: Tell) -> tuple[tuple[str, Episodes], ...]:
+def compare(order: ReplayOrder, episodes: int, tell: Tell) -> tuple[tuple[str, Episodes], ...]:
     """Run several episodes with the rules and without; of the first run the steps are kept.
 
     Args:
@@ -274,7 +274,7 @@ def compare(order: Order, episodes: int, tell: Tell) -> tuple[tuple[str, Episode
     return tuple(runs)
 
 
-def run_fork(order: Order, step: int, rest: Rest, tell: Tell) -> Fork:
+def run_fork(order: ReplayOrder, step: int, rest: Rest, tell: Tell) -> Fork:
     """Run the episode with what the shield changed at a step, and without it, and draw both.
 
     Args:
@@ -314,7 +314,7 @@ def run_fork(order: Order, step: int, rest: Rest, tell: Tell) -> Fork:
     return branched
 
 
-def movie(replay: Replay) -> bytes:
+def movie(replay: ReplayPair) -> bytes:
     """The replay as MP4."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "replay.mp4"

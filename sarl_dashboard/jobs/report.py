@@ -24,7 +24,7 @@ MOST_REPORTS = 8  # a report has about a megabyte
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class ReportOrder:
     """Everything that a report depends on.
 
     Attributes:
@@ -58,7 +58,7 @@ def report_cache() -> BoundedCache[Report]:
     return BoundedCache(MOST_REPORTS)
 
 
-def reporting(order: Order) -> Job[Report]:
+def reporting(order: ReportOrder) -> Job[Report]:
     """Make a report.
 
     Args:
@@ -68,7 +68,7 @@ def reporting(order: Order) -> Job[Report]:
     return Job(order.key, lambda job: _make(job, order, cache), 100)
 
 
-def _make(job: Job[Report], order: Order, cache: BoundedCache[Report]) -> None:
+def _make(job: Job[Report], order: ReportOrder, cache: BoundedCache[Report]) -> None:
     job.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
 
     def progress(done: int, total: int) -> bool:

@@ -268,8 +268,8 @@ def waiting_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 OTHER_RULES = RuleSet.load(DATA / "rules" / "cartpole_compact.json")
 
 
-def an_order(steps: int = 1000) -> learning.Order:
-    return learning.Order("CartPole-v1", None, (ARMS["none"],), steps, 1, "centre")
+def an_order(steps: int = 1000) -> learning.LearningOrder:
+    return learning.LearningOrder("CartPole-v1", None, (ARMS["none"],), steps, 1, "centre")
 
 
 @pytest.mark.usefixtures("waiting_process")

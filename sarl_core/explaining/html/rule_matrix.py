@@ -40,7 +40,7 @@ _INSET = 8.0  # percent of a cell beyond the range of the data, where open inter
 _OPEN = 1.5  # to here, so that bars of neighbours do not run into each other
 
 
-class Column(NamedTuple):
+class MatrixColumn(NamedTuple):
     """A feature that some rule asks about.
 
     Attributes:
@@ -82,7 +82,7 @@ class RuleMatrix:
     """
 
     rule_set: RuleSet
-    columns: tuple[Column, ...]
+    columns: tuple[MatrixColumn, ...]
     rules: tuple[Rule, ...]
 
     @property
@@ -139,7 +139,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     return RuleMatrix(
         rule_set,
         tuple(
-            Column(feature, features[feature], *_range(feature, rule_set, demonstrations))
+            MatrixColumn(feature, features[feature], *_range(feature, rule_set, demonstrations))
             for feature in asked
         ),
         (*placed, *others),
@@ -205,7 +205,7 @@ def _action(label: int, rule_set: RuleSet, dimension: int) -> str:
     return f"{action.name}: {label_text(label, action)}" if several else text
 
 
-class _Row(NamedTuple):
+class _MatrixRow(NamedTuple):
     """A rule, as the template draws it: a cell is its text and its style."""
 
     name: str
@@ -217,7 +217,7 @@ class _Row(NamedTuple):
     cells: list[tuple[str, str]]
 
 
-def _row(matrix: RuleMatrix, rule: Rule) -> _Row:
+def _row(matrix: RuleMatrix, rule: Rule) -> _MatrixRow:
     bars, colour = matrix.bars(rule), label_colour(rule.action)
     cells = [("", "")] * len(matrix.columns)
     for place, column in enumerate(matrix.columns):
@@ -229,7 +229,7 @@ def _row(matrix: RuleMatrix, rule: Rule) -> _Row:
     if rule.placed:
         action = f"{PLACED_MARK}{action}"
         name += ", by hand" if rule.origin == "manual" else ", pinned"
-    return _Row(
+    return _MatrixRow(
         name,
         action,
         colour,
@@ -240,7 +240,7 @@ def _row(matrix: RuleMatrix, rule: Rule) -> _Row:
     )
 
 
-def _scale_text(column: Column) -> str:
+def _scale_text(column: MatrixColumn) -> str:
     low = number_text(column.low, apart_from=column.high)
     high = number_text(column.high, apart_from=column.low)
     unit = f" {column.name.unit}" if column.name.unit else ""
@@ -267,7 +267,7 @@ def _range(
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 
-def _bar(bounds: Bounds, column: Column) -> Bar:
+def _bar(bounds: Bounds, column: MatrixColumn) -> Bar:
     def place(value: float) -> float:
         if math.isinf(value):
             return _OPEN if value < 0 else 100.0 - _OPEN

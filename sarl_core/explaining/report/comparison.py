@@ -15,7 +15,7 @@ from markupsafe import Markup
 from sarl_core.documents import parse_json
 from sarl_core.environments.failures import cannot_fail
 from sarl_core.errors import InputError, quoted
-from sarl_core.explaining.report.svg import MUTED, NEUTRAL, Scale, dot_and_interval
+from sarl_core.explaining.report.svg import MUTED, NEUTRAL, SvgScale, dot_and_interval
 from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import at_least_text, number_text, share_text
@@ -90,7 +90,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Row:
+class ResultRow:
     """A result as it is shown.
 
     Attributes:
@@ -123,7 +123,7 @@ class Compared:
 
     sentences: tuple[str, ...]
     headings: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[ResultRow, ...]
     ends: tuple[str, str]
 
 
@@ -206,7 +206,7 @@ def compared(results: Sequence[Result]) -> Compared | None:
     """
     if not results:
         return None
-    scale = Scale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
+    scale = SvgScale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
     more = [_more(one) for one in results]
     known = [
         place
@@ -397,9 +397,9 @@ def _more(one: Result) -> tuple[str, ...]:
     )
 
 
-def _row(one: Result, scale: Scale, more: tuple[str, ...]) -> Row:
+def _row(one: Result, scale: SvgScale, more: tuple[str, ...]) -> ResultRow:
     colour = MUTED if one.changed is None else NEUTRAL
-    return Row(
+    return ResultRow(
         name=one.name,
         picture=dot_and_interval(scale, one.iqm, one.low, one.high, colour=colour, zero=True),
         typical=number_text(one.iqm),

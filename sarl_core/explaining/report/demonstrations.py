@@ -55,7 +55,7 @@ class ActionShares:
 
 
 @dataclass(frozen=True)
-class FeatureLine:
+class FeatureSummary:
     """One number that the expert saw.
 
     Attributes:
@@ -88,7 +88,7 @@ class Shown:
     actions: tuple[ActionShares, ...]
     returns: Markup
     returns_text: str
-    features: tuple[FeatureLine, ...]
+    features: tuple[FeatureSummary, ...]
     notes: tuple[str, ...]
 
 
@@ -113,7 +113,7 @@ def shown(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> Sh
         returns=picture,
         returns_text=text,
         features=tuple(
-            FeatureLine(
+            FeatureSummary(
                 f"{row.name} ({row.unit})" if row.unit else row.name,
                 *(within(value, row) for value in (row.low, row.median, row.high)),
             )

@@ -77,7 +77,7 @@ class Beyond:
 
 
 @dataclass(frozen=True)
-class Gaps:
+class UncoveredSummary:
     """What the rules do not reach.
 
     Attributes:
@@ -100,7 +100,7 @@ def gaps(
     demonstrations: Demonstrations,
     tally: Tally,
     examples: Examples | None,
-) -> Gaps:
+) -> UncoveredSummary:
     """What the rules do not reach, and which of them are doubtful.
 
     Args:
@@ -113,7 +113,7 @@ def gaps(
         The part of the report.
     """
     boxed = any(rule.box is not None for rule in rule_set.rules)
-    return Gaps(
+    return UncoveredSummary(
         coverage=tuple(
             _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
         ),

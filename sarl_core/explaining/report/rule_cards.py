@@ -13,7 +13,7 @@ from markupsafe import Markup
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow
-from sarl_core.explaining.report.svg import Scale, evidence_bar, interval_bar
+from sarl_core.explaining.report.svg import SvgScale, evidence_bar, interval_bar
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.evidence import what_tells
 from sarl_core.mining.digits import value_text
@@ -276,7 +276,7 @@ def _condition(
     low = number_text(row.low, apart_from=row.high)
     high = number_text(row.high, apart_from=row.low)
     finite = [value for value in (bounds.low, bounds.high) if math.isfinite(value)]
-    scale = Scale.over([row.low, row.high, *finite], margin=0.04)
+    scale = SvgScale.over([row.low, row.high, *finite], margin=0.04)
     return ConditionRow(
         text,
         f"{low} to {high}{unit}",

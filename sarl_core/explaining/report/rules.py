@@ -20,7 +20,7 @@ _PRINTED_LINES = 150  # of the table; the file itself holds all
 
 
 @dataclass(frozen=True)
-class Line:
+class RuleLine:
     """A rule in a table.
 
     Attributes:
@@ -71,7 +71,7 @@ class Rules:
 
     introduction: tuple[str, ...]
     groups: tuple[Group, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[RuleLine, ...]
     printed: int
     left_out: int
 
@@ -182,9 +182,9 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
     return tuple(found)
 
 
-def _line(rule_set: RuleSet, index: int) -> Line:
+def _line(rule_set: RuleSet, index: int) -> RuleLine:
     rule = rule_set.rules[index]
-    return Line(
+    return RuleLine(
         name=rule_set.name_of(rule),
         action=action_text(rule.action, rule_set.actions[rule.dimension]),
         colour=label_colour(rule.action),

@@ -18,7 +18,7 @@ from sarl_core.explaining.templates import render
 NEUTRAL, BAD, MUTED = "var(--fill)", "var(--bad)", "var(--muted)"
 
 
-class Scale(NamedTuple):
+class SvgScale(NamedTuple):
     """Numbers from left to right.
 
     Attributes:
@@ -30,7 +30,7 @@ class Scale(NamedTuple):
     high: float
 
     @classmethod
-    def over(cls, values: Sequence[float], *, margin: float = 0.0) -> Scale:
+    def over(cls, values: Sequence[float], *, margin: float = 0.0) -> SvgScale:
         """The scale that shows all of some finite numbers.
 
         Args:
@@ -99,7 +99,7 @@ def evidence_bar(
 
 
 def interval_bar(
-    scale: Scale, data: tuple[float, float], asked: tuple[float, float], states: Sequence[float]
+    scale: SvgScale, data: tuple[float, float], asked: tuple[float, float], states: Sequence[float]
 ) -> Markup:
     """What a rule asks of a feature, against the data; said in words beside it.
 
@@ -157,7 +157,7 @@ def columns(
 
 
 def dot_and_interval(
-    scale: Scale, value: float, low: float, high: float, *, colour: str, zero: bool
+    scale: SvgScale, value: float, low: float, high: float, *, colour: str, zero: bool
 ) -> Markup:
     """A number and how sure one can be of it; said in words beside it.
 

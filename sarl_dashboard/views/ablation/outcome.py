@@ -9,13 +9,13 @@ from sarl_core.studies.ablation_run import AblationRecord
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.ablation import ablating
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.views.ablation.settings import Choice
+from sarl_dashboard.views.ablation.settings import AblationChoice
 from sarl_dashboard.views.ablation.table import show
 
 PLACE = Place[AblationRecord]("ablation")
 
 
-def outcome(choice: Choice) -> None:
+def outcome(choice: AblationChoice) -> None:
     """The button or the progress, and all that is known so far."""
     wanted = choice.wanted
 

@@ -33,7 +33,7 @@ RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class AblationChoice:
     """What was chosen.
 
     Attributes:
@@ -56,7 +56,7 @@ class Choice:
         return self.rules != OWN_FILE and demonstrated(row.env_id, row.seed, episodes)
 
 
-def settings() -> Choice:
+def settings() -> AblationChoice:
     """The widgets, and what they ask for.
 
     Raises:
@@ -134,4 +134,4 @@ def settings() -> Choice:
     notes_notice(check_environment(env_id, Shield(rule_set)).notes)
     row = Row("all rules", env_id, first, chosen, rule_set, projection, outside)
     wanted = Wanted(row, int(episodes or LEAST_EPISODES), int(most or 1))
-    return Choice(wanted, rules)
+    return AblationChoice(wanted, rules)

@@ -25,13 +25,13 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
 from sarl_dashboard.text import escaped
-from sarl_dashboard.views.ablation.settings import Choice
+from sarl_dashboard.views.ablation.settings import AblationChoice
 
 TABLE_ROWS = 14
 ROW_HEIGHT = 33  # pixels
 
 
-def show(ablation: Ablation, choice: Choice, *, at_work: bool) -> None:
+def show(ablation: Ablation, choice: AblationChoice, *, at_work: bool) -> None:
     """An ablation, as far as it is finished.
 
     Args:
@@ -90,7 +90,7 @@ def figure(ablation: Ablation) -> None:
     )
 
 
-def table(ablation: Ablation, choice: Choice) -> None:
+def table(ablation: Ablation, choice: AblationChoice) -> None:
     """All rules that were taken out; one can be chosen."""
     import pandas as pd
 

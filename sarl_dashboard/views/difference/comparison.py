@@ -30,7 +30,7 @@ EVERY = "all"
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RuleSetComparison:
     """Two rule sets, held against each other.
 
     Attributes:
@@ -75,7 +75,7 @@ def comparison() -> None:
         refuse(error)
 
 
-def _compare(first: Side, second: Side) -> Comparison:
+def _compare(first: Side, second: Side) -> RuleSetComparison:
     names = (first.name, second.name)
     if first.name == second.name:
         names = (f"{first.name} (first)", f"{second.name} (second)")
@@ -84,7 +84,7 @@ def _compare(first: Side, second: Side) -> Comparison:
         fits(first.rule_set, demonstrations) and fits(second.rule_set, demonstrations)
     ):
         demonstrations = None
-    return Comparison(first.rule_set, second.rule_set, demonstrations, names)
+    return RuleSetComparison(first.rule_set, second.rule_set, demonstrations, names)
 
 
 @cached(show_spinner="Comparing …")
@@ -100,7 +100,7 @@ def _disagreement(
 
 
 @cached(show_spinner="Writing the rules in plain language …")
-def _rules_frame(compared: Comparison, kinds: tuple[str, ...]) -> Any:
+def _rules_frame(compared: RuleSetComparison, kinds: tuple[str, ...]) -> Any:
     """The rules that differ, as a data frame."""
     import pandas as pd
 
@@ -112,7 +112,7 @@ def _rules_frame(compared: Comparison, kinds: tuple[str, ...]) -> Any:
 
 
 @cached()
-def _decisions(compared: Comparison, dimension: int) -> tuple[str, Any]:
+def _decisions(compared: RuleSetComparison, dimension: int) -> tuple[str, Any]:
     """What the two say of the states, as a table in HTML, and some states as a data frame."""
     import pandas as pd
 
@@ -138,7 +138,7 @@ def _headed(title: str, *paragraphs: str) -> str:
     return "\n\n".join([f"### {title}", *filter(None, paragraphs)])
 
 
-def _show_rules(compared: Comparison) -> None:
+def _show_rules(compared: RuleSetComparison) -> None:
     """Rules added, removed, changed."""
     disagreements = compared.disagreement
     st.markdown(
@@ -188,7 +188,7 @@ def _show_rules(compared: Comparison) -> None:
     )
 
 
-def _show_states(compared: Comparison) -> None:
+def _show_states(compared: RuleSetComparison) -> None:
     """The states that are decided differently."""
     disagreements = compared.disagreement
     random = (

@@ -35,7 +35,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class RuleSetEvidence:
     """The rules at the thresholds with everything that is known about them.
 
     Attributes:
@@ -57,11 +57,11 @@ class Evidence:
         return _findings(self.parts, self.rule_set)
 
 
-def chosen_evidence() -> Evidence:
+def chosen_evidence() -> RuleSetEvidence:
     """That of what is chosen; there are demonstrations."""
     parts = data_parts()
     assert parts is not None
-    return Evidence(parts, rules_at())
+    return RuleSetEvidence(parts, rules_at())
 
 
 @cached(show_spinner="Weighing the evidence …")

@@ -12,12 +12,12 @@ from sarl_core.mining.validation.learning_curve import MiningCurve, learning_cur
 from sarl_core.progress import Progress
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.worked_out import worked_out
-from sarl_dashboard.views.evidence.evidence import Evidence
+from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
 ORDERS = 6
 
 
-def show_curve(evidence: Evidence) -> None:
+def show_curve(evidence: RuleSetEvidence) -> None:
     """What rules of fewer episodes would have been."""
     parts = evidence.parts
     if parts.mined.n_episodes < 2:

@@ -12,11 +12,11 @@ from sarl_core.explaining.tables.evidence import enough_columns
 from sarl_core.explaining.words.evidence import never_text
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
-from sarl_dashboard.views.evidence.evidence import Evidence
+from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
 
 @cached()
-def _enough(evidence: Evidence) -> Any:
+def _enough(evidence: RuleSetEvidence) -> Any:
     import pandas as pd
 
     findings = evidence.findings
@@ -32,7 +32,7 @@ def _enough(evidence: Evidence) -> Any:
     return pd.DataFrame(columns)
 
 
-def show_enough(evidence: Evidence) -> None:
+def show_enough(evidence: RuleSetEvidence) -> None:
     """How many more episodes each rule would take."""
     findings = evidence.findings
     if findings.judged is None:

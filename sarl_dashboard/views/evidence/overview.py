@@ -21,7 +21,7 @@ from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.language import share_text
 from sarl_core.mining.validation.holding_out import Verdict, shortfall
 from sarl_dashboard.cache import cached
-from sarl_dashboard.views.evidence.evidence import Evidence
+from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
 MOST_DRAWN = 600
 MEANINGS: tuple[tuple[Verdict, str], ...] = (
@@ -33,12 +33,12 @@ MEANINGS: tuple[tuple[Verdict, str], ...] = (
 
 
 @cached()
-def _overview(evidence: Evidence) -> Markup:
+def _overview(evidence: RuleSetEvidence) -> Markup:
     findings = evidence.findings
     return overview_plot(findings.rules[:MOST_DRAWN], evidence.rule_set, findings.threshold)
 
 
-def show_overview(evidence: Evidence) -> None:
+def show_overview(evidence: RuleSetEvidence) -> None:
     """All rules with what is known of them, and how many reach the minimum confidence."""
     findings = evidence.findings
     judged = findings.judged

@@ -15,12 +15,12 @@ from sarl_core.mining.validation.stability import SAME_RULE, Stability, rule_sta
 from sarl_core.progress import Progress
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
-from sarl_dashboard.views.evidence.evidence import Evidence
+from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
 TABLE_ROWS = 12
 
 
-def show_stability(evidence: Evidence) -> None:
+def show_stability(evidence: RuleSetEvidence) -> None:
     """How often each rule comes back."""
     mined = evidence.parts.mined
     if not evidence.rule_set.rules or mined.n_episodes < 2:

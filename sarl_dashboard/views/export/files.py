@@ -20,7 +20,7 @@ from sarl_core.shielding.projection import Projection
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.export.settings import Settings
+from sarl_dashboard.views.export.settings import ExportSettings
 
 LINES = 120
 
@@ -57,7 +57,7 @@ def vectors_of(rule_set: RuleSet, projection: Projection) -> bytes:
     return export_vectors(rule_set, projection)
 
 
-def show_file(rule_set: RuleSet, settings: Settings) -> None:
+def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
     """The file: its beginning, and the downloads.
 
     Args:

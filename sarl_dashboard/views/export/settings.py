@@ -44,7 +44,7 @@ FORMATS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class ExportSettings:
     """What is exported, and how.
 
     Attributes:
@@ -95,7 +95,7 @@ def chosen_rules() -> RuleSet:
     return rule_set
 
 
-def settings() -> Settings:
+def settings() -> ExportSettings:
     """The box of settings."""
     with st.container(border=True):
         left, middle, right = st.columns([4, 5, 3], gap="medium")
@@ -130,4 +130,4 @@ def settings() -> Settings:
                 help="Several conditions on one feature become one interval, and each rule stands "
                 "by itself: easier to read, slower to execute",
             )
-    return Settings(rule_set, form, projection, rounded, merged)
+    return ExportSettings(rule_set, form, projection, rounded, merged)

@@ -13,19 +13,19 @@ from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
-from sarl_dashboard.jobs.improving import Order
+from sarl_dashboard.jobs.improving import ImprovementOrder
 from sarl_dashboard.state.agents import agent_for, has_expert
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, data_parts, upload_name
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.mined import grown_trees, mined_rules
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_thresholds
-from sarl_dashboard.views.improve.settings import AT_THRESHOLDS, MOST, NOBODY, Choices
+from sarl_dashboard.views.improve.settings import AT_THRESHOLDS, MOST, NOBODY, ImproveChoices
 
 GAPS_SEEDS_A_RUN = MOST
 
 
-def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
+def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> ImprovementOrder:
     """What the choices ask for.
 
     Args:
@@ -66,10 +66,12 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         seed=choices.seed,
     )
     command = command_for(choices, demonstrations, env_id, thresholds)
-    return Order(demonstrations, env_id, plan, expert, None, command)
+    return ImprovementOrder(demonstrations, env_id, plan, expert, None, command)
 
 
-def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) -> Order:
+def gaps_order(
+    choices: ImproveChoices, demonstrations: Demonstrations, env_id: str
+) -> ImprovementOrder:
     """Which states need a demonstration, at the thresholds in force."""
     trees = grown_trees(demonstrations, choices.divider)
     rules = mined_rules(trees, chosen_thresholds(), data_parts())
@@ -81,11 +83,14 @@ def gaps_order(choices: Choices, demonstrations: Demonstrations, env_id: str) ->
         divider=choices.divider,
         seed=FRESH + choices.seed * GAPS_SEEDS_A_RUN,
     )
-    return Order(demonstrations, env_id, plan, None, rules, "")
+    return ImprovementOrder(demonstrations, env_id, plan, None, rules, "")
 
 
 def command_for(
-    choices: Choices, demonstrations: Demonstrations, env_id: str, thresholds: Thresholds | None
+    choices: ImproveChoices,
+    demonstrations: Demonstrations,
+    env_id: str,
+    thresholds: Thresholds | None,
 ) -> str:
     """The same on the command line, for the card."""
     name = chosen_dataset()

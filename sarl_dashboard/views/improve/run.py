@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
-from sarl_dashboard.jobs.improving import Order, Outcome, improving, outcome_cache
+from sarl_dashboard.jobs.improving import ImprovementOrder, Outcome, improving, outcome_cache
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.views.improve.outcome import show_outcome
 from sarl_dashboard.views.improve.shipped import show_shipped
@@ -15,7 +15,7 @@ PLACE = Place[Outcome](
 )
 
 
-def run_of(order: Order | None) -> None:
+def run_of(order: ImprovementOrder | None) -> None:
     """The button or the progress, and what is known so far.
 
     Args:
@@ -40,7 +40,9 @@ def run_of(order: Order | None) -> None:
     watched(PLACE, outcome)
 
 
-def offer_of(order: Order, latest: Outcome | None, finished: Outcome | None) -> Offer[Outcome]:
+def offer_of(
+    order: ImprovementOrder, latest: Outcome | None, finished: Outcome | None
+) -> Offer[Outcome]:
     """What the button begins.
 
     Args:
@@ -60,7 +62,7 @@ def offer_of(order: Order, latest: Outcome | None, finished: Outcome | None) -> 
     )
 
 
-def what_it_does(order: Order) -> str:
+def what_it_does(order: ImprovementOrder) -> str:
     """Beside the button."""
     plan = order.plan
     if order.rules is not None:

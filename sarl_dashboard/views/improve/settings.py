@@ -21,7 +21,7 @@ MOST_ROUNDS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
+class ImproveChoices:
     """What the widgets say."""
 
     env: str | None
@@ -43,7 +43,7 @@ def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> 
     return int(usual if value is None else value)
 
 
-def settings(demonstrations: Demonstrations) -> Choices:
+def settings(demonstrations: Demonstrations) -> ImproveChoices:
     """The widgets."""
     expert = st.session_state.get("expert") or st.query_params.get("expert")
     is_asked = expert != NOBODY
@@ -128,7 +128,7 @@ def settings(demonstrations: Demonstrations) -> Choices:
                 )
         if expert == OWN_FILE:
             policy_file = policy_upload("The expert", "expert_file", env)
-    return Choices(
+    return ImproveChoices(
         env,
         expert,
         policy_file,

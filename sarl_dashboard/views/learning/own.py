@@ -10,7 +10,7 @@ from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.jobs.learning import Order, learning, study_of
+from sarl_dashboard.jobs.learning import LearningOrder, learning, study_of
 from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.settings import settings
 from sarl_dashboard.views.learning.study import archive, show_curves, show_study
@@ -58,7 +58,7 @@ def show_own() -> None:
     watched(PLACE, outcome, seconds=LOOK_SECONDS)
 
 
-def begun(order: Order | None) -> LearningStudy | None:
+def begun(order: LearningOrder | None) -> LearningStudy | None:
     """What there is of a study; why it cannot be read is said."""
     if order is None:
         return None
@@ -69,7 +69,7 @@ def begun(order: Order | None) -> LearningStudy | None:
         return None
 
 
-def offer_of(order: Order, study: LearningStudy | None) -> Offer[LearningStudy]:
+def offer_of(order: LearningOrder, study: LearningStudy | None) -> Offer[LearningStudy]:
     """What the button starts, or goes on with.
 
     Args:
@@ -91,7 +91,7 @@ def offer_of(order: Order, study: LearningStudy | None) -> Offer[LearningStudy]:
     )
 
 
-def downloads(order: Order, study: LearningStudy) -> None:
+def downloads(order: LearningOrder, study: LearningStudy) -> None:
     """What was learned, to take away."""
     with st.container(horizontal=True, vertical_alignment="bottom"):
         run = st.selectbox(

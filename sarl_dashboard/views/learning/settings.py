@@ -9,7 +9,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.study import LearningPlan
 from sarl_dashboard.components.settings import notes_notice
-from sarl_dashboard.jobs.learning import Order
+from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.environments import environment_of, registered
 from sarl_dashboard.state.rule_choice import rules_for
@@ -19,7 +19,7 @@ from sarl_dashboard.text import refuse
 MOST_STEPS, MOST_SEEDS = 500_000, 5
 
 
-def settings() -> Order | None:
+def settings() -> LearningOrder | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
     with st.container(border=True):
         discrete = is_discrete()
@@ -106,7 +106,7 @@ def settings() -> Order | None:
     except SarlError as error:
         refuse(error)
         return None
-    return Order(env_id, rule_set, chosen, int(steps), int(seeds), projection)
+    return LearningOrder(env_id, rule_set, chosen, int(steps), int(seeds), projection)
 
 
 def is_discrete() -> bool:

@@ -22,14 +22,14 @@ from sarl_dashboard.components.run_bar import waited_for
 from sarl_dashboard.jobs.replays import (
     EPISODES,
     WITH,
-    Order,
+    ReplayOrder,
     compare,
     compared,
     comparison_cache,
 )
 
 
-def comparison(order: Order) -> None:
+def comparison(order: ReplayOrder) -> None:
     """Several episodes instead of one, on request."""
     st.subheader("Over several episodes")
     ran = compared(order)

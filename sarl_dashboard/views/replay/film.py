@@ -8,15 +8,15 @@ import streamlit as st
 
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import no_boxes_notice, notes_notice
-from sarl_dashboard.jobs.replays import Replay, movie
+from sarl_dashboard.jobs.replays import ReplayPair, movie
 from sarl_dashboard.state.agents import FRESH_SEED
 from sarl_dashboard.state.environments import demonstrated
 from sarl_dashboard.state.rule_files import NO_RULES, OWN_FILE
 from sarl_dashboard.text import escaped
-from sarl_dashboard.views.replay.settings import Settings
+from sarl_dashboard.views.replay.settings import ReplaySettings
 
 
-def headline(replay: Replay, settings: Settings) -> None:
+def headline(replay: ReplayPair, settings: ReplaySettings) -> None:
     """Whose episode it is, and what should be known about it.
 
     Args:
@@ -38,7 +38,7 @@ def headline(replay: Replay, settings: Settings) -> None:
     no_boxes_notice([] if rule_set is None else [rule_set], order.outside)
 
 
-def film(replay: Replay) -> None:
+def film(replay: ReplayPair) -> None:
     """The episode as a film, and the film as files."""
     order = replay.order
     if order.rules not in (OWN_FILE, NO_RULES) and demonstrated(order.env_id, order.seed, 1):

@@ -6,13 +6,13 @@ import streamlit as st
 
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rules import UNFILTERED
-from sarl_dashboard.jobs.replays import Replay
+from sarl_dashboard.jobs.replays import ReplayPair
 from sarl_dashboard.state.rule_files import CHOSEN
 
 FEW = 0.3  # share of the steps below which the rules say little about an episode
 
 
-def numbers(replay: Replay) -> None:
+def numbers(replay: ReplayPair) -> None:
     """Returns, lengths and interventions."""
     plain, shielded = replay.plain, replay.shielded
     alone = float(plain.returns[0])
@@ -73,7 +73,7 @@ def numbers(replay: Replay) -> None:
         )
 
 
-def _unfiltered_differ(replay: Replay) -> bool:
+def _unfiltered_differ(replay: ReplayPair) -> bool:
     """Whether the rules were filtered, from demonstrations that are at hand."""
     return (
         replay.order.rules in (CHOSEN, "filtered")

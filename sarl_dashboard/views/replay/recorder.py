@@ -28,7 +28,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.jobs.replays import Played, Replay, compared, comparison_cache
+from sarl_dashboard.jobs.replays import Played, ReplayPair, compared, comparison_cache
 from sarl_dashboard.views.replay.run import jump_to
 
 CHANGED, OUTSIDE = "changed by the rules", "outside the data"
@@ -46,7 +46,7 @@ class Recorded:
         on_screen: Which of them is on screen.
     """
 
-    replay: Replay
+    replay: ReplayPair
     episodes: Episodes
     on_screen: int
 

@@ -9,8 +9,8 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.run_bar import waited_for
 from sarl_dashboard.jobs.replays import (
-    Order,
     Played,
+    ReplayOrder,
     compared,
     latest_order,
     replay_cache,
@@ -18,7 +18,7 @@ from sarl_dashboard.jobs.replays import (
     show_next,
 )
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.replay.settings import Settings
+from sarl_dashboard.views.replay.settings import ReplaySettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Jump:
         step: In it.
     """
 
-    order: Order
+    order: ReplayOrder
     step: int
 
 
@@ -54,7 +54,7 @@ def chosen_jump() -> Jump | None:
     return Jump(comparison[0].of_seed(seed), step)
 
 
-def run_bar(settings: Settings, jump: Jump | None) -> None:
+def run_bar(settings: ReplaySettings, jump: Jump | None) -> None:
     """The button; what it asks for, or a jump, becomes the latest replay."""
     started = st.button("Run", type="primary", icon=":material/play_arrow:", key="run")
     if jump is None and not started and not st.session_state.pop("_run", False):

@@ -19,7 +19,7 @@ from sarl_dashboard.components.settings import (
     outside_choice,
     projection_choice,
 )
-from sarl_dashboard.jobs.replays import Order
+from sarl_dashboard.jobs.replays import ReplayOrder
 from sarl_dashboard.state.agents import (
     AGENTS,
     FRESH_SEED,
@@ -37,7 +37,7 @@ RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class ReplaySettings:
     """What the widgets say; what it asks for is put together when it is needed."""
 
     env: str | None
@@ -49,7 +49,7 @@ class Settings:
     projection: Projection
     outside: Outside
 
-    def order(self) -> Order:
+    def order(self) -> ReplayOrder:
         """What is asked for.
 
         Raises:
@@ -63,7 +63,7 @@ class Settings:
         description = named_description(
             describe_environment(env_id), rule_set, chosen_demonstrations()
         )
-        return Order(
+        return ReplayOrder(
             env_id,
             agent,
             self.rules,
@@ -74,7 +74,7 @@ class Settings:
             description,
         )
 
-    def ask_for(self, order: Order) -> bool:
+    def ask_for(self, order: ReplayOrder) -> bool:
         """Whether they still ask for what is on screen."""
         try:
             return self.order().key == order.key
@@ -82,7 +82,7 @@ class Settings:
             return False
 
 
-def settings() -> Settings:
+def settings() -> ReplaySettings:
     """The widgets."""
     with st.container(border=True):
         in_a_row = 6 if continuous(st.session_state.get("env")) else 5
@@ -126,4 +126,6 @@ def settings() -> Settings:
             policy_file = policy_upload("Policy", "policy_file", env)
         if rules == OWN_FILE:
             rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
-    return Settings(env, agent, policy_file, rules, rule_file, int(seed or 0), projection, outside)
+    return ReplaySettings(
+        env, agent, policy_file, rules, rule_file, int(seed or 0), projection, outside
+    )

@@ -27,7 +27,7 @@ from sarl_core.mining.language import counted, label_text, number_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
 from sarl_dashboard.components.chart import chart
-from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, Replay
+from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
 from sarl_dashboard.state.compact_set import SHOWN_AS
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
@@ -170,7 +170,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
             replay.png(step)
 
 
-def changes(replay: Replay, current: int, mark: str) -> None:
+def changes(replay: ReplayPair, current: int, mark: str) -> None:
     """Ways to the changes before and after a step, and how many there are.
 
     Args:

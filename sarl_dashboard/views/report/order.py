@@ -12,7 +12,7 @@ from sarl_core.explaining.report.report import Wishes
 from sarl_core.explaining.report.tally import report_rules
 from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.jobs.report import Order, as_results, comparison_of_session
+from sarl_dashboard.jobs.report import ReportOrder, as_results, comparison_of_session
 from sarl_dashboard.state.data import (
     UPLOAD,
     chosen_dataset,
@@ -22,7 +22,7 @@ from sarl_dashboard.state.data import (
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
-from sarl_dashboard.views.report.settings import Choices
+from sarl_dashboard.views.report.settings import ReportChoices
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Named:
     results: tuple[str, ...]
 
 
-def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
+def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOrder:
     """What the choices ask for.
 
     Args:
@@ -62,11 +62,11 @@ def order_of(choices: Choices, demonstrations: Demonstrations) -> Order:
         trees = grown_trees(demonstrations, rule_set.divider)
     # The card of the shipped compact rules says how they came about.
     card = read_card(compact_file()) if choices.rules == COMPACT else None
-    return Order(rule_set, demonstrations, wishes, card, results, trees)
+    return ReportOrder(rule_set, demonstrations, wishes, card, results, trees)
 
 
 def results_of_choices(
-    choices: Choices, demonstrations: Demonstrations
+    choices: ReportChoices, demonstrations: Demonstrations
 ) -> tuple[tuple[Result, ...], tuple[str, ...]]:
     """The results to show, and the names of their files."""
     results: list[Result] = []
@@ -85,7 +85,7 @@ def results_of_choices(
     return tuple(results), tuple(names)
 
 
-def file_names(choices: Choices) -> tuple[str, str]:
+def file_names(choices: ReportChoices) -> tuple[str, str]:
     """Of the rules and of the demonstrations, as the command line would name them."""
     name = chosen_dataset()
     data = f"data/demonstrations/{name}.parquet"
@@ -100,7 +100,7 @@ def file_names(choices: Choices) -> tuple[str, str]:
 
 
 def commands(
-    choices: Choices, rule_set: RuleSet, demonstrations: Demonstrations, named: Named
+    choices: ReportChoices, rule_set: RuleSet, demonstrations: Demonstrations, named: Named
 ) -> tuple[str, ...]:
     """How the report is made again; () where a file alone does not hold what it is made of."""
     raw = raw_demonstrations()

@@ -11,14 +11,14 @@ from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.jobs.report import Order, report_cache, reporting
+from sarl_dashboard.jobs.report import ReportOrder, report_cache, reporting
 from sarl_dashboard.text import escaped
 
 PLACE = Place[Report]("report")
 PREVIEW = 900  # pixels
 
 
-def report_of(order: Order, name: str) -> None:
+def report_of(order: ReportOrder, name: str) -> None:
     """The button or the progress, and the report.
 
     Args:

@@ -15,7 +15,7 @@ RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
+class ReportChoices:
     """What the widgets say."""
 
     rules: str
@@ -26,7 +26,7 @@ class Choices:
     files: list[UploadedFile]
 
 
-def settings(has_comparison: bool) -> Choices:
+def settings(has_comparison: bool) -> ReportChoices:
     """The widgets.
 
     Args:
@@ -81,4 +81,4 @@ def settings(has_comparison: bool) -> Choices:
                 accept_multiple_files=True,
                 key="report_results",
             )
-    return Choices(rules, rule_file, int(in_full or 0), int(frames or 0), with_session, files)
+    return ReportChoices(rules, rule_file, int(in_full or 0), int(frames or 0), with_session, files)

@@ -16,7 +16,7 @@ from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, ChosenAgent, agent_
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.shield.settings import NO_SHIELD, Choices
+from sarl_dashboard.views.shield.settings import NO_SHIELD, ShieldChoices
 
 # Their places give them their colours, the paper's where it has them.
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
@@ -24,7 +24,7 @@ RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE, EDITED)
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class ShieldLine:
     """One agent with one shield.
 
     Attributes:
@@ -66,7 +66,7 @@ def free_name(name: str, taken: Sequence[str]) -> str:
     return next(each for each in names if each not in taken)
 
 
-def pilots(choices: Choices, env_id: str) -> list[Pilot]:
+def pilots(choices: ShieldChoices, env_id: str) -> list[Pilot]:
     """The chosen agents.
 
     Raises:
@@ -89,7 +89,7 @@ def pilots(choices: Choices, env_id: str) -> list[Pilot]:
     return chosen
 
 
-def guards(choices: Choices) -> list[Guard]:
+def guards(choices: ShieldChoices) -> list[Guard]:
     """The chosen shields that can be had; why the others cannot is said."""
     chosen: list[Guard] = []
     problems: list[str] = []
@@ -111,12 +111,12 @@ def guards(choices: Choices) -> list[Guard]:
     return chosen
 
 
-def line(choices: Choices, env_id: str, pilot: Pilot, guard: Guard) -> Line:
+def line(choices: ShieldChoices, env_id: str, pilot: Pilot, guard: Guard) -> ShieldLine:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
     outside: Outside = choices.outside if guard.rules is not None else "act"
     name = f"{pilot.name}, {guard.name}"
-    return Line(
+    return ShieldLine(
         Row(name, env_id, choices.seed, pilot.agent, guard.rules, projection, outside),
         Arm(name, pilot.name, guard.rules, projection, outside=outside),
         arm_style(pilot.place, guard.place),

@@ -30,7 +30,7 @@ MOST_EPISODES = 1_000
 
 
 @dataclass(frozen=True, eq=False)
-class Choices:
+class ShieldChoices:
     """What the widgets say."""
 
     env: str | None
@@ -49,7 +49,7 @@ class Choices:
         return any(name not in (NO_SHIELD, OWN_FILE) for name in self.shields)
 
 
-def settings() -> Choices:
+def settings() -> ShieldChoices:
     """The widgets."""
     with st.container(border=True):
         in_a_row = 5 if continuous(st.session_state.get("env")) else 4
@@ -109,7 +109,7 @@ def settings() -> Choices:
         rule_file = None
         if OWN_FILE in shields:
             rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
-    return Choices(
+    return ShieldChoices(
         env,
         int(episodes or 1),
         int(seed or 0),

@@ -20,15 +20,15 @@ from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
-from sarl_dashboard.views.shield.lines import Line
+from sarl_dashboard.views.shield.lines import ShieldLine
 
 HEIGHT = 400
 ROW = 46  # pixels a row of the first figure
 
-Finished = Sequence[tuple[Line, Episodes]]
+Finished = Sequence[tuple[ShieldLine, Episodes]]
 
 
-def comparison_of(lines: Sequence[Line], episodes: int) -> None:
+def comparison_of(lines: Sequence[ShieldLine], episodes: int) -> None:
     """The button or the progress, and all that is known so far.
 
     Args:
@@ -208,7 +208,7 @@ def column_config(env_id: str) -> dict[str, Any]:
     }
 
 
-def table_row(line: Line, episodes: Episodes) -> dict[str, Any]:
+def table_row(line: ShieldLine, episodes: Episodes) -> dict[str, Any]:
     """What the table says of a line."""
     numbers, summary, failures = episodes.statistics, episodes.summary(), episodes.failures
     rules = line.arm.rules

@@ -21,14 +21,14 @@ from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.run_bar import episodes_bar, watched
-from sarl_dashboard.jobs.episodes import Batch, Row, known
+from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.state.agents import FRESH_SEED, ChosenAgent, agent_for, has_expert
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.text import escaped, in_full
 
-PLACE = Place[Batch]("divider")
+PLACE = Place[EpisodeBatch]("divider")
 MOST_EPISODES = 200
 
 Divided = tuple[tuple[Quantisation, ...], ...]
