@@ -248,7 +248,7 @@ def test_repr_shows_shapes() -> None:
 
 
 @pytest.mark.parametrize("space", SPACES)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_rebuilding_changes_nothing(space: str, data: st.DataObject) -> None:
     got = data.draw(demonstrations(space))

@@ -133,7 +133,7 @@ def test_environment_of_a_file_that_is_not_there_any_more(
     assert capfd.readouterr() == ("", "")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(metadata=_metadata, env_id=st.sampled_from([None, "CartPole-v1"]))
 def test_any_metadata(metadata: dict[str, Any], env_id: str | None) -> None:
     text = json.dumps(metadata)
@@ -162,7 +162,7 @@ _name = st.sampled_from(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(
     names=st.lists(_name, max_size=5),
     rows=st.lists(st.lists(_field, max_size=5), max_size=5),

@@ -49,7 +49,7 @@ def saved(original: Demonstrations, name: str) -> Demonstrations:
 
 @pytest.mark.parametrize("extension", ["parquet", "npz"])
 @pytest.mark.parametrize("space", SPACES)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_everything_survives(extension: str, space: str, data: st.DataObject) -> None:
     original = data.draw(demonstrations(space))
@@ -60,7 +60,7 @@ def test_everything_survives(extension: str, space: str, data: st.DataObject) ->
 
 
 @pytest.mark.parametrize("space", SPACES)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_columns_survive_csv(space: str, data: st.DataObject) -> None:
     original = data.draw(demonstrations(space))

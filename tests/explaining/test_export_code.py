@@ -150,7 +150,7 @@ def test_every_vector_and_fifty_thousand_states(
 
 
 @given(st.integers(0, 10_000), st.integers(1, 25), st.booleans())
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_any_rules_in_any_order(seed: int, count: int, by_hand: bool) -> None:
     rng = np.random.default_rng(seed)
     rules = tuple(

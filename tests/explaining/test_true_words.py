@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -151,7 +151,6 @@ def applies_to(rule: Rule, demonstrations: Demonstrations) -> list[bool]:
     return rule.applies(demonstrations.observations).tolist()
 
 
-@settings(deadline=None)
 @given(demonstrations_of_any_scale())
 def test_a_sentence_read_back_selects_the_states_of_the_rule(
     demonstrations: Demonstrations,
@@ -173,7 +172,6 @@ def test_a_sentence_read_back_selects_the_states_of_the_rule(
                 assert told(in_words(drawn), words, count).tolist() == own, drawn
 
 
-@settings(deadline=None)
 @given(demonstrations_of_any_scale(), st.integers(0, 10**6))
 def test_a_condition_and_the_value_beside_it_agree(
     demonstrations: Demonstrations, pick: int

@@ -34,7 +34,7 @@ def test_the_best_of_many_is_found_although_single_episodes_deceive():
     assert found.means[found.best] == pytest.approx(means[found.best], abs=0.3)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.integers(1, 30), st.integers(1, 20), st.integers(1, 90))
 def test_the_plan_is_what_is_run(candidates, first, most):
     calls = []

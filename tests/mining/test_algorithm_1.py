@@ -66,7 +66,7 @@ def expect_cell(landscape, i, j, rules, steps):
         assert np.isnan(landscape.fidelity[i, j])
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     labelled_states(),
     THRESHOLDS,
@@ -86,7 +86,7 @@ def test_random_trees_give_the_oracles_rules(demonstrations, supp, conf, lift, d
     assert len(mined.rules) == len(wanted)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(max_steps=30), st.sampled_from([0.0, 1.1]), st.sampled_from([None, 2]))
 def test_random_landscapes_are_the_oracle_in_every_cell_edges_included(demonstrations, lift, depth):
     trees = grow_policy_trees(demonstrations)
@@ -138,7 +138,7 @@ def test_shipped_landscapes_on_the_papers_grid(name):
             expect_cell(landscape, i, j, rules, len(labels))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(labelled_states(), THRESHOLDS, THRESHOLDS)
 def test_rules_are_disjoint_and_cover_every_pure_leaf_when_unfiltered(demonstrations, supp, conf):
     rules = mine_rules(demonstrations, supp_min=supp, conf_min=conf).rules
@@ -153,7 +153,7 @@ def test_rules_are_disjoint_and_cover_every_pure_leaf_when_unfiltered(demonstrat
         assert covered[tree.rows(leaf)].all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(labelled_states(), THRESHOLDS, THRESHOLDS)
 def test_nothing_changes_before_the_next_change_and_something_at_it(demonstrations, supp, conf):
     trees = grow_policy_trees(demonstrations)
@@ -186,7 +186,7 @@ def test_nothing_changes_before_the_next_change_and_something_at_it(demonstratio
             assert at(0.0) == here
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(max_steps=25))
 def test_the_pareto_front_is_what_trying_everything_finds(demonstrations):
     trees = grow_policy_trees(demonstrations)

@@ -16,7 +16,7 @@ from sarl_core.mining.tree import LEAF, TreeStructure
 from tests.mining.strategies import labelled_states
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(), st.integers(2, 12))
 def test_every_state_has_one_rule_and_the_budget_holds(demonstrations, budget):
     trees = grow_budgeted_trees(demonstrations, max_rules=budget)
@@ -117,7 +117,7 @@ def test_queries_that_change_nothing_are_taken_out():
     assert len(alike.feature) == 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(labelled_states(), st.integers(2, 9))
 def test_a_tree_is_put_together_again_under_the_same_numbers(demonstrations, budget):
     trees = grow_budgeted_trees(demonstrations, max_rules=budget)

@@ -39,7 +39,7 @@ def test_probabilities_are_the_shares_at_the_rule_that_applies():
     assert model.predict([[0.0], [1.0]]).tolist() == ["stay", "go"]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(), st.floats(0, 1), st.floats(0, 1))
 def test_what_is_predicted_is_the_most_probable(demonstrations, supp, conf):
     states = demonstrations.observations

@@ -29,7 +29,7 @@ def crowded(draw):
     return Demonstrations(states, rng.integers(0, 2, (n, 2)), episodes)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(crowded(), st.sampled_from([0.0, 0.1, 1.0]))
 def test_every_pair_of_states_was_looked_at(demonstrations, reach):
     found = find_contradictions(demonstrations, reach=reach)

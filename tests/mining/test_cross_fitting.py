@@ -167,7 +167,7 @@ def test_numbers_part_where_one_lies_clearly_lower(mined, elsewhere, expected):
 # --- counts at the nodes, and influence -----------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(), st.integers(1, 6), st.integers(0, 2**16))
 def test_nodes_are_counted_in_every_episode(demonstrations, episodes, seed):
     tree = grow_policy_trees(demonstrations)[0]
@@ -192,7 +192,7 @@ def test_nodes_are_counted_in_every_episode(demonstrations, episodes, seed):
     assert (counts.samples > 0).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(st.integers(0, 50), st.floats(0, 1)), min_size=1, max_size=12),
     st.sampled_from(["episodes", "states"]),

@@ -163,7 +163,7 @@ EDITS = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(EDITS, max_size=12))
 def test_every_step_is_undone_and_redone(edits):
     history = History()
@@ -182,7 +182,7 @@ def test_every_step_is_undone_and_redone(edits):
     assert history.edits == tuple(edits)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(EDITS, max_size=12))
 def test_no_edit_loses_or_doubles_a_rule_that_was_mined(edits):
     for rule_set in (FINE, COARSE):

@@ -30,7 +30,7 @@ def expect_boxes(rule_set, demonstrations):
         assert (np.diff(ordered, axis=0) >= 0).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(labelled_states())
 def test_boxes_of_random_rules_are_the_quantiles_of_their_states(demonstrations):
     for conf_min in (0.5, 1.0):

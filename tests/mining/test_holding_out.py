@@ -300,7 +300,7 @@ def low_end(n, share, spread):
     return mean - stats.t.ppf(0.975, n) * (squares / n / (n + 1)) ** 0.5
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.3, 1.0), st.floats(0.0, 0.2), st.floats(0.02, 0.98))
 def test_episodes_needed_is_the_first_number_whose_lower_end_passes(share, spread, threshold):
     needed = float(episodes_needed(np.array([share]), np.array([spread]), threshold)[0])
@@ -336,7 +336,7 @@ def test_where_both_ends_are_cut_off_the_most_uneven_is_assumed():
 # --- the landscape --------------------------------------------------------------------------------
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(labelled_states(), st.sampled_from([0.0, 1.1]), st.sampled_from([None, 2]))
 def test_the_landscapes_layer_is_what_mining_every_cell_counts(demonstrations, lift, depth):
     parted = in_episodes(demonstrations, 13)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -57,7 +57,6 @@ def test_every_dimension_is_divided_on_its_own() -> None:
     assert (first[0].width, second[0].width) == (2.0, 8.0)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.floats(-1.0, 1.0, width=32), min_size=2, max_size=60),
     st.integers(2, 12),

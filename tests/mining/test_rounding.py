@@ -72,7 +72,7 @@ def test_the_nearest_of_the_shortest(
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6), st.floats(0, 1))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_no_shorter_number_would_do(one: int, other: int, share: float) -> None:
     below, above = (float(np.float32(count / 997)) for count in sorted((one, other)))
     threshold = below + share * (above - below)

@@ -26,7 +26,7 @@ def read(document):
     return rules_from_json(json.dumps(document), name="rules.json")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states(), st.floats(0, 1), st.floats(0, 1))
 def test_what_is_written_is_read(demonstrations, supp, conf):
     rules = mine_rules(demonstrations, supp_min=supp, conf_min=conf)
@@ -330,7 +330,7 @@ def places(value, path=()):
             yield from places(entry, (*path, index))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data())
 def test_whatever_stands_in_a_file_is_read_or_refused_in_a_sentence(document, data):
     copy = json.loads(json.dumps(document))

@@ -92,7 +92,7 @@ def test_a_path_as_text_is_a_path(rules: RuleSet, tmp_path: Path) -> None:
         load_rules(str(tmp_path / "none.json"))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(labelled_states(), st.floats(0, 1), st.floats(0, 1))
 def test_equal_rules_have_equal_digests_after_saving_too(
     demonstrations: Demonstrations, supp: float, conf: float
@@ -141,7 +141,7 @@ SET_CHANGES: dict[str, Callable[[RuleSet], Any]] = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data())
 def test_whatever_changes_changes_the_digest(rules: RuleSet, data: st.DataObject) -> None:
     assert list(RULE_CHANGES) == [field.name for field in fields(Rule)]

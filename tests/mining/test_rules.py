@@ -25,7 +25,7 @@ def test_a_state_on_the_threshold_goes_left():
     assert rule((0, ">", 1.0)).applies(states).tolist() == [False, True]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states())
 def test_measures_are_those_of_the_rows(demonstrations):
     for one in mine_rules(demonstrations, supp_min=0.0, conf_min=0.7).rules:

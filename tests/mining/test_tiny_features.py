@@ -27,7 +27,7 @@ def tree_of(observations: NDArray[np.float32], labels: NDArray[np.int64]) -> Pol
     return grow_policy_trees(demonstrations(observations, labels))[0]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10**6), exponent=st.integers(-100, 60), offset=st.floats(-3, 3))
 def test_a_multiple_by_a_power_of_two_has_the_same_tree(
     seed: int, exponent: int, offset: float

@@ -9,7 +9,7 @@ from tests.mining.oracle import fit
 from tests.mining.strategies import labelled_states
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states())
 def test_the_arrays_say_what_scikit_learn_says(demonstrations):
     (tree,) = grow_policy_trees(demonstrations)
@@ -24,7 +24,7 @@ def test_the_arrays_say_what_scikit_learn_says(demonstrations):
     assert tree.depth.max() == learner.get_depth()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(labelled_states())
 def test_rows_of_a_node_are_those_that_reach_it(demonstrations):
     (tree,) = grow_policy_trees(demonstrations)

@@ -80,7 +80,7 @@ def assert_same(one, batch, row):
         assert one.executed is batch.executed[row] or same_action(one.executed, batch.executed[row])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(shields(), st.data())
 def test_one_and_a_batch_of_one_give_the_same_answer_or_the_same_sentence(shield, data):
     observation = data.draw(observations(shield.rule_set))
@@ -95,7 +95,7 @@ def test_one_and_a_batch_of_one_give_the_same_answer_or_the_same_sentence(shield
     assert_same(one, batch, 0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(shields(), st.data())
 def test_a_batch_is_its_rows(shield, data):
     count = data.draw(st.integers(1, 5))
@@ -119,7 +119,7 @@ def test_a_batch_is_its_rows(shield, data):
             assert np.array_equal(ours, theirs)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(shields(), st.data())
 def test_what_is_executed_carries_the_rules_labels(shield, data):
     rule_set = shield.rule_set
@@ -153,7 +153,7 @@ def test_what_is_executed_carries_the_rules_labels(shield, data):
     assert not math.isnan(decision.margin)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(shields().filter(lambda shield: shield.outside == "act"), st.data())
 def test_exported_python_gives_the_same_answer(shield, data):
     rule_set = shield.rule_set
@@ -253,7 +253,7 @@ class Still(gymnasium.Env):
         return np.zeros(3, dtype=np.float32), 1.0, False, False, {}
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     st.sampled_from(BOXES),
     st.integers(0, 500),

@@ -78,7 +78,7 @@ EDITS = [
 ]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.sampled_from(EDITS), unique=True, max_size=8), st.booleans())
 def test_an_edit_decides_as_a_shield_and_as_a_scan_in_order(edits, fine):
     base = FINE if fine else COARSE

@@ -107,7 +107,7 @@ def is_outside(rule, state):
     )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     st.integers(0, 10_000), st.sampled_from([DISCRETE, JOINTS]), st.sampled_from(["act", "abstain"])
 )

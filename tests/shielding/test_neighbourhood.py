@@ -40,7 +40,7 @@ def a_state(seed):
     return next(state for state in states_of(seed) if np.isfinite(state).all())
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 10_000))
 def test_near_misses_are_all_rules_that_one_change_lets_apply(seed):
     rules = random_rules(seed, DISCRETE)
@@ -72,7 +72,7 @@ def test_near_misses_are_all_rules_that_one_change_lets_apply(seed):
         assert miss.in_force == (miss.rule in now)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_two_features_where_one_is_not_enough(seed):
     rules = random_rules(seed, JOINTS, count=8)
@@ -99,7 +99,7 @@ def test_two_features_where_one_is_not_enough(seed):
             assert not holds(rule, moved(state, *nearly))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(0, 10_000), st.sampled_from([DISCRETE, JOINTS]), st.sampled_from(["act", "abstain"])
 )

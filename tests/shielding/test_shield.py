@@ -43,7 +43,7 @@ def states_around(rules, d, seed=0, n=60):
     return states
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(labelled_states(), st.sampled_from([(0.0, 1.0), (0.05, 0.7), (0.2, 0.4), (0.9, 1.0)]))
 def test_it_does_what_a_scan_of_the_rules_does(demonstrations, thresholds):
     rules = mine_rules(demonstrations, supp_min=thresholds[0], conf_min=thresholds[1])
@@ -64,7 +64,7 @@ def test_it_does_what_a_scan_of_the_rules_does(demonstrations, thresholds):
         assert batch.margin[row] == decision.margin
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(labelled_states())
 def test_the_tree_and_the_shield_agree_bit_for_bit(demonstrations):
     from sarl_core import grow_policy_trees

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import false_discovery_control, permutation_test
 
@@ -48,7 +48,6 @@ def test_holm_by_hand() -> None:
     assert holm([0.9, 0.8]).tolist() == [1.0, 1.0]
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
 def test_holm_is_no_stricter_than_bonferroni_and_stricter_than_none(values: list[float]) -> None:
     adjusted = holm(values)
