@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.paper.studies import STUDIES
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.views.paper.claims import show_all_claims
 from sarl_dashboard.views.paper.report_files import require_report
 from sarl_dashboard.views.paper.study import report_download, show_study
@@ -18,18 +19,7 @@ st.caption(
     "of several experts of each task, with 95 % intervals."
 )
 report = require_report()
-place = (
-    st.segmented_control(
-        "Show",
-        [CLAIMS, *NAMES],
-        default=CLAIMS,
-        key="figure",
-        bind="query-params",
-        required=True,
-        label_visibility="collapsed",
-    )
-    or CLAIMS
-)
+place = switch("Show", "figure", [CLAIMS, *NAMES])
 if place == CLAIMS:
     show_all_claims(report.studies.values())
     report_download()

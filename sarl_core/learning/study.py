@@ -145,11 +145,11 @@ def run_study(
     """
     make_folder(folder)
     _claim(folder, plan)
-    todo = [(seed, arm) for seed in plan.seeds for arm in plan.arms]
-    total = len(todo) * plan.steps
+    runs = [(seed, arm) for seed in plan.seeds for arm in plan.arms]
+    total = len(runs) * plan.steps
     diverged: list[str] = []
     try:
-        for index, (seed, arm) in enumerate(todo):
+        for index, (seed, arm) in enumerate(runs):
             before = index * plan.steps
 
             def advance(done: int, _: int, before: int = before) -> bool:
@@ -166,7 +166,7 @@ def run_study(
         study = load_study(folder)
         _sum_up(folder, study)
         raise CancelledError(
-            f"stopped; {len(study.finished)} of {len(todo)} runs are finished and kept in {folder}"
+            f"stopped; {len(study.finished)} of {len(runs)} runs are finished and kept in {folder}"
             ", and the same order goes on from there"
         ) from error
     except WorkError:
@@ -176,7 +176,7 @@ def run_study(
     _sum_up(folder, study)
     if diverged:
         raise WorkError(
-            f"{len(study.finished)} of {len(todo)} runs are finished and kept in {folder}; "
+            f"{len(study.finished)} of {len(runs)} runs are finished and kept in {folder}; "
             f"{len(diverged)} failed ({diverged[0]})"
         )
     return study

@@ -68,6 +68,44 @@ def outside_choice(width: Width = "stretch") -> Outside:
     )
 
 
+def switch(label: str, key: str, options: Sequence[str], hint: str | None = None) -> str:
+    """A choice between a few ways to look; the first where nothing was chosen.
+
+    Args:
+        label: What it is called, for who cannot see it.
+        key: Of the widget, and in the URL.
+        options: The ways.
+        hint: Said when the pointer rests on it.
+    """
+    return (
+        st.segmented_control(
+            label,
+            options,
+            default=options[0],
+            key=key,
+            bind="query-params",
+            required=True,
+            label_visibility="collapsed",
+            help=hint,
+        )
+        or options[0]
+    )
+
+
+def search_box() -> tuple[str, ...]:
+    """The words that rules are searched for, in small letters (URL: search)."""
+    text = st.text_input(
+        "Search",
+        key="search",
+        bind="query-params",
+        icon=":material/search:",
+        width=300,
+        placeholder="a feature, an action, a number",
+        label_visibility="collapsed",
+    )
+    return tuple((text or "").lower().split())
+
+
 def notes_notice(notes: Iterable[str]) -> None:
     """Say how it was found out which feature is which, and what else a visitor should know."""
     for note in dict.fromkeys(notes):

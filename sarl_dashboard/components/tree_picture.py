@@ -16,6 +16,7 @@ from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import LEAF, PolicyTree
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.session import is_dark
 
 WHOLE_TREE = "Whole tree"
@@ -50,15 +51,7 @@ def show_tree(path: PathInTree, *, around: str, widget: str) -> None:
     """
     view, reached, dark = WHOLE_TREE, _is_reached(path), is_dark()
     if reached:
-        view = st.segmented_control(
-            "Tree",
-            [around, WHOLE_TREE],
-            default=around,
-            key=widget,
-            bind="query-params",
-            required=True,
-            label_visibility="collapsed",
-        )
+        view = switch("Tree", widget, [around, WHOLE_TREE])
     if view == WHOLE_TREE:
         st.plotly_chart(
             _picture(path, dark),

@@ -177,7 +177,7 @@ def _run(
         have = known_episodes.get(row.key, batch.episodes)
         return len(have) if have is not None else 0
 
-    todo, tasks = [], []
+    incomplete, tasks = [], []
     for row in batch.rows:
         have = count(row)
         job.done += have
@@ -185,7 +185,7 @@ def _run(
             job.text = f"Preparing {row.name} …"
             try:
                 tasks.append(_task(row, have, batch.episodes))
-                todo.append(row)
+                incomplete.append(row)
             except SarlError as error:
                 batch.problems[row.key] = error
                 job.done += batch.episodes - have
@@ -194,7 +194,7 @@ def _run(
     job.text = "Starting …"
     work = run_tasks(tasks, executor)
     for index, outcome in work:
-        row = todo[index]
+        row = incomplete[index]
         if isinstance(outcome, SarlError):
             batch.problems[row.key] = outcome
             continue

@@ -140,7 +140,7 @@ def test_after_a_process_has_died_there_are_new_ones() -> None:
     with Processes(1) as pool:
         with pytest.raises(WorkError, match="ended unexpectedly"):
             gathered(pool, [deadly])
-        assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3  # type: ignore[arg-type]
+        assert sum(len(piece) for piece in gathered(pool, [task(episodes=3)])[0]) == 3
 
 
 def test_where_a_process_dies_a_rollout_says_so_and_the_next_one_runs() -> None:

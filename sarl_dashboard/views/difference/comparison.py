@@ -21,6 +21,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
@@ -154,16 +155,10 @@ def _show_rules(compared: RuleSetComparison) -> None:
     )
     if not any(counts):
         return
-    view = st.segmented_control(
-        "Show",
-        [EVERY, *(kind for kind, count in zip(KINDS, counts, strict=True) if count)],
-        default=EVERY,
-        key="kind",
-        bind="query-params",
-        required=True,
-        label_visibility="collapsed",
+    view = switch(
+        "Show", "kind", [EVERY, *(kind for kind, count in zip(KINDS, counts, strict=True) if count)]
     )
-    kinds = KINDS if view in (None, EVERY) else (str(view),)
+    kinds = KINDS if view == EVERY else (view,)
     frame = _rules_frame(compared, kinds)
     column = st.column_config
     action, action_width = action_column(disagreements.first.actions, "What the rule says")

@@ -15,6 +15,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.settings import search_box, switch
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
@@ -49,25 +50,8 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
     """The rules as edited; returns the chosen one."""
     rule_set = verdicts.rule_set
     with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
-        search = st.text_input(
-            "Search",
-            key="search",
-            bind="query-params",
-            icon=":material/search:",
-            width=300,
-            placeholder="a feature, an action, a number",
-            label_visibility="collapsed",
-        )
-        view = st.segmented_control(
-            "Show",
-            [EVERY, TOUCHED],
-            default=EVERY,
-            key="rules_shown",
-            bind="query-params",
-            required=True,
-            label_visibility="collapsed",
-        )
-    words = tuple((search or "").lower().split())
+        words = search_box()
+        view = switch("Show", "rules_shown", [EVERY, TOUCHED])
     rows = _rows(of.rule_set, edits.history(of).edits, view == TOUCHED, words)
     order = rows.order
     if not order:

@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state.data import all_demonstrations
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.export.files import prepared_for, show_file
@@ -35,15 +36,7 @@ def show_export(demonstrations: Demonstrations) -> None:
         st.error(f"{in_full(str(error))}{more}", icon=":material/error:")
         return
     show_rounding(prepared, len(everything))
-    view = st.segmented_control(
-        "View",
-        [FILE, MATRIX],
-        default=FILE,
-        key="carry_view",
-        bind="query-params",
-        required=True,
-        label_visibility="collapsed",
-    )
+    view = switch("View", "carry_view", [FILE, MATRIX])
     if view == MATRIX:
         show_matrix(prepared.rule_set, chosen.stem, demonstrations)
     else:

@@ -10,6 +10,7 @@ from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import replication
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.paper import report_files
@@ -48,18 +49,7 @@ def show_study(name: str, entry: Entry | None) -> None:
     st.caption(f"Made from {replication(frame)} for each environment.")
     part = parts[0]
     if len(parts) > 1:
-        part = (
-            st.segmented_control(
-                "Part",
-                parts,
-                default=parts[0],
-                key=f"part_{name}",
-                bind="query-params",
-                required=True,
-                label_visibility="collapsed",
-            )
-            or parts[0]
-        )
+        part = switch("Part", f"part_{name}", parts)
     left, right = st.columns([3, 2], gap="large")
     with left:
         drawings = report_files.drawings(name, entry, part, dark=is_dark())

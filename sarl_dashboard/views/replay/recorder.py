@@ -28,6 +28,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.jobs.replays import Played, ReplayPair, compared, comparison_cache
 from sarl_dashboard.views.replay.run import jump_to
 
@@ -123,18 +124,7 @@ def source(played: Played) -> Recorded:
         runs = comparison_cache().get((comparison[0].key, comparison[1]))
     if comparison is not None and runs is not None and runs[0][1].steps is not None:
         several = runs[0][1]
-        if (
-            st.segmented_control(
-                "Steps of",
-                [ONE, ALL],
-                default=ONE,
-                key="recorded",
-                bind="query-params",
-                required=True,
-                label_visibility="collapsed",
-            )
-            == ALL
-        ):
+        if switch("Steps of", "recorded", [ONE, ALL]) == ALL:
             return Recorded(replay, several, replay.order.seed - comparison[0].seed)
     return Recorded(replay, replay.shown, 0)
 

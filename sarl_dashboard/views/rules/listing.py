@@ -17,6 +17,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.settings import search_box
 from sarl_dashboard.components.tables import frame
 from sarl_dashboard.state.data import data_parts, held_out_demonstrations
 from sarl_dashboard.text import in_full
@@ -68,15 +69,7 @@ def matching(listed: Listed, in_force: InForce) -> list[int]:
         )
     )
     with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
-        search = st.text_input(
-            "Search",
-            key="search",
-            bind="query-params",
-            icon=":material/search:",
-            width=300,
-            placeholder="a feature, an action, a number",
-            label_visibility="collapsed",
-        )
+        words = search_box()
         action = st.selectbox(
             "Action",
             [EVERY, *names],
@@ -97,14 +90,13 @@ def matching(listed: Listed, in_force: InForce) -> list[int]:
             )
     if len(sure) < len(listed.rules):
         why_left_out(listed, least)
-    words = (search or "").lower().split()
     places = sure if action == EVERY else [place for place in sure if listed.does[place] == action]
     if not words:
         return places
     return [place for place in places if has_words(listed, place, rule_set, words)]
 
 
-def has_words(listed: Listed, place: int, rule_set: RuleSet, words: list[str]) -> bool:
+def has_words(listed: Listed, place: int, rule_set: RuleSet, words: tuple[str, ...]) -> bool:
     """Whether a rule has all words of a search."""
     rule, does = listed.rules[place], listed.does[place]
     text = f"{conditions_text(rule, rule_set)} {does} {rule_set.name_of(rule)}".lower()

@@ -14,6 +14,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import mined_landscape
@@ -132,23 +133,6 @@ def chosen_display(
         dimension = chosen_dimension([tree.dimension.name for tree in trees])
     return Display(
         trees, compact, held_out, dimension, LAYERS[pair], view == SURFACES, grid == PAPER
-    )
-
-
-def switch(label: str, key: str, options: list[str], hint: str | None = None) -> str:
-    """A choice between a few ways to look."""
-    return (
-        st.segmented_control(
-            label,
-            options,
-            default=options[0],
-            key=key,
-            bind="query-params",
-            required=True,
-            label_visibility="collapsed",
-            help=hint,
-        )
-        or options[0]
     )
 
 
