@@ -8,6 +8,7 @@ deep link.
 from __future__ import annotations
 
 import atexit
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -19,4 +20,10 @@ _while_it_runs = ExitStack()
 _while_it_runs.enter_context(temporary_folder())
 atexit.register(_while_it_runs.close)
 
-app = st.App(Path(__file__).parent / "pages" / "_router.py")
+# Streamlit puts a script's folder first on the import path while it runs, and takes it away again
+# unless it was there before. An import in another thread that falls into that moment passes over a
+# folder and finds no module.
+_PAGES = Path(__file__).parent / "pages"
+sys.path.append(str(_PAGES))
+
+app = st.App(_PAGES / "_router.py")

@@ -77,3 +77,15 @@ def test_every_public_name_is_there():
     assert set(sarl_core.__all__) <= set(dir(sarl_core))
     with pytest.raises(AttributeError, match="nonsense"):
         _ = sarl_core.nonsense
+
+
+def test_a_page_run_leaves_the_import_path_alone():
+    # An import in another thread passes over a folder when one before it is taken away meanwhile.
+    code = """
+import app, sys
+from streamlit.runtime.scriptrunner.exec_code import modified_sys_path
+before = list(sys.path)
+with modified_sys_path("pages/_router.py"):
+    assert sys.path == before
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
