@@ -9,9 +9,9 @@ method alone agrees whatever was demonstrated, and counts as 1.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from sarl_core.mining.language import counted, share_text
 from sarl_core.paper.study import Frames, Study, experts_in

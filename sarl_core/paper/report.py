@@ -30,27 +30,36 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
-from sarl_core.documents import parse_json
+from msgspec import Meta, Struct, to_builtins
+
+from sarl_core.documents import MisfitError, Number, conformed, parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.files import whole_file
 from sarl_core.limits import limited_bytes
 from sarl_core.paper.chance import chance_text
-from sarl_core.paper.verdicts import VERDICTS, Claim
+from sarl_core.paper.verdicts import Claim
 
 FORMAT, VERSION = "sarl-paper", 2
 REPORT = "report.json"
 MAX_BYTES = 20_000_000
 
-_TEXTS = ("place", "title", "command", "made")
-_FILES = ("table", "page", "picture")
+# A report shall not point at files elsewhere.
+FileName = Annotated[str, Meta(pattern=r"^(?!\.{1,2}$)[^/\\\0]+$")]
 
 
-@dataclass(frozen=True)
-class Entry:
+class Files(TypedDict):
+    """Names of a study's files by their kind."""
+
+    table: FileName
+    page: FileName
+    picture: FileName
+
+
+class Entry(Struct, frozen=True, forbid_unknown_fields=True):
     """What one study found; the fields are those of the file.
 
     Attributes:
@@ -73,11 +82,11 @@ class Entry:
     quick: bool
     command: str
     made: str
-    seconds: float
+    seconds: Number
     settings: Mapping[str, Any]
     inputs: Mapping[str, Any]
     versions: Mapping[str, str]
-    files: Mapping[str, str]
+    files: Files
     numbers: Mapping[str, Any]
     claims: tuple[Claim, ...]
 
@@ -117,7 +126,7 @@ def report_document(report: PaperReport) -> dict[str, Any]:
     Returns:
         As the module says; numbers that are not finite are null.
     """
-    studies = {name: asdict(entry) for name, entry in report.studies.items()}
+    studies = {name: to_builtins(entry) for name, entry in report.studies.items()}
     claims = [claim for entry in report.studies.values() for claim in entry.claims]
     document: dict[str, Any] = _plain(
         {
@@ -183,54 +192,14 @@ def parse_report(document: Any) -> PaperReport:
         raise ValueError(f"its format is not {FORMAT}")
     if document.get("version") != VERSION:
         raise ValueError(f"its version is {quoted(document.get('version'))} and not {VERSION}")
-    studies = document.get("studies")
-    if not isinstance(studies, dict):
-        raise ValueError("it lists no studies")
-    return PaperReport({str(name): _entry(str(name), entry) for name, entry in studies.items()})
+    studies = {}
+    for name, entry in conformed(document, _Document).studies.items():
+        try:
+            studies[name] = conformed(entry, Entry)
+        except MisfitError as error:
+            raise MisfitError(error.what, f"study {quoted(name)}", *error.place) from error
+    return PaperReport(studies)
 
 
-def _entry(name: str, entry: Any) -> Entry:
-    names = {one.name for one in fields(Entry)}
-    if not isinstance(entry, dict) or set(entry) != names:
-        raise ValueError(
-            f"study {quoted(name)} does not have the entries {', '.join(sorted(names))}"
-        )
-    for key in _TEXTS:
-        _expect(isinstance(entry[key], str), name, key)
-    _expect(isinstance(entry["quick"], bool), name, "quick")
-    _expect(_is_number(entry["seconds"]), name, "seconds")
-    for key in ("settings", "inputs", "versions", "numbers"):
-        _expect(isinstance(entry[key], dict), name, key)
-    files = entry["files"]
-    _expect(isinstance(files, dict) and set(files) == set(_FILES), name, "files")
-    # Only names: a report shall not point at files elsewhere.
-    _expect(all(isinstance(file, str) and _is_name(file) for file in files.values()), name, "files")
-    _expect(isinstance(entry["claims"], list), name, "claims")
-    return Entry(**{**entry, "claims": tuple(_claim(name, claim) for claim in entry["claims"])})
-
-
-def _claim(name: str, claim: Any) -> Claim:
-    names = {one.name for one in fields(Claim)}
-    _expect(isinstance(claim, dict) and set(claim) == names, name, "claims")
-    texts = names - {"numbers", "by_chance"}
-    _expect(all(isinstance(claim[key], str) for key in texts), name, "claims")
-    _expect(claim["verdict"] in VERDICTS, name, "claims")
-    chance = claim["by_chance"]
-    _expect(chance is None or (_is_number(chance) and 0 <= chance <= 1), name, "claims")
-    numbers = claim["numbers"]
-    _expect(isinstance(numbers, dict), name, "claims")
-    _expect(all(one is None or _is_number(one) for one in numbers.values()), name, "claims")
-    return Claim(**claim)
-
-
-def _expect(right: bool, name: str, key: str) -> None:
-    if not right:
-        raise ValueError(f"{key!r} of study {quoted(name)} is not what it should be")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _is_name(file: str) -> bool:
-    return file not in ("", ".", "..") and Path(file).name == file and "\\" not in file
+class _Document(Struct):
+    studies: dict[str, Any]

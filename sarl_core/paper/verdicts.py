@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from msgspec import Struct, field
 from numpy.typing import ArrayLike, NDArray
 
+from sarl_core.documents import Number, Share
 from sarl_core.rollouts.statistics import MeanInterval, mean_interval, rate_of
 
 Verdict = Literal["agrees", "partly", "does not agree", "cannot be judged"]
@@ -22,8 +23,7 @@ Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(Struct, frozen=True, forbid_unknown_fields=True):
     """A sentence of the paper beside our number.
 
     Attributes:
@@ -43,8 +43,8 @@ class Claim:
     ours: str
     verdict: Verdict
     decided_by: str
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    by_chance: float | None = None
+    numbers: Mapping[str, Number | None] = field(default_factory=dict)
+    by_chance: Share | None = None
     constructed: str = ""
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
+from msgspec.structs import replace
 
 from sarl_core.paper.chance import chance_text, how_decided, with_chance
 from sarl_core.paper.landscape_table import cells_exchanged, landscapes_of

@@ -73,10 +73,11 @@ def downloads(entry: Entry) -> None:
                 files["page"],
                 key="page_file",
             )
-        for label, kind in (("Picture (PNG)", "picture"), ("Data (CSV)", "table")):
-            path = report_files.FOLDER / files[kind]
+        picture = ("Picture (PNG)", files["picture"], "picture_file")
+        for label, name, key in (picture, ("Data (CSV)", files["table"], "table_file")):
+            path = report_files.FOLDER / name
             if path.is_file():
-                download(label, path.read_bytes(), files[kind], key=f"{kind}_file")
+                download(label, path.read_bytes(), name, key=key)
         report_download()
 
 
