@@ -114,12 +114,13 @@ class MisfitError(ValueError):
         self.what, self.place = what, place
 
 
-def conformed(value: Any, kind: type[T]) -> T:
+def conformed(value: Any, kind: type[T], *, strict: bool = True) -> T:
     """What was parsed, as a type that says what may stand there.
 
     Args:
         value: Of dicts, lists, texts, numbers, true, false and null.
         kind: As msgspec takes it; booleans are no numbers.
+        strict: Whether a text is no number, as one of a CSV file is.
 
     Returns:
         One of that type.
@@ -128,7 +129,7 @@ def conformed(value: Any, kind: type[T]) -> T:
         MisfitError: If anything in it is something else, is missing, or is not known.
     """
     try:
-        return msgspec.convert(value, kind)
+        return msgspec.convert(value, kind, strict=strict)
     except msgspec.ValidationError as error:
         raise _in_words(value, kind, str(error)) from error
 

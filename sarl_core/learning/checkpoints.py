@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import Struct
 
+from sarl_core.documents import Count, NotNegative, conformed
 from sarl_core.errors import InputError, WorkError
 from sarl_core.files import whole_file
-from sarl_core.learning.curves import LearningEpisodes
+from sarl_core.learning.curves import Columns, LearningEpisodes
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -119,16 +121,22 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
             f"differ); {advice}"
         )
     try:
-        learner.set_parameters(document["parameters"])
-        learner.num_timesteps = int(document["steps"])
-        _remember(learner, document["memory"])
-        return Rest(
-            LearningEpisodes.from_dict(document["curve"]),
-            float(document["seconds"]),
-            int(document["sittings"]),
-        )
+        said = conformed(document, _Document)
+        learner.set_parameters(said.parameters)
+        learner.num_timesteps = said.steps
+        _remember(learner, said.memory)
+        return Rest(said.curve.read(), said.seconds, said.sittings)
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
         raise InputError(f"{path} lacks a part of its learner ({error}); {advice}") from error
+
+
+class _Document(Struct):
+    steps: Count
+    curve: Columns
+    seconds: NotNegative
+    sittings: Count
+    parameters: dict[str, Any]
+    memory: dict[str, Any]
 
 
 def _memory_of(learner: Any) -> dict[str, Any]:

@@ -2,24 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import asdict
 from numpy.typing import NDArray
 
-from sarl_core.errors import InputError
+from sarl_core.documents import Count, MisfitError, Number, Share
 
-_KINDS: dict[str, type] = {
-    "ends": np.int64,
-    "returns": np.float64,
-    "lengths": np.int64,
-    "crashed": np.bool_,
-    "interventions": np.int64,
-    "covered": np.int64,
-    "shielded": np.bool_,
-}
+
+class Columns(Struct):
+    """Of a learning curve as a file has it, one entry an episode; see `LearningEpisodes`."""
+
+    ends: list[Count]
+    returns: list[float]
+    lengths: list[Count]
+    crashed: list[bool]
+    interventions: list[Count]
+    covered: list[Count]
+    shielded: list[bool]
+
+    def read(self) -> LearningEpisodes:
+        """The curve.
+
+        Raises:
+            MisfitError: If the columns are not equally long.
+        """
+        if len({len(column) for column in asdict(self).values()}) > 1:
+            raise MisfitError("the columns of a learning curve are not equally long")
+        whole = {
+            name: np.array(getattr(self, name), dtype=np.int64)
+            for name in ("ends", "lengths", "interventions", "covered")
+        }
+        return LearningEpisodes(
+            returns=np.array(self.returns, dtype=np.float64),
+            crashed=np.array(self.crashed, dtype=np.bool_),
+            shielded=np.array(self.shielded, dtype=np.bool_),
+            **whole,
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,31 +127,7 @@ class LearningEpisodes:
 
     def to_dict(self) -> dict[str, list[Any]]:
         """Its columns, ready for JSON."""
-        return {name: getattr(self, name).tolist() for name in _KINDS}
-
-    @classmethod
-    def from_dict(cls, columns: Mapping[str, Any]) -> LearningEpisodes:
-        """Read what `to_dict` wrote.
-
-        Args:
-            columns: One list a column.
-
-        Returns:
-            The curve.
-
-        Raises:
-            InputError: If a column is missing, is not numbers, or has another length.
-        """
-        try:
-            arrays: dict[str, NDArray[Any]] = {
-                name: np.array(columns[name], dtype=kind) for name, kind in _KINDS.items()
-            }
-            lengths = {array.shape for array in arrays.values()}
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"a learning curve lacks a column or a number ({error})") from error
-        if len(lengths) > 1 or arrays["ends"].ndim != 1:
-            raise InputError("the columns of a learning curve are not equally long")
-        return cls(**arrays)
+        return {one.name: getattr(self, one.name).tolist() for one in fields(self)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +143,7 @@ class Bins:
     interventions: NDArray[np.float64]
 
 
-NO_EPISODES = LearningEpisodes.from_dict({name: [] for name in _KINDS})
+NO_EPISODES = Columns([], [], [], [], [], [], []).read()
 
 
 @dataclass(frozen=True)
@@ -160,11 +158,11 @@ class Trial:
         cut: Episodes that were cut off before their end; none of them is among the crashes.
     """
 
-    returns: tuple[float, ...]
-    crashes: int
-    intervention_rate: float
-    coverage: float
-    cut: int = 0
+    returns: tuple[Number, ...]
+    crashes: Count
+    intervention_rate: Share
+    coverage: Share
+    cut: Count = 0
 
     @property
     def mean(self) -> float:
@@ -185,30 +183,6 @@ class Trial:
             "coverage": self.coverage,
             **({"cut": self.cut} if self.cut else {}),
         }
-
-    @classmethod
-    def from_dict(cls, entry: Mapping[str, Any]) -> Trial:
-        """Read what `to_dict` wrote.
-
-        Args:
-            entry: Its fields.
-
-        Returns:
-            The trial.
-
-        Raises:
-            InputError: If a field is missing or no number.
-        """
-        try:
-            return cls(
-                returns=tuple(float(value) for value in entry["returns"]),
-                crashes=int(entry["crashes"]),
-                intervention_rate=float(entry["intervention_rate"]),
-                coverage=float(entry["coverage"]),
-                cut=int(entry.get("cut", 0)),
-            )
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"a trial after learning lacks a number ({error})") from error
 
 
 def _ratio(part: Any, whole: Any) -> float:

@@ -15,7 +15,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from sarl_core.environments.failures import failed
 from sarl_core.learning.arms import Handover, LearningArm
-from sarl_core.learning.curves import LearningEpisodes
+from sarl_core.learning.curves import Columns, LearningEpisodes
 from sarl_core.learning.learners import MaskedPPO
 from sarl_core.learning.replay_buffers import HandoverVecEnv
 
@@ -72,7 +72,7 @@ class Recorder(BaseCallback):
 
     def curve(self) -> LearningEpisodes:
         """The episodes that have ended."""
-        return LearningEpisodes.from_dict(self.columns)
+        return Columns(**self.columns).read()
 
     def _on_step(self) -> bool:
         dones: NDArray[np.bool_] = self.locals["dones"]

@@ -6,18 +6,19 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from msgspec import Struct
 
-from sarl_core.documents import parse_json
+from sarl_core.documents import Count, MisfitError, NotNegative, conformed, parse_json
 from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import ARMS, LearningArm
-from sarl_core.learning.curves import LearningEpisodes, Trial
+from sarl_core.learning.curves import NO_EPISODES, Columns, LearningEpisodes, Trial
 from sarl_core.limits import limited_bytes
 
 FORMAT = "sarl-learning"
@@ -25,8 +26,6 @@ VERSION = 1
 PLAN, RESULTS, CURVES = "plan.json", "results.json", "curves.csv"
 RUNS, POLICIES = "runs", "policies"
 
-# What a document leads to that is of another form than ours.
-_MALFORMED = (KeyError, TypeError, ValueError, OverflowError, AttributeError)
 _DECIMALS = 4  # of returns in files
 _COLUMNS = ("ends", "returns", "lengths", "crashed", "interventions", "covered", "shielded")
 _HEADINGS = ("step", "return", "length", "crashed", "interventions", "covered", "shielded")
@@ -182,8 +181,9 @@ def load_run(path: Path) -> LearningRun:
     """
     document = read_json(path)
     try:
-        return _run(document, LearningEpisodes.from_dict(document["curve"]))
-    except _MALFORMED as error:
+        entry = conformed(document, _RunWithCurve)
+        return entry.read(entry.curve.read())
+    except MisfitError as error:
         raise InputError(f"{path} lacks a part of its run ({error}); delete it") from error
 
 
@@ -199,22 +199,21 @@ def load_study(folder: Path) -> LearningStudy:
     Raises:
         InputError: If there is none, or a file is damaged.
     """
-    plan = read_json(folder / PLAN)
+    settings = read_json(folder / PLAN)
     try:
-        arms = tuple(ARMS[name] for name in plan["arms"])
-        seeds = tuple(int(seed) for seed in plan["seeds"])
-        env_id, steps = str(plan["env_id"]), int(plan["steps"])
-    except _MALFORMED as error:
+        plan = conformed(settings, _Plan)
+        arms = tuple(map(_arm, plan.arms))
+    except MisfitError as error:
         raise InputError(
             f"{folder / PLAN} lacks a part of its plan ({error}); choose a folder that `learn` "
             "wrote"
         ) from error
     if (folder / RUNS).is_dir():
-        paths = [run_path(folder, arm, seed) for seed in seeds for arm in arms]
+        paths = [run_path(folder, arm, seed) for seed in plan.seeds for arm in arms]
         runs = tuple(load_run(path) for path in paths if path.is_file())
     else:
         runs = _from_tables(folder)
-    return LearningStudy(env_id, steps, plan, arms, seeds, runs)
+    return LearningStudy(plan.env_id, plan.steps, settings, arms, plan.seeds, runs)
 
 
 def save_tables(folder: Path, study: LearningStudy, results: Mapping[str, Any]) -> None:
@@ -289,43 +288,70 @@ def _entry(run: LearningRun) -> dict[str, Any]:
     }
 
 
-def _run(entry: Mapping[str, Any], curve: LearningEpisodes) -> LearningRun:
-    trials = [
-        None if entry[name] is None else Trial.from_dict(entry[name])
-        for name in ("alone", "shielded")
-    ]
-    return LearningRun(
-        arm=ARMS[entry["arm"]],
-        seed=int(entry["seed"]),
-        done=int(entry["steps_done"]),
-        curve=curve,
-        alone=trials[0],
-        shielded=trials[1],
-        seconds=float(entry["seconds"]),
-        sittings=int(entry["sittings"]),
-    )
+# What a file says at least.
+class _Plan(Struct):
+    env_id: str
+    steps: Count
+    arms: tuple[str, ...]
+    seeds: tuple[Count, ...]
+    trial_episodes: Count
+
+
+class _Run(Struct):
+    arm: str
+    seed: Count
+    steps_done: Count
+    seconds: NotNegative
+    sittings: Count
+    alone: Trial | None
+    shielded: Trial | None
+
+    def read(self, curve: LearningEpisodes) -> LearningRun:
+        return LearningRun(
+            _arm(self.arm),
+            self.seed,
+            self.steps_done,
+            curve,
+            self.alone,
+            self.shielded,
+            self.seconds,
+            self.sittings,
+        )
+
+
+class _RunWithCurve(_Run):
+    curve: Columns
+
+
+class _Results(Struct):
+    runs: tuple[_Run, ...] = ()
+
+
+def _arm(name: str) -> LearningArm:
+    if name not in ARMS:
+        raise MisfitError(f"there is no arm {quoted(name)}")
+    return ARMS[name]
 
 
 def _from_tables(folder: Path) -> tuple[LearningRun, ...]:
-    import pandas as pd
-
-    entries: Sequence[Mapping[str, Any]] = read_json(folder / RESULTS).get("runs", [])
+    document = read_json(folder / RESULTS)
     try:
-        table = pd.read_csv(io.BytesIO(limited_bytes(folder / CURVES)))
-        curves = {
-            key: LearningEpisodes.from_dict(
-                {
-                    column: part[heading].to_numpy()
-                    for column, heading in zip(_COLUMNS, _HEADINGS, strict=True)
-                }
-            )
-            for key, part in table.groupby(["arm", "seed"])
-        }
-        empty = LearningEpisodes.from_dict({name: np.zeros(0) for name in _COLUMNS})
-        return tuple(
-            _run(entry, curves.get((entry["arm"], int(entry["seed"])), empty)) for entry in entries
+        columns: dict[tuple[str, str], dict[str, list[str]]] = defaultdict(
+            lambda: {name: [] for name in _COLUMNS}
         )
-    except (OSError, *_MALFORMED) as error:
+        text = limited_bytes(folder / CURVES).decode()
+        for row in csv.DictReader(io.StringIO(text), strict=True):
+            of_run = columns[row["arm"], row["seed"]]
+            for name, heading in zip(_COLUMNS, _HEADINGS, strict=True):
+                of_run[name].append(row[heading])
+        curves = {
+            key: conformed(of_run, Columns, strict=False).read() for key, of_run in columns.items()
+        }
+        return tuple(
+            run.read(curves.get((run.arm, str(run.seed)), NO_EPISODES))
+            for run in conformed(document, _Results).runs
+        )
+    except (OSError, KeyError, ValueError, csv.Error) as error:
         raise InputError(
             f"{folder / CURVES} does not fit {RESULTS} ({error}); copy both from a folder that "
             "`learn` wrote"

@@ -15,7 +15,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, WorkError, load_demonstrations, mine_rules
 from sarl_core.learning.arms import ARMS, arms_named
-from sarl_core.learning.curves import LearningEpisodes, Trial
+from sarl_core.learning.curves import Columns, Trial
 from sarl_core.learning.study import LearningPlan
 from sarl_core.learning.study_files import (
     LearningRun,
@@ -49,7 +49,7 @@ def a_run(arm: str) -> LearningRun:
     columns |= {"crashed": [1] * 10, "interventions": [3] * 10, "covered": [9] * 10}
     columns |= {"ends": list(range(60, 601, 60)), "shielded": [1] * 10}
     trial = Trial((9.0, 10.0), 2, 0.0, 0.0)
-    return LearningRun(ARMS[arm], 0, 600, LearningEpisodes.from_dict(columns), trial, trial)
+    return LearningRun(ARMS[arm], 0, 600, Columns(**columns).read(), trial, trial)
 
 
 @pytest.fixture(scope="module")

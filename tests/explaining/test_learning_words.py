@@ -17,7 +17,7 @@ from sarl_core.explaining.figures.learning import (
 )
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, verdict
 from sarl_core.learning.arms import ARMS
-from sarl_core.learning.curves import LearningEpisodes, Trial
+from sarl_core.learning.curves import Columns, Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
 from sarl_core.learning.summary import summarise_study
 
@@ -25,8 +25,8 @@ RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
 
 
 def a_run(arm: str, seed: int, crashes: int, alone: float) -> LearningRun:
-    curve = LearningEpisodes.from_dict(
-        {
+    curve = Columns(
+        **{
             "ends": [(index + 1) * 100 for index in range(10)],
             "returns": [float(index * 10) for index in range(10)],
             "lengths": [100] * 10,
@@ -35,7 +35,7 @@ def a_run(arm: str, seed: int, crashes: int, alone: float) -> LearningRun:
             "covered": [100] * 10,
             "shielded": [ARMS[arm].shielded] * 10,
         }
-    )
+    ).read()
     trial = Trial((alone - 1, alone + 1), 1, 0.0, 0.0)
     return LearningRun(ARMS[arm], seed, 1000, curve, trial, Trial((150.0, 150.0), 0, 0.5, 1.0))
 
@@ -184,9 +184,7 @@ def test_curves_are_means_in_bands(study: LearningStudy) -> None:
 
 def test_curves_of_a_run_at_work_end_where_it_is() -> None:
     run = a_run("none", 0, 3, 0.0)
-    curve = LearningEpisodes.from_dict(
-        {name: column[:5] for name, column in run.curve.to_dict().items()}
-    )
+    curve = Columns(**{name: column[:5] for name, column in run.curve.to_dict().items()}).read()
     half = replace(run, curve=curve, done=500, alone=None, shielded=None)
     figure = curves_figure(a_study(half))
     (crashes,) = [trace for trace in figure.data if trace.name and trace.yaxis == "y2"]
@@ -196,7 +194,7 @@ def test_curves_of_a_run_at_work_end_where_it_is() -> None:
 
 def test_a_run_without_an_episode_draws_nothing_and_breaks_nothing() -> None:
     run = a_run("none", 0, 3, 0.0)
-    empty = LearningEpisodes.from_dict({name: [] for name in run.curve.to_dict()})
+    empty = Columns(**{name: [] for name in run.curve.to_dict()}).read()
     study = a_study(replace(run, curve=empty, done=10, alone=None, shielded=None))
     assert not curves_figure(study).data
 

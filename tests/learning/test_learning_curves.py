@@ -7,14 +7,14 @@ import json
 import numpy as np
 import pytest
 
-from sarl_core import InputError
-from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes, Trial
+from sarl_core.documents import MisfitError, conformed
+from sarl_core.learning.curves import NO_EPISODES, Columns, LearningEpisodes, Trial
 
 
 @pytest.fixture
 def curve() -> LearningEpisodes:
-    return LearningEpisodes.from_dict(
-        {
+    return Columns(
+        **{
             "ends": [10, 20, 20, 35],
             "returns": [1.0, 2.0, 6.0, -3.5],
             "lengths": [10, 10, 8, 15],
@@ -23,7 +23,7 @@ def curve() -> LearningEpisodes:
             "covered": [10, 10, 8, 15],
             "shielded": [True, True, True, False],
         }
-    )
+    ).read()
 
 
 def test_crashes_are_counted_up_to_and_with_a_step(curve: LearningEpisodes) -> None:
@@ -48,7 +48,7 @@ def test_changes_are_counted_by_steps_and_not_by_episodes(curve: LearningEpisode
 
 
 def test_a_curve_survives_json_and_nobody_changes_it(curve: LearningEpisodes) -> None:
-    again = LearningEpisodes.from_dict(json.loads(json.dumps(curve.to_dict())))
+    again = Columns(**json.loads(json.dumps(curve.to_dict()))).read()
     assert again.to_dict() == curve.to_dict()
     assert again.ends.dtype == np.int64
     assert again.crashed.dtype == np.bool_
@@ -66,16 +66,16 @@ def test_its_size_is_seen_at_a_glance(curve: LearningEpisodes) -> None:
     [{"ends": None}, {"returns": ["?"] * 4}, {"lengths": [1]}, {"ends": [[1, 2, 3, 4]]}],
 )
 def test_a_damaged_curve_is_refused(curve: LearningEpisodes, damage: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="learning curve"):
-        LearningEpisodes.from_dict({**curve.to_dict(), **damage})
-    with pytest.raises(InputError, match="learning curve"):
-        LearningEpisodes.from_dict({"ends": []})
+    with pytest.raises(MisfitError, match="|".join([*damage, "equally long"])):
+        conformed({**curve.to_dict(), **damage}, Columns).read()
+    with pytest.raises(MisfitError, match="'returns' is missing"):
+        conformed({"ends": []}, Columns)
 
 
 def test_a_trial_survives_json_and_is_refused_when_damaged() -> None:
     trial = Trial((1.0, 3.0), 1, 0.25, 1.0)
     assert (trial.mean, trial.crash_rate) == (2.0, 0.5)
-    assert Trial.from_dict(json.loads(json.dumps(trial.to_dict()))) == trial
+    assert conformed(json.loads(json.dumps(trial.to_dict())), Trial) == trial
     for damage in ({"returns": 3}, {"crashes": None}, {"coverage": "all"}):
-        with pytest.raises(InputError, match="trial"):
-            Trial.from_dict({**trial.to_dict(), **damage})
+        with pytest.raises(MisfitError, match=next(iter(damage))):
+            conformed({**trial.to_dict(), **damage}, Trial)

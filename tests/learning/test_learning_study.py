@@ -15,7 +15,7 @@ from stable_baselines3 import PPO
 
 from sarl_core import InputError, RuleSet, WorkError, load_demonstrations, mine_rules
 from sarl_core.learning.arms import ARMS, arms_named
-from sarl_core.learning.curves import LearningEpisodes, Trial
+from sarl_core.learning.curves import Columns, Trial
 from sarl_core.learning.run import LearningResult, learn
 from sarl_core.learning.study import LearningPlan, run_study
 from sarl_core.learning.study_files import (
@@ -217,8 +217,8 @@ def test_when_the_disk_is_full_what_is_finished_is_summed_up(
 
 def a_run(arm: str, seed: int, crashes: int, alone: float, steps: int = 1000) -> LearningRun:
     """A run of ten episodes of which some crashed."""
-    curve = LearningEpisodes.from_dict(
-        {
+    curve = Columns(
+        **{
             "ends": [(index + 1) * steps // 10 for index in range(10)],
             "returns": [float(index) for index in range(10)],
             "lengths": [steps // 10] * 10,
@@ -227,7 +227,7 @@ def a_run(arm: str, seed: int, crashes: int, alone: float, steps: int = 1000) ->
             "covered": [50] * 10,
             "shielded": [ARMS[arm].shielded] * 10,
         }
-    )
+    ).read()
     trial = Trial((alone - 1, alone + 1), 1, 0.0, 0.0)
     return LearningRun(ARMS[arm], seed, steps, curve, trial, Trial((5.0, 5.0), 0, 0.5, 1.0))
 
