@@ -3,6 +3,7 @@ from .agents.agent import make_agent as make_agent
 from .demonstrations.dataset import Demonstrations as Demonstrations
 from .demonstrations.formats import load_demonstrations as load_demonstrations
 from .demonstrations.formats import save_demonstrations as save_demonstrations
+from .environments.environment import Environment as Environment
 from .errors import InputError as InputError
 from .errors import SarlError as SarlError
 from .errors import WorkError as WorkError

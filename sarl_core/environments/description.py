@@ -7,6 +7,7 @@ environment itself.
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,7 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import numbered
+from sarl_core.environments.imports import named_object, reason
 from sarl_core.errors import InputError
 from sarl_core.limits import MAX_FEATURES
 
@@ -138,49 +141,94 @@ _CATALOGUE: dict[str, EnvironmentNames] = {
     ),
 }
 
+_UNKNOWN = re.compile(r"unexpected keyword argument '(\w+)'")
 
-def make_environment(env_id: str, *, render_mode: str | None = None) -> Any:
+
+def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = None) -> Any:
     """Make an environment as ``gymnasium.make`` does, with an error of one sentence.
 
     Args:
-        env_id: What ``gymnasium.make`` takes, ``module:Id`` included.
+        environment: What ``gymnasium.make`` takes, ``module:Id`` included, or that with its
+            arguments and wrappers.
         render_mode: As the environment calls it; None for no pictures.
 
     Returns:
         A ``gymnasium.Env``.
 
     Raises:
-        InputError: If there is no such environment or it cannot be made.
+        InputError: If there is no such environment or it cannot be made or wrapped.
     """
     import gymnasium
 
-    # An environment that draws nothing need not take the parameter.
-    parameters: dict[str, Any] = {} if render_mode is None else {"render_mode": render_mode}
+    environment = as_environment(environment)
+    env_id, parameters = environment.id, environment.keywords
+    if render_mode is not None:  # an environment that draws nothing need not take the parameter
+        parameters["render_mode"] = render_mode
     try:
         with warnings.catch_warnings():
             # Of versions out of date, say; if it cannot be made, the error says so in one line.
             warnings.simplefilter("ignore")
-            return gymnasium.make(env_id, disable_env_checker=True, **parameters)
+            env: Any = gymnasium.make(env_id, disable_env_checker=True, **parameters)
     except Exception as error:  # other people's code, which may raise anything
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        text = str(error).strip()
+        if (unknown := _UNKNOWN.search(text)) and unknown[1] in environment.keywords:
+            raise InputError(
+                f"the environment {env_id!r} takes no argument {unknown[1]!r}; give it others "
+                "(--env-args)"
+            ) from error
+        because = text.splitlines()[0] if text else type(error).__name__
         lacking = isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled))
         if lacking and ":" not in env_id:  # else it may be the named module that does not exist
             raise InputError(
                 f"the environment {env_id!r} needs a package that is not installed "
-                f"({reason.rstrip('.')}); install it, or choose another environment"
+                f"({because.rstrip('.')}); install it, or choose another environment"
             ) from error
         raise InputError(
-            f"the environment {env_id!r} cannot be made ({reason}); "
+            f"the environment {env_id!r} cannot be made"
+            f"{' with these arguments' if environment.keywords else ''} ({because}); "
             "give an id that gymnasium.make knows, such as CartPole-v1"
+            f"{', and arguments that it takes' if environment.keywords else ''}"
         ) from error
+    for wrapper in environment.wrappers:
+        env = _wrapped(env, wrapper)
+    return env
+
+
+def _wrapped(env: Any, name: str) -> Any:
+    """An environment in a wrapper that the caller names."""
+    import gymnasium
+
+    try:
+        wrapper = named_object(name, "the wrapper")
+        if not callable(wrapper):
+            raise InputError(
+                f"the wrapper {name!r} is {type(wrapper).__name__} and cannot be called; name a "
+                "gymnasium.Wrapper class, or a function that takes an environment and gives one"
+            )
+        try:
+            outer = wrapper(env)
+        except Exception as error:  # the caller's code, which may raise anything
+            raise InputError(
+                f"the wrapper {name!r} cannot be put around the environment ({reason(error)}); "
+                "it is called with the environment alone"
+            ) from error
+        if not isinstance(outer, gymnasium.Env):
+            raise InputError(
+                f"the wrapper {name!r} gives no environment but {type(outer).__name__}; let it "
+                "return a gymnasium.Env"
+            )
+        return outer
+    except InputError:
+        env.close()
+        raise
 
 
 @lru_cache(maxsize=64)
-def describe_environment(env_id: str) -> EnvironmentDescription:
+def describe_environment(environment: EnvironmentOrId) -> EnvironmentDescription:
     """Spaces and names of an environment.
 
     Args:
-        env_id: What ``gymnasium.make`` takes.
+        environment: What `make_environment` takes.
 
     Returns:
         Its description; names from Gymnasium's documentation where they are known.
@@ -189,7 +237,8 @@ def describe_environment(env_id: str) -> EnvironmentDescription:
         InputError: If there is no such environment, its observations are images, or its
             actions cannot be mined.
     """
-    env = make_environment(env_id)
+    env_id = str(environment)
+    env = make_environment(environment)
     try:
         d = _feature_count(env_id, env.observation_space)
         limit = env.spec.max_episode_steps if env.spec is not None else None
