@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from markupsafe import Markup
+from msgspec import Struct
 
-from sarl_core.documents import parse_json
+from sarl_core.documents import Count, MisfitError, Number, Share, conformed, parse_json
 from sarl_core.environments.failures import cannot_fail
 from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, SvgScale, dot_and_interval
@@ -38,7 +38,6 @@ _HEADINGS = (
 _ALWAYS = ("Failures",)  # a typical return hides them
 _UNKNOWN, _NOT_KNOWN, _NONE = "–", "not known", "cannot fail"
 _NUMBERS = ("mean", "std", "iqm", "iqm_low", "iqm_high")
-_DIFFERENCE = ("return_difference", "difference_low", "difference_high")
 HARMS: Effect = "harms"
 
 
@@ -136,13 +135,9 @@ def results_of(comparison: Comparison) -> tuple[Result, ...]:
     Returns:
         A results.
     """
+    of_all = {"environment": comparison.env_id, "seed": comparison.seed}
     return tuple(
-        _result(
-            comparison_row(arm, episodes, comparison.alone(place))
-            | {"environment": comparison.env_id},
-            "",
-            comparison.seed,
-        )
+        conformed(comparison_row(arm, episodes, comparison.alone(place)) | of_all, _Row).read()
         for place, (arm, episodes) in enumerate(
             zip(comparison.arms, comparison.episodes, strict=True)
         )
@@ -192,7 +187,10 @@ def results_from_text(text: str, name: str) -> tuple[Result, ...]:
         raise InputError(
             f"the comparison {name} has {len(rows)} rows; give one with 1 to {_MOST_ROWS}"
         )
-    return tuple(_result(row, name) for row in rows)
+    try:
+        return tuple(conformed(row, _Row, strict=False).read() for row in rows)
+    except MisfitError as error:
+        raise InputError(f"in the comparison {name}, {error}; download it again") from error
 
 
 def compared(results: Sequence[Result]) -> Compared | None:
@@ -291,62 +289,61 @@ def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
     return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
 
 
-def _result(row: Mapping[str, Any], name: str, seed: int | None = None) -> Result:
-    def number(key: str) -> float:
-        value = row.get(key)
-        try:
-            if isinstance(value, bool):
-                raise TypeError
-            found = float(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError, OverflowError):
-            found = math.nan
-        if not math.isfinite(found):
-            raise InputError(
-                f"{key!r} in the comparison {name} is {quoted(value)}, not a number; download it "
-                "again"
-            )
-        return found
+class _Row(Struct):
+    arm: str
+    episodes: Count
+    mean: Number
+    std: Number
+    iqm: Number
+    iqm_low: Number
+    iqm_high: Number
+    environment: str | None = None
+    seed: Count | None = None
+    rules: Count | None = None
+    intervention_rate: Share | None = None
+    coverage: Share | None = None
+    crash_rate: Share | None = None
+    failure_rate: Share | None = None
+    failure_low: Share | None = None
+    failure_high: Share | None = None
+    cut: Count | None = None
+    freedom: Share | None = None
+    return_difference: Number | None = None
+    difference_low: Number | None = None
+    difference_high: Number | None = None
+    effect: Effect | None = None
 
-    def share(key: str) -> float | None:
-        return None if row.get(key) is None else min(max(number(key), 0.0), 1.0)
-
-    def whole(key: str) -> int | None:
-        return None if row.get(key) is None else int(number(key))
-
-    mean, std, iqm, low, high = map(number, _NUMBERS)
-    gained = None
-    if all(row.get(name) is not None for name in _DIFFERENCE):
-        gained = MeanInterval(*map(number, _DIFFERENCE))
-    effect = str(row.get("effect") or "")
-    if not low <= iqm <= high:
-        raise InputError(
-            f"the interval of {quoted(row['arm'])} in the comparison {name} does not hold its "
-            "value; download it again"
+    def read(self) -> Result:
+        if not self.iqm_low <= self.iqm <= self.iqm_high:
+            raise MisfitError(f"the interval of {quoted(self.arm)} does not hold its value")
+        return Result(
+            name=self.arm,
+            env_id=self.environment or "",
+            seed=self.seed,
+            rules=self.rules,
+            episodes=self.episodes,
+            mean=self.mean,
+            std=self.std,
+            iqm=self.iqm,
+            low=self.iqm_low,
+            high=self.iqm_high,
+            changed=self.intervention_rate,
+            covered=self.coverage,
+            crashes=self.failure_rate if self.crash_rate is None else self.crash_rate,
+            crash_ends=_both(self.failure_low, self.failure_high),
+            cut=self.cut or 0,
+            freedom=None if self.coverage is None else self.freedom,
+            gained=_gain(self.return_difference, self.difference_low, self.difference_high),
+            effect=self.effect or "",
         )
-    return Result(
-        name=str(row["arm"]),
-        env_id=str(row.get("environment") or ""),
-        seed=seed if seed is not None else whole("seed"),
-        rules=whole("rules"),
-        episodes=int(number("episodes")),
-        mean=mean,
-        std=std,
-        iqm=iqm,
-        low=low,
-        high=high,
-        changed=share("intervention_rate"),
-        covered=share("coverage"),
-        crashes=share("failure_rate") if row.get("crash_rate") is None else share("crash_rate"),
-        crash_ends=_both(share("failure_low"), share("failure_high")),
-        cut=whole("cut") or 0,
-        freedom=None if row.get("coverage") is None else share("freedom"),
-        gained=gained,
-        effect=effect if effect in get_args(Effect) else "",
-    )
 
 
 def _both(low: float | None, high: float | None) -> tuple[float, float] | None:
     return None if low is None or high is None else (low, high)
+
+
+def _gain(mean: float | None, low: float | None, high: float | None) -> MeanInterval | None:
+    return None if mean is None or low is None or high is None else MeanInterval(mean, low, high)
 
 
 # --- showing -----------------------------------------------------------------------------------
