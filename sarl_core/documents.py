@@ -7,13 +7,15 @@ import math
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import inspect
 
-from sarl_core.errors import quoted
-from sarl_core.limits import require_memory
+from sarl_core.errors import InputError, quoted
+from sarl_core.limits import limited_bytes, require_memory
 
 LARGEST_WHOLE = 2**53  # whole numbers up to here are exact in floating point too
 _LARGEST = sys.float_info.max
@@ -24,6 +26,7 @@ Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_WHOLE)]
 
 T = TypeVar("T")
+S = TypeVar("S", bound=msgspec.Struct)
 
 # What the signs of a text may come to as objects of Python, in bytes: about half of the worst.
 _COSTS = {"{": 100, "[": 40, ":": 20, ",": 20, '"': 15}
@@ -83,6 +86,29 @@ def parse_json(
     return document
 
 
+def read_object(path: Path, advice: str) -> dict[str, Any]:
+    """Read a file that holds a JSON object.
+
+    Args:
+        path: The file.
+        advice: What to do if it is none, as "write it again".
+
+    Returns:
+        The object.
+
+    Raises:
+        InputError: If it is none.
+    """
+    try:
+        document = parse_json(limited_bytes(path))
+    except (OSError, ValueError, InputError) as error:
+        reason = (isinstance(error, OSError) and error.strerror) or error
+        raise InputError(f"{path} cannot be read ({reason}); {advice}") from error
+    if not isinstance(document, dict):
+        raise InputError(f"{path} holds no JSON object; {advice}")
+    return document
+
+
 def _refuse_constant(constant: str) -> Any:
     raise ValueError(f"it holds {constant}, which is no number")
 
@@ -134,6 +160,23 @@ def conformed(value: Any, kind: type[T], *, strict: bool = True) -> T:
         raise _in_words(value, kind, str(error)) from error
 
 
+def fitting(value: Any, kind: type[S]) -> S:
+    """What of a document is as a type says; its defaults stand for what is not.
+
+    Args:
+        value: As of `conformed`.
+        kind: A struct in which everything has a default.
+
+    Returns:
+        One of that type.
+    """
+    parts: dict[str, Any] = {}
+    for field in msgspec.structs.fields(kind):
+        with suppress(LookupError, TypeError, MisfitError):
+            parts[field.name] = conformed(value[field.encode_name], field.type)
+    return kind(**parts)
+
+
 def _in_words(value: Any, kind: Any, text: str) -> MisfitError:
     """What msgspec says, as "Expected `int` >= 0 - at `$.rules[3].samples`", in our words."""
     path = text.rpartition(" - at `$")[2] if " - at `$" in text else ""
@@ -181,11 +224,11 @@ def _either(kind: inspect.Type) -> list[Any]:
 
 def _within(kind: inspect.Type, step: str | int) -> list[Any]:
     """The types of what stands there under a key or in a place."""
-    if isinstance(kind, inspect.StructType):
+    if isinstance(kind, inspect.StructType | inspect.DataclassType):
         types: list[inspect.Type] = [
             field.type for field in kind.fields if field.encode_name == step
         ]
-        if kind.tag_field == step:
+        if isinstance(kind, inspect.StructType) and kind.tag_field == step:
             types.append(inspect.LiteralType((kind.tag,)))
     elif isinstance(kind, inspect.TupleType):
         types = [kind.item_types[int(step)]]

@@ -6,7 +6,6 @@ Its plain text, and of its pickles those of the spaces and of the last observati
 from __future__ import annotations
 
 import base64
-import json
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.sb3_statistics import read_array, read_box
+from sarl_core.documents import parse_json
 from sarl_core.errors import InputError
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -62,8 +62,8 @@ def read_data(text: bytes) -> TrainingRecord:
         InputError: If it is no such text.
     """
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        data = parse_json(text, finite=False)
+    except ValueError as error:
         raise InputError("its entry 'data' is no JSON; give what model.save() wrote") from error
     if not isinstance(data, dict):
         raise InputError("its entry 'data' holds no settings; give what model.save() wrote")

@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from sarl_core.documents import Count, MisfitError, NotNegative, conformed, parse_json
+from sarl_core.documents import Count, MisfitError, NotNegative, conformed, read_object
 from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import ARMS, LearningArm
@@ -125,14 +125,8 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         InputError: If it is no such file, or of another version.
     """
-    try:
-        document = parse_json(limited_bytes(path))
-    except (OSError, ValueError, InputError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InputError(
-            f"{path} cannot be read ({reason}); choose a folder that `learn` wrote"
-        ) from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
+    document = read_object(path, "choose a folder that `learn` wrote")
+    if document.get("format") != FORMAT:
         raise InputError(f"{path} is not of a study of learning; choose a folder `learn` wrote")
     if document.get("version") != VERSION:
         raise InputError(

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import plotly.graph_objects as go
+from msgspec import Meta, Struct
 from plotly.subplots import make_subplots
 
+from sarl_core.documents import Count, MisfitError, NotNegative, Number, Share, conformed
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
@@ -36,17 +38,16 @@ class RoundPoint:
         pairs: State-action pairs that they were grown from.
     """
 
-    number: int
-    mean: float
-    std: float
-    coverage: float
-    disagreement: float
-    rules: int
-    pairs: int
+    number: Count
+    mean: Number
+    std: NotNegative
+    coverage: Share
+    disagreement: Share
+    rules: Count
+    pairs: Count
 
 
-@dataclass(frozen=True)
-class BudgetPoint:
+class BudgetPoint(Struct, frozen=True, rename={"low": "iqm_low", "high": "iqm_high"}):
     """What the best rules of a number achieve.
 
     Attributes:
@@ -58,12 +59,12 @@ class BudgetPoint:
         episodes: How many it was measured on.
     """
 
-    rules: int
-    mean: float
-    iqm: float
-    low: float
-    high: float
-    episodes: int
+    rules: Count
+    mean: Number
+    iqm: Number
+    low: Number
+    high: Number
+    episodes: Count
 
 
 def points_of(rounds: Sequence[AggregationRound]) -> tuple[RoundPoint, ...]:
@@ -102,22 +103,15 @@ def card_points(card: Mapping[str, Any]) -> tuple[RoundPoint, ...]:
         InputError: If it is no such card.
     """
     try:
-        return tuple(
-            RoundPoint(
-                number=int(one["number"]),
-                mean=float(one["mean"]),
-                std=float(one["std"]),
-                coverage=float(one["coverage"]),
-                disagreement=float(one["disagreement"]),
-                rules=int(one["rules"]),
-                pairs=int(one["pairs"]),
-            )
-            for one in card["rounds"]
-        )
-    except (KeyError, TypeError, ValueError) as error:
+        return conformed(card, _Card).rounds
+    except MisfitError as error:
         raise InputError(
-            f"the card does not tell of its rounds ({error!r}); make the rules again with aggregate"
+            f"the card does not tell of its rounds ({error}); make the rules again with aggregate"
         ) from error
+
+
+class _Card(Struct):
+    rounds: Annotated[tuple[RoundPoint, ...], Meta(min_length=1)]
 
 
 def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint, ...]:
@@ -134,23 +128,17 @@ def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint
         InputError: If the document is of another form.
     """
     try:
-        points = [
-            BudgetPoint(
-                rules=int(one["rules"]),
-                mean=float(one["mean"]),
-                iqm=float(one["iqm"]),
-                low=float(one["iqm_low"]),
-                high=float(one["iqm_high"]),
-                episodes=int(one["episodes"]),
-            )
-            for one in document["environments"].get(env_id, ())
-        ]
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        points = conformed(document, _Budgets).environments.get(env_id, ())
+    except MisfitError as error:
         raise InputError(
-            f"the returns by number of rules are not of the expected form ({error!r}); write them "
+            f"the returns by number of rules are not of the expected form ({error}); write them "
             "again"
         ) from error
     return tuple(sorted(points, key=lambda point: point.rules))
+
+
+class _Budgets(Struct):
+    environments: dict[str, tuple[BudgetPoint, ...]]
 
 
 def rounds_figure(

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
-from sarl_core.documents import parse_json
-from sarl_core.errors import InputError
+from sarl_core.documents import Count, Number, Share, fitting, read_object
 from sarl_core.explaining.colours import layer_colour
 from sarl_core.explaining.report.tally import Tally
-from sarl_core.limits import limited_bytes
 from sarl_core.mining.edit_counts import edits_sentence
 from sarl_core.mining.language import counted, number_text, share_text, threshold_text
 from sarl_core.mining.rule_set import RuleSet
@@ -25,7 +24,6 @@ from sarl_core.mining.tree import PolicyTree
 # Fine where the rules change fast: at small supports and high confidences.
 _SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 _CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
-_CARD_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -100,6 +98,34 @@ class Kept:
     card: tuple[tuple[str, str], ...]
 
 
+class _Card(Struct):
+    """What a card may say."""
+
+    budget: Count | None = None
+    rounds: list[Any] = []
+    chosen_round: Count | None = None
+    refined: bool | None = None
+    chosen_by: str | None = None
+    reported: dict[str, Any] = {}
+    reported_on: str | None = None
+    seed: Count | None = None
+    command: str | None = None
+
+
+class _Reported(Struct):
+    """What it may say of the episodes that it reports."""
+
+    episodes: Count | None = None
+    mean: Number | None = None
+    std: Number | None = None
+    min: Number | None = None
+    max: Number | None = None
+    failures: Count | None = None
+    failure_low: Share | None = None
+    failure_high: Share | None = None
+    cut: Count | None = None
+
+
 def read_card(rules: Path) -> Mapping[str, Any] | None:
     """The card beside a rule file, which says how the rules were made.
 
@@ -115,15 +141,7 @@ def read_card(rules: Path) -> Mapping[str, Any] | None:
     path = rules.with_suffix(".card.json")
     if not path.is_file():
         return None
-    try:
-        card = parse_json(limited_bytes(path, _CARD_BYTES))
-    except (OSError, ValueError, InputError) as error:
-        raise InputError(
-            f"the card {path} cannot be read ({error}); mend it or take it away"
-        ) from (error)
-    if not isinstance(card, dict):
-        raise InputError(f"the card {path} is not a JSON object; mend it or take it away")
-    return card
+    return read_object(path, "mend this card or take it away")
 
 
 def kept(
@@ -143,11 +161,12 @@ def kept(
     Returns:
         The part of the report.
     """
-    facts = _card_facts(card) if card is not None else ()
+    said = fitting(card, _Card)
+    facts = tuple(_card_facts(said))
     edits = edits_sentence(rule_set)
     then = (edits,) if edits else ()
     if rule_set.cut == "leaves" or trees is None:
-        return Kept((*_built(rule_set, card), *then), None, "", (), facts)
+        return Kept((*_built(rule_set, said), *then), None, "", (), facts)
     limits = rule_set.thresholds
     landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
     same = (
@@ -273,7 +292,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
 # --- a budget ----------------------------------------------------------------------------------
 
 
-def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]:
+def _built(rule_set: RuleSet, card: _Card) -> tuple[str, ...]:
     if rule_set.cut != "leaves":
         return _cut(rule_set)
     found = [
@@ -282,18 +301,17 @@ def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]
         "possible. So these rules leave an agent nothing to choose from: they are a policy that "
         "replaces it, and no longer a shield that corrects it here and there.",
     ]
-    if card is not None and isinstance(card.get("budget"), int):
+    if card.budget is not None:
         each = " for each action" if len(rule_set.actions) > 1 else ""
-        rounds = card.get("rounds")
         asked = (
-            f" In {counted(len(rounds), 'round')} the rules were let act, the expert was asked "
-            "what it would have done in the states they led to, and the rules were built anew "
-            "from all its answers."
-            if isinstance(rounds, list) and rounds
+            f" In {counted(len(card.rounds), 'round')} the rules were let act, the expert was "
+            "asked what it would have done in the states they led to, and the rules were built "
+            "anew from all its answers."
+            if card.rounds
             else ""
         )
-        found.append(f"The budget was {card['budget']:,} rules{each}.{asked}")
-        if card.get("refined") is True:
+        found.append(f"The budget was {card.budget:,} rules{each}.{asked}")
+        if card.refined:
             found.append(
                 "Then the thresholds in the rules were moved to where the rules achieve more "
                 "when they act. They are therefore no plain record of what the expert did most "
@@ -306,58 +324,45 @@ def _built(rule_set: RuleSet, card: Mapping[str, Any] | None) -> tuple[str, ...]
     return tuple(found)
 
 
-def _shares(reported: Mapping[str, Any]) -> list[float]:
-    """The ends of the interval of the failures, as far as a card has them."""
-    ends = (reported.get("failure_low"), reported.get("failure_high"))
-    return [float(end) for end in ends if isinstance(end, (int, float)) and 0 <= end <= 1]
+def _card_facts(card: _Card) -> Iterator[tuple[str, str]]:
+    """What a card says."""
+    if card.budget is not None:
+        yield "Most rules for each action", number_text(card.budget)
+    if card.rounds:
+        taken = _with(", of which the rules of round {} were taken", card.chosen_round)
+        yield "Rounds of asking the expert", f"{len(card.rounds)}{taken}"
+    if card.refined is not None:
+        yield "Thresholds moved to achieve more", "yes" if card.refined else "no"
+    if card.chosen_by is not None:
+        yield "Chosen by", card.chosen_by
+    reported = fitting(card.reported, _Reported)
+    if reported.mean is not None:
+        yield (
+            "Mean return of an agent that follows the rules",
+            number_text(reported.mean)
+            + _with(" ± {}", reported.std)
+            + _with(", from {} to {}", reported.min, reported.max)
+            + _with(", over {} episodes", reported.episodes),
+        )
+    cut = _with(", {} of which were cut off before they could fail", reported.cut)
+    ends = [end and 100 * end for end in (reported.failure_low, reported.failure_high)]
+    failures = _with(
+        f"{{}} of {{}} episodes{cut} (95 % interval {{}} to {{}} %)",
+        reported.failures,
+        reported.episodes,
+        *ends,
+    )
+    if failures:
+        yield "Failures of an agent that follows the rules", failures
+    if card.reported_on is not None:
+        yield "Reported on", card.reported_on
+    if card.seed is not None:
+        yield "Seed", number_text(card.seed)
+    if card.command is not None:
+        yield "Made by", card.command
 
 
-def _card_facts(card: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """What a card says, as far as it can be understood."""
-    found: list[tuple[str, str]] = []
-
-    def number(value: object) -> str | None:
-        usable = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return number_text(float(value)) if usable and math.isfinite(float(value)) else None  # type: ignore[arg-type]
-
-    def text(name: str, key: str) -> None:
-        if isinstance(card.get(key), str):
-            found.append((name, str(card[key])))
-
-    if (budget := number(card.get("budget"))) is not None:
-        found.append(("Most rules for each action", budget))
-    if isinstance(rounds := card.get("rounds"), list) and rounds:
-        chosen = number(card.get("chosen_round"))
-        told = f", of which the rules of round {chosen} were taken" if chosen else ""
-        found.append(("Rounds of asking the expert", f"{len(rounds)}{told}"))
-    if isinstance(refined := card.get("refined"), bool):
-        found.append(("Thresholds moved to achieve more", "yes" if refined else "no"))
-    text("Chosen by", "chosen_by")
-    if isinstance(reported := card.get("reported"), Mapping):
-        mean, std = number(reported.get("mean")), number(reported.get("std"))
-        least, most = number(reported.get("min")), number(reported.get("max"))
-        episodes = number(reported.get("episodes"))
-        if mean is not None:
-            spread = f" ± {std}" if std is not None else ""
-            ends = f", from {least} to {most}" if least is not None and most is not None else ""
-            over = f", over {episodes} episodes" if episodes is not None else ""
-            found.append(
-                ("Mean return of an agent that follows the rules", f"{mean}{spread}{ends}{over}")
-            )
-        failures = number(reported.get("failures"))
-        shares = [number(100 * share) for share in _shares(reported)]
-        cut = number(reported.get("cut"))
-        over = f", {cut} of which were cut off before they could fail" if cut else ""
-        if failures is not None and episodes is not None and len(shares) == 2:
-            found.append(
-                (
-                    "Failures of an agent that follows the rules",
-                    f"{failures} of {episodes} episodes{over} (95 % interval {shares[0]} to "
-                    f"{shares[1]} %)",
-                )
-            )
-    text("Reported on", "reported_on")
-    if (seed := number(card.get("seed"))) is not None:
-        found.append(("Seed", seed))
-    text("Made by", "command")
-    return tuple(found)
+def _with(text: str, *numbers: float | None) -> str:
+    """A text with numbers in its gaps; nothing where one of them is not known."""
+    known = [number_text(one) for one in numbers if one is not None]
+    return text.format(*known) if len(known) == len(numbers) else ""

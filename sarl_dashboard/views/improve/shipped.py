@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import streamlit as st
+from msgspec import Struct
 
-from sarl_core.documents import parse_json
+from sarl_core.documents import Count, MisfitError, Number, Share, conformed, read_object
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.figures.aggregation import budget_figure, budget_points, card_points
 from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.improving.aggregation_files import card_path
-from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import counted, share_text
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.state.data import SHIPPED_SETS
@@ -21,6 +20,7 @@ from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
 BUDGETS = "budgets.json"
+ADVICE = "write it again"
 
 
 def show_shipped() -> None:
@@ -34,93 +34,101 @@ def show_shipped() -> None:
     )
     file = card_path(compact_file())
     try:
-        card = read_document(file)
-        if card is not None:
-            show_card(card)
+        if file.is_file():
+            show_card(read_object(file, ADVICE))
         show_budgets()
     except SarlError as error:
         refuse(error)
 
 
-def read_document(path: Path) -> dict[str, Any] | None:
-    """A JSON file; None if there is none.
+class Reported(Struct):
+    """What a card says of the episodes that it reports."""
 
-    Raises:
-        InputError: If it cannot be read.
-    """
-    if not path.is_file():
-        return None
-    try:
-        document = parse_json(limited_bytes(path))
-    except (OSError, ValueError, InputError) as error:
-        raise InputError(f"{path.name} cannot be read ({error}); write it again") from error
-    if not isinstance(document, dict):
-        raise InputError(f"{path.name} holds no JSON object; write it again")
-    return document
+    episodes: Count
+    mean: Number
+    std: Number
+    min: Number
+    failures: Count | None = None
+    failure_low: Share = 0.0
+    failure_high: Share = 1.0
+    cut: Count = 0
+    freedom: Share | None = None
+    intervention_rate: Share = 0.0
 
 
-def show_card(card: dict[str, Any]) -> None:
+class Card(Struct):
+    """What a card says, but for its rounds."""
+
+    command: str
+    rules_per_dimension: list[Count]
+    chosen_round: Count
+    refined: bool
+    generations: Count
+    reported: Reported | None
+
+
+def show_card(document: dict[str, Any]) -> None:
     """How the shipped compact rules came about."""
-    points = card_points(card)
     try:
-        sentence, chosen = card_sentence(card), int(card["chosen_round"])
-        command = str(card["command"])
-        reported = card["reported"]
-        mean = float(reported["mean"]) if reported else None
-        if not points:
-            raise KeyError("rounds")
-    except (KeyError, TypeError, ValueError) as error:
+        card = conformed(document, Card)
+    except MisfitError as error:
         raise InputError(
-            f"the card of the compact rules lacks {error}; make the rules again with aggregate"
+            f"the card of the compact rules lacks a part ({error}); make the rules again with "
+            "aggregate"
         ) from error
+    points = card_points(document)
     st.subheader("The compact rules that are shipped")
-    st.markdown(sentence)
+    st.markdown(card_sentence(card))
     with st.popover("The command that made them", icon=":material/terminal:"):
-        st.code(command, language="sh", wrap_lines=True)
-    show_rounds(points, chosen=chosen, reported=mean, key="card")
+        st.code(card.command, language="sh", wrap_lines=True)
+    show_rounds(
+        points,
+        chosen=card.chosen_round,
+        reported=None if card.reported is None else card.reported.mean,
+        key="card",
+    )
 
 
-def card_sentence(card: dict[str, Any]) -> str:
+def card_sentence(card: Card) -> str:
     """What the rules of a card achieve, for Markdown."""
-    size = size_text([int(count) for count in card["rules_per_dimension"]])
-    afterwards = ""
-    if card["refined"]:
-        afterwards = f", refined in {counted(int(card['generations']), 'step')} afterwards"
-    origin = f"They are those of round {int(card['chosen_round'])}{afterwards}."
-    reported = card["reported"]
-    if not reported:
+    size = size_text(card.rules_per_dimension)
+    afterwards = f", refined in {counted(card.generations, 'step')} afterwards" * card.refined
+    origin = f"They are those of round {card.chosen_round}{afterwards}."
+    reported = card.reported
+    if reported is None:
         return f"These are {size}. {origin}"
     return (
         f"A novice that acts at random, kept to these {size}, reached a mean return of "
-        f"**{float(reported['mean']):,.1f}** over {int(reported['episodes']):,} fresh episodes "
-        f"(deviation {float(reported['std']):,.1f}, least {float(reported['min']):,.1f})"
+        f"**{reported.mean:,.1f}** over {reported.episodes:,} fresh episodes "
+        f"(deviation {reported.std:,.1f}, least {reported.min:,.1f})"
         f"{_failures_of_card(reported)}. {origin}{_policy_of_card(reported)}"
     )
 
 
-def _failures_of_card(reported: dict[str, Any]) -> str:
+def _failures_of_card(reported: Reported) -> str:
     """How many of a card's episodes failed; nothing where it does not say."""
-    if "failures" not in reported:
+    if reported.failures is None:
         return ""
-    low, high = (share_text(float(reported[f"failure_{end}"])) for end in ("low", "high"))
-    cut = int(reported.get("cut", 0))
+    low, high = share_text(reported.failure_low), share_text(reported.failure_high)
+    cut = reported.cut
     also = f", and {cut:,} were cut off before they could" if cut else ""
-    return f"; {int(reported['failures']):,} of them failed{also} (95 % interval {low} to {high})"
+    return f"; {reported.failures:,} of them failed{also} (95 % interval {low} to {high})"
 
 
-def _policy_of_card(reported: dict[str, Any]) -> str:
+def _policy_of_card(reported: Reported) -> str:
     """That a card's rules are a policy, where they leave nothing to choose from."""
-    if reported.get("freedom") != 0:
+    if reported.freedom != 0:
         return ""
-    changed = share_text(float(reported["intervention_rate"]))
+    changed = share_text(reported.intervention_rate)
     return f" {POLICY_TEXT}: they changed {changed} of the novice's steps."
 
 
 def show_budgets() -> None:
     """Return against number of rules, an environment each."""
-    document = read_document(RULES_FOLDER / BUDGETS)
-    if document is None:
+    file = RULES_FOLDER / BUDGETS
+    if not file.is_file():
         return
+    document = read_object(file, ADVICE)
     budgets = [
         (label, points)
         for label, env_id in SHIPPED_SETS.values()
