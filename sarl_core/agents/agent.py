@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up
 from sarl_core.errors import InputError, require
 from sarl_core.shipped import DATA
@@ -143,7 +144,7 @@ class UniformAgent:
 
 def make_agent(
     spec: str | Path | Agent,
-    env_id: str,
+    env_id: EnvironmentOrId,
     *,
     stochastic: bool = False,
     seed: int = 0,
@@ -168,7 +169,7 @@ def make_agent(
     Raises:
         InputError: If there is no such agent, or it does not fit the environment.
     """
-    require(env_id, str, "the environment must be text", "give its id, as 'CartPole-v1'")
+    as_environment(env_id)  # refuses what is no environment
     if isinstance(spec, Agent):
         return spec
     require(
@@ -191,7 +192,7 @@ def make_agent(
         return PolicyAgent("untrained", _untrained(env_id, seed), True, first)
     notes: tuple[str, ...] = ()
     if spec == "expert":
-        name, policy = "expert", _expert(env_id)
+        name, policy = "expert", _expert(str(env_id))
     else:
         name = Path(spec).stem
         policy, notes = _policy_from(Path(spec), env_id, normalise)
@@ -220,7 +221,7 @@ def shipped_experts(folder: Path = EXPERT_FOLDER) -> dict[str, Path]:
     return dict(sorted(experts.items()))
 
 
-def _novice(env_id: str, first: NDArray[np.int64]) -> UniformAgent:
+def _novice(env_id: EnvironmentOrId, first: NDArray[np.int64]) -> UniformAgent:
     env = make_environment(env_id)
     space = env.action_space
     counts = np.array(label_counts(space), dtype=np.int64)
@@ -230,7 +231,7 @@ def _novice(env_id: str, first: NDArray[np.int64]) -> UniformAgent:
     return UniformAgent("novice", counts, first, low.astype(np.float32), high.astype(np.float32))
 
 
-def _untrained(env_id: str, seed: int) -> MlpPolicy:
+def _untrained(env_id: EnvironmentOrId, seed: int) -> MlpPolicy:
     """The weights PPO starts from, without a learner around them."""
     import torch
     from gymnasium import spaces
@@ -255,7 +256,7 @@ def _untrained(env_id: str, seed: int) -> MlpPolicy:
         label_counts=tuple(counts) if description.is_discrete else (),
         action_low=low,
         action_high=high,
-        env_id=env_id,
+        env_id=str(env_id),
     )
 
 
@@ -271,7 +272,7 @@ def _expert(env_id: str) -> MlpPolicy:
 
 
 def _policy_from(
-    path: Path, env_id: str, normalise: str | Path | None
+    path: Path, env_id: EnvironmentOrId, normalise: str | Path | None
 ) -> tuple[MlpPolicy, tuple[str, ...]]:
     if path.suffix.lower() not in (".npz", ".zip"):
         raise InputError(
@@ -286,12 +287,14 @@ def _policy_from(
 
     env = make_environment(env_id)
     try:
-        return load_sb3_zip(path, env, env_id, normalise=normalise)
+        return load_sb3_zip(path, env, str(env_id), normalise=normalise)
     finally:
         env.close()
 
 
-def _unlike(agent: PolicyAgent, normalisation: Normalisation, env_id: str) -> tuple[str, ...]:
+def _unlike(
+    agent: PolicyAgent, normalisation: Normalisation, env_id: EnvironmentOrId
+) -> tuple[str, ...]:
     """Say so where the first states that a policy meets are unlike those of its statistics."""
     states = _first_states(agent, env_id)
     far = np.abs(normalisation.deviations(states)) > _FAR
@@ -308,7 +311,7 @@ def _unlike(agent: PolicyAgent, normalisation: Normalisation, env_id: str) -> tu
     )
 
 
-def _first_states(agent: PolicyAgent, env_id: str) -> NDArray[np.float32]:
+def _first_states(agent: PolicyAgent, env_id: EnvironmentOrId) -> NDArray[np.float32]:
     """Some states that an agent meets, from the start of a few episodes, shape (n, d)."""
     from sarl_core.agents.spaces import adapt
 
@@ -333,7 +336,7 @@ def _first_states(agent: PolicyAgent, env_id: str) -> NDArray[np.float32]:
         env.close()
 
 
-def order_notes(agent: Agent, env_id: str) -> tuple[str, ...]:
+def order_notes(agent: Agent, env_id: EnvironmentOrId) -> tuple[str, ...]:
     """What is to be said of how the features of a policy and of an environment were matched.
 
     Args:
@@ -361,7 +364,7 @@ def order_notes(agent: Agent, env_id: str) -> tuple[str, ...]:
             tuple(name for name, _ in names.features),
             agent.policy.env_id,
         ),
-        NamedFeatures(env_id.rsplit(":", 1)[-1], here.feature_names, env_id),
+        NamedFeatures(str(env_id).rsplit(":", 1)[-1], here.feature_names, str(env_id)),
     )
     if order.how == "permuted":  # two environments of one catalogue: none is the other's
         raise InputError(
@@ -371,7 +374,7 @@ def order_notes(agent: Agent, env_id: str) -> tuple[str, ...]:
     return (order.note,) if order.note else ()
 
 
-def _check_fit(spec: str, policy: MlpPolicy, env_id: str) -> None:
+def _check_fit(spec: str, policy: MlpPolicy, env_id: EnvironmentOrId) -> None:
     """Refuse a policy that was trained for other observations or actions."""
     description = describe_environment(env_id)
     d = len(description.feature_names)

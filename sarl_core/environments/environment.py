@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
 from sarl_core.documents import parse_json
@@ -56,6 +56,12 @@ class Environment:
     def __str__(self) -> str:
         """Its id."""
         return self.id
+
+    @property
+    def key(self) -> str:
+        """A text that tells it from all others; of one that is nothing but an id, that id."""
+        others = [getattr(self, part.name) for part in fields(self)[1:]]
+        return self.id if self == Environment(self.id) else json.dumps([self.id, *others])
 
     @property
     def keywords(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance, scores
@@ -121,7 +122,7 @@ def aggregate(
     start: Demonstrations,
     plan: Plan,
     *,
-    env_id: str | None = None,
+    env_id: EnvironmentOrId | None = None,
     agent: str | Agent = "novice",
     expert: str | Agent = "expert",
     jobs: int = 1,
@@ -210,7 +211,7 @@ class _Run:
         self,
         start: Demonstrations,
         plan: Plan,
-        env_id: str,
+        env_id: EnvironmentOrId,
         agent: Agent,
         expert: Agent,
         jobs: int,
@@ -395,7 +396,7 @@ class _Run:
             choice = _Choice(best, self.trees[best])
         pairs = self.answers.pairs(choice.index)
         return Aggregation(
-            env_id=self.env_id,
+            env_id=str(self.env_id),
             plan=self.plan,
             rule_set=with_boxes(self.rules(choice.trees), pairs),
             trees=choice.trees,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress
 from sarl_core.rollouts.episodes import rollout
@@ -71,7 +72,7 @@ class Gaps:
 
 
 def find_gaps(
-    env_id: str,
+    env_id: EnvironmentOrId,
     rules: RuleSet,
     *,
     agent: str | Agent = "novice",
@@ -135,7 +136,7 @@ def find_gaps(
 
 
 def gaps_so_far(
-    env_id: str,
+    env_id: EnvironmentOrId,
     rules: RuleSet,
     *,
     agent: str | Agent = "novice",

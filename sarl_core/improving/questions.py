@@ -12,6 +12,7 @@ from sarl_core.agents.spaces import Actions
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.rollouts.steps import StepTable
 
@@ -81,7 +82,7 @@ def importance(label_scores: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def answered(
-    env_id: str,
+    env_id: EnvironmentOrId,
     expert: Agent,
     observations: NDArray[np.float32],
     actions: Actions,
@@ -116,7 +117,7 @@ def answered(
         action_names=description.action_names,
         label_names=description.label_names,
         label_first=description.label_first,
-        env_id=env_id,
+        env_id=str(env_id),
         agent=expert.name,
         **bounds,
     )
@@ -125,7 +126,7 @@ def answered(
 class Answers:
     """What an expert said, at first and round by round."""
 
-    def __init__(self, env_id: str, expert: Agent, start: Demonstrations) -> None:
+    def __init__(self, env_id: EnvironmentOrId, expert: Agent, start: Demonstrations) -> None:
         """Ask about the states that were demonstrated.
 
         Args:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import executor_of, run_each
@@ -80,7 +81,7 @@ class _Parameters:
 
 
 def refine(
-    env_id: str,
+    env_id: EnvironmentOrId,
     trees: Sequence[PolicyTree],
     pairs: Demonstrations,
     *,
@@ -216,7 +217,7 @@ def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
 
 
 def _mean_return(
-    env_id: str,
+    env_id: EnvironmentOrId,
     structures: Sequence[TreeStructure],
     few: Demonstrations,
     divider: int,

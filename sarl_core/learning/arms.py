@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def arms_named(names: Sequence[str], *, discrete: bool = True) -> tuple[Learning
 
 
 def check_learning(
-    env_id: str, rules: RuleSet | None, arm: LearningArm, *, steps: int, seed: int
+    env_id: EnvironmentOrId, rules: RuleSet | None, arm: LearningArm, *, steps: int, seed: int
 ) -> None:
     """Refuse what cannot be learned, before any work is done for it.
 

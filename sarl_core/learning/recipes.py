@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from sarl_core.environments.description import make_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.learning.arms import SEEDS_APART, LearningArm
 from sarl_core.shielding.shield import Shield
 
@@ -74,7 +75,7 @@ _REPLAY = 100_000  # steps that an off-policy learner remembers
 
 
 def make_learner(
-    env_id: str, shield: Shield | None, arm: LearningArm, *, steps: int, seed: int
+    env_id: EnvironmentOrId, shield: Shield | None, arm: LearningArm, *, steps: int, seed: int
 ) -> tuple[BaseAlgorithm, VecEnv]:
     """Make the learner of an arm, and its environments.
 
@@ -108,7 +109,7 @@ def make_learner(
     }
     if arm.replay:
         continuous = isinstance(env.action_space, Box)
-        recipe = dict(_SAC) if continuous else _recipe(_DQN, env_id)
+        recipe = dict(_SAC) if continuous else _recipe(_DQN, str(env_id))
         recipe["buffer_size"] = min(_REPLAY, steps)
         recipe["learning_starts"] = min(recipe["learning_starts"], steps // 10)
         algorithm: Any = learners.ExecutedSAC if continuous else learners.ExecutedDQN
@@ -116,7 +117,7 @@ def make_learner(
     with warnings.catch_warnings():
         # A last batch that is smaller than the others does no harm.
         warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
-        return _policy_gradient(env_id, env, arm, steps, common), env
+        return _policy_gradient(str(env_id), env, arm, steps, common), env
 
 
 def _policy_gradient(
@@ -158,7 +159,7 @@ def _falling(start: float) -> Callable[[float], float]:
     return lambda remaining: start * max(remaining, 0.02)
 
 
-def _environment(env_id: str) -> Any:
+def _environment(env_id: EnvironmentOrId) -> Any:
     from gymnasium.wrappers import FlattenObservation
 
     from sarl_core.shielding.wrappers import is_flat

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import PolicyAgent
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import shield_for
@@ -150,7 +151,7 @@ def relevance_from_frame(frame: pd.DataFrame) -> Relevance:
 
 
 def study_relevance(
-    env_id: str,
+    env_id: EnvironmentOrId,
     rule_sets: Mapping[str, RuleSet],
     *,
     seeds: Sequence[int] = (0, 1, 2, 3, 4),
@@ -216,7 +217,7 @@ def study_relevance(
         if environment is not None:
             environment.close()
     return Relevance(
-        env_id=env_id,
+        env_id=str(env_id),
         names=tuple(rule_sets),
         rule_counts=tuple(len(rules) for rules in rule_sets.values()),
         seeds=np.array(seeds, dtype=np.int64),
@@ -228,7 +229,7 @@ def study_relevance(
     )
 
 
-def _learner(env_id: str, seed: int, learning_steps: int) -> PPO:
+def _learner(env_id: EnvironmentOrId, seed: int, learning_steps: int) -> PPO:
     import torch
     from stable_baselines3 import PPO
 
@@ -248,13 +249,13 @@ def _learner(env_id: str, seed: int, learning_steps: int) -> PPO:
 
 
 def _test(
-    env_id: str, learner: PPO, seed: int, shields: Sequence[Shield], steps: int
+    env_id: EnvironmentOrId, learner: PPO, seed: int, shields: Sequence[Shield], steps: int
 ) -> tuple[tuple[list[int], list[int]], float]:
     """Steps at which each shield's rules applied and were broken, and the mean return."""
     from sarl_core.learning.experts import export_policy
 
     first = np.array(describe_environment(env_id).label_first, dtype=np.int64)
-    agent = PolicyAgent("learner", export_policy(learner, env_id=env_id), True, first)
+    agent = PolicyAgent("learner", export_policy(learner, env_id=str(env_id)), True, first)
     recorded = record(env_id, agent, steps=steps, seed=RELEVANCE + SEEDS_A_LEARNER * seed)
     applied, broken = [], []
     for shield in shields:

@@ -12,6 +12,7 @@ import numpy as np
 
 from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
 from sarl_core.learning.checkpoints import Rest, load_checkpoint, save_checkpoint
@@ -66,7 +67,7 @@ class LearningResult:
 
 
 def learn(
-    env_id: str,
+    env_id: EnvironmentOrId,
     rules: RuleSet | None,
     arm: LearningArm,
     *,
@@ -114,7 +115,7 @@ def learn(
     began = time.monotonic()
     shield = None if rules is None else Shield(rules, projection=projection)
     identity = {
-        "env_id": env_id,
+        "env_id": as_environment(env_id).key,
         "arm": arm.name,
         "steps": steps,
         "seed": seed,
@@ -145,7 +146,7 @@ def learn(
 
     try:
         curve = _learn(learner, env, env_id, arm, steps, seed, rest.curve, tell, keep)
-        policy = _exported(learner, env_id, arm)
+        policy = _exported(learner, str(env_id), arm)
     finally:
         env.close()
 
@@ -158,14 +159,14 @@ def learn(
     alone, shielded = tried(None), None if shield is None else tried(shield)
     end = so_far(curve)
     return LearningResult(
-        env_id, arm, steps, seed, curve, policy, alone, shielded, end.seconds, end.sittings
+        str(env_id), arm, steps, seed, curve, policy, alone, shielded, end.seconds, end.sittings
     )
 
 
 def _learn(
     learner: Any,
     env: Any,
-    env_id: str,
+    env_id: EnvironmentOrId,
     arm: LearningArm,
     steps: int,
     seed: int,
@@ -182,7 +183,7 @@ def _learn(
 
     begun = learner.num_timesteps
     recorder = Recorder(
-        env_id, arm, env, before, steps=steps, seed=seed + begun, tell=tell, keep=keep
+        str(env_id), arm, env, before, steps=steps, seed=seed + begun, tell=tell, keep=keep
     )
     go_on = tell(before, begun)
     if go_on and begun < steps:
@@ -223,7 +224,7 @@ def _diverged(learner: Any, error: Exception) -> Exception:
 
 
 def _try(
-    env_id: str,
+    env_id: EnvironmentOrId,
     policy: MlpPolicy,
     shield: Shield | None,
     episodes: int,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, WorkError, require_whole
 from sarl_core.rendering.film import Film
 from sarl_core.rollouts.episodes import Episodes, run_seeds
@@ -25,7 +26,7 @@ MAX_STEPS = 5_000  # of one picture; where an environment sets itself no limit
 _DEFAULT_FPS = 30.0  # where an environment does not say
 
 
-def picture_speed(env_id: str, max_steps: int | None = None) -> tuple[float, int]:
+def picture_speed(env_id: EnvironmentOrId, max_steps: int | None = None) -> tuple[float, int]:
     """Refuse an environment without pictures; of one with, say how fast and how long it runs.
 
     Args:
@@ -54,7 +55,7 @@ def picture_speed(env_id: str, max_steps: int | None = None) -> tuple[float, int
 
 
 def film_episode(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     shield: Shield | None,
     seed: int,
@@ -82,7 +83,7 @@ def film_episode(
     """
 
     def observer(view: View) -> None:
-        film.add(picture_of(view.env, env_id))
+        film.add(picture_of(view.env, str(env_id)))
         if view.step:
             progress(view.step, limit)
 

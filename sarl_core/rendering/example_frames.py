@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.agents.spaces import Actions
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError, Progress, report
@@ -124,7 +125,7 @@ class _FramePlace(NamedTuple):
 
 
 def example_frames(
-    env_id: str,
+    env_id: EnvironmentOrId,
     rule_set: RuleSet,
     rules: Sequence[int],
     players: Sequence[Player],
@@ -193,7 +194,7 @@ def example_frames(
     report(progress, total, total)
     size = next(iter(pictures.values())).shape[1::-1] if pictures else (width, 0)
     return Examples(
-        env_id=env_id,
+        env_id=str(env_id),
         frames={rule: drawn for rule, drawn in frames.items() if drawn},
         played=tuple(played),
         size=(int(size[0]), int(size[1])),
@@ -202,7 +203,7 @@ def example_frames(
 
 
 def _play(
-    env_id: str,
+    env_id: EnvironmentOrId,
     shield: Shield,
     player: Player,
     episodes: int,
@@ -252,7 +253,7 @@ def _spread(
 
 
 def _pictures(
-    env_id: str,
+    env_id: EnvironmentOrId,
     played: Sequence[PlayedEpisodes],
     wanted: Sequence[_FramePlace],
     width: int,
@@ -293,7 +294,7 @@ class _Repeating:
 
 
 def _draw(
-    env_id: str, seed: int, steps: StepTable, wanted: set[int], width: int
+    env_id: EnvironmentOrId, seed: int, steps: StepTable, wanted: set[int], width: int
 ) -> dict[int, NDArray[np.uint8]]:
     """Play an episode again up to the last step that is wanted."""
     pictures = {}
@@ -302,7 +303,7 @@ def _draw(
         if view.step > max(wanted):
             return
         # Every state is drawn: flames and dust fade as they are drawn.
-        picture = picture_of(view.env, env_id)
+        picture = picture_of(view.env, str(env_id))
         if not np.array_equal(view.state, steps.observation[view.step]):
             raise _AstrayError  # a picture would show another state
         if view.step in wanted:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require_whole
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.rule_tree import NO_RULE
@@ -116,7 +117,7 @@ class Fork:
 
 
 def fork(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     shield: Shield,
     *,
@@ -178,7 +179,7 @@ def fork(
         panels.append(
             _ForkedPanel(
                 title=title,
-                subtitle=f"{env_id.rsplit(':', 1)[-1]} · seed {seed}",
+                subtitle=f"{str(env_id).rsplit(':', 1)[-1]} · seed {seed}",
                 film=film,
                 steps=episode.steps,
                 shielded=True,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require_whole
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.environment_actions import environment_dimensions
@@ -165,7 +166,7 @@ def check_picture_path(path: Path) -> None:
 
 
 def render_episode(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     *,
     shield: Shield | None = None,
@@ -199,7 +200,7 @@ def render_episode(
 
 
 def side_by_side(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     shield: Shield,
     *,
@@ -237,7 +238,7 @@ def side_by_side(
 
 
 def _replay(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     shields: tuple[Shield | None, ...],
     seed: int,
@@ -272,7 +273,7 @@ def _replay(
         panels.append(
             Panel(
                 title=f"{actor.name}{ending}",
-                subtitle=f"{env_id.rsplit(':', 1)[-1]} · seed {seed}",
+                subtitle=f"{str(env_id).rsplit(':', 1)[-1]} · seed {seed}",
                 film=film,
                 steps=episode.steps,
                 shielded=shield is not None,

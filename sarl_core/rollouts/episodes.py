@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import failed, failure_known
 from sarl_core.errors import SarlError, require_whole
 from sarl_core.mining.language import share_text
@@ -371,7 +372,7 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
 
 
 def rollout(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     *,
     shield: Shield | None = None,
@@ -449,7 +450,7 @@ def rollout(
 
 
 def run_seeds(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     shield: Shield | None,
     seeds: NDArray[np.int64],
@@ -493,4 +494,4 @@ def run_seeds(
         observer=observer,
         render_mode=render_mode,
     )
-    return Episodes(env_id=env_id, agent=agent.name, seeds=seeds, **outcome._asdict())
+    return Episodes(env_id=str(env_id), agent=agent.name, seeds=seeds, **outcome._asdict())

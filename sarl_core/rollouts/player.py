@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent, order_notes
 from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.environments.imports import reason
+from sarl_core.errors import InputError
 from sarl_core.rollouts.steps import StepTable
 
 if TYPE_CHECKING:
@@ -81,7 +84,7 @@ class _Lane:
 
 
 def play(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     shield: Shield | None,
     seeds: NDArray[np.int64],
@@ -132,7 +135,7 @@ class _Lanes:
 
     def __init__(
         self,
-        env_id: str,
+        env_id: EnvironmentOrId,
         agent: Agent,
         shield: Shield | None,
         seeds: NDArray[np.int64],
@@ -171,7 +174,10 @@ class _Lanes:
         )
         self.lanes.append(lane)
         self.started += 1
-        observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
+        try:
+            observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
+        except Exception as error:  # other people's code, which may raise anything
+            raise self._broken(lane, "at its reset", error) from error
         state = self.adapter.flat(observation)
         self.states = np.concatenate([self.states, state[None]])
         if self.observer is not None:
@@ -194,9 +200,13 @@ class _Lanes:
         rewards = np.empty(len(states))
         ended: list[tuple[int, bool, bool]] = []
         for index, lane in enumerate(self.lanes):
-            observation, reward, terminated, truncated, info = lane.env.step(actions[index])
+            try:
+                observation, reward, terminated, truncated, info = lane.env.step(actions[index])
+                rewards[index] = reward
+            except Exception as error:  # other people's code, which may raise anything
+                where = f"at step {self.lengths[lane.episode]}"
+                raise self._broken(lane, where, error) from error
             following[index] = adapter.flat(observation)
-            rewards[index] = reward
             if "cost" in info:
                 self.costs[lane.episode] = _added(self.costs[lane.episode], info["cost"])
             if terminated or truncated:
@@ -238,6 +248,13 @@ class _Lanes:
         self.lengths[episodes] += 1
         self.states = following
         return self._end(ended, episodes)
+
+    def _broken(self, lane: _Lane, where: str, error: Exception) -> InputError:
+        """What to say of an environment that raises in the middle of its work."""
+        return InputError(
+            f"{self.env_id} failed in the episode with seed {self.seeds[lane.episode]}, {where} "
+            f"({reason(error)}); mend the environment or its wrapper, or choose another"
+        )
 
     def _end(self, ended: list[tuple[int, bool, bool]], episodes: NDArray[np.int64]) -> int:
         closed = {index for index, _, _ in ended}
@@ -344,7 +361,7 @@ def _added(cost: float, more: Any) -> float:
     return value if np.isnan(cost) else cost + value
 
 
-def shield_for(env_id: str, shield: Shield) -> Shield:
+def shield_for(env_id: EnvironmentOrId, shield: Shield) -> Shield:
     """The shield whose rules are in the order of an environment's features and actions.
 
     Args:
@@ -375,7 +392,7 @@ class Ready(NamedTuple):
     notes: tuple[str, ...]
 
 
-def check_environment(env_id: str, shield: Shield | None) -> Ready:
+def check_environment(env_id: EnvironmentOrId, shield: Shield | None) -> Ready:
     """Read an environment's spaces, put the shield into their order, and refuse what cannot be run.
 
     Args:

@@ -10,6 +10,7 @@ import numpy as np
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import require_whole
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.player import EpisodeArrays, play
@@ -28,7 +29,7 @@ _BATCH = 16
 
 
 def record(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     *,
     steps: int,
@@ -75,7 +76,7 @@ def record(
 
 
 def _demonstrations(
-    env_id: str, agent: str, seed: int, outcomes: list[EpisodeArrays], steps: int
+    env_id: EnvironmentOrId, agent: str, seed: int, outcomes: list[EpisodeArrays], steps: int
 ) -> Demonstrations:
     description = describe_environment(env_id)
 
@@ -99,14 +100,14 @@ def _demonstrations(
         action_names=description.action_names,
         label_names=description.label_names,
         label_first=description.label_first,
-        env_id=env_id,
+        env_id=str(env_id),
         agent=agent,
         seed=seed,
         **_bounds(env_id),
     )
 
 
-def _bounds(env_id: str) -> dict[str, Any]:
+def _bounds(env_id: EnvironmentOrId) -> dict[str, Any]:
     """Bounds of the action space; none where a side is open, so that the data's are taken."""
     description = describe_environment(env_id)
     low, high = description.action_low, description.action_high

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_core.processes import completed
 from sarl_core.rollouts.episodes import LOST, Episodes, run_seeds
@@ -48,7 +49,7 @@ class Task:
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
     """
 
-    env_id: str
+    env_id: EnvironmentOrId
     agent: Agent
     shield: Shield | None
     seed: int
@@ -146,7 +147,7 @@ def run_tasks(
     if executor is None:
         yield from _run_here(tasks)
         return
-    paces: defaultdict[tuple[str, int], _Pace] = defaultdict(_Pace)
+    paces: defaultdict[tuple[EnvironmentOrId, int], _Pace] = defaultdict(_Pace)
     progress = [_Progress(task, paces[task.env_id, id(task.agent)]) for task in tasks]
     with closing(completed(executor, _calls(progress), lost=LOST)) as batches:
         for batch in batches:
@@ -206,7 +207,7 @@ def _handed_over(
 
 
 def _work(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     shield: PackedShield | None,
     seeds: NDArray[np.int64],

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require_whole
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
@@ -67,7 +68,7 @@ class AblationRecord:
 
     def __init__(
         self,
-        env_id: str,
+        env_id: EnvironmentOrId,
         agent: Agent,
         shield: Shield,
         seed: int,
@@ -266,7 +267,7 @@ class AblationRecord:
 
 
 def ablate(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     shield: Shield,
     *,

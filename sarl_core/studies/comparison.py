@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sarl_core.agents.agent import Agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import failure_known
 from sarl_core.errors import InputError
 from sarl_core.progress import Progress, part_of
@@ -100,7 +101,7 @@ class Comparison:
 
 
 def compare(
-    env_id: str,
+    env_id: EnvironmentOrId,
     arms: Sequence[Arm],
     *,
     episodes: int = 100,
@@ -148,11 +149,11 @@ def compare(
         )
         for index, arm in enumerate(arms)
     )
-    return Comparison(env_id, seed, tuple(arms), played)
+    return Comparison(str(env_id), seed, tuple(arms), played)
 
 
 def compare_arm(
-    env_id: str,
+    env_id: EnvironmentOrId,
     arm: Arm,
     *,
     episodes: int = 100,

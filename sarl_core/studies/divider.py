@@ -20,6 +20,7 @@ from sarl_core.agents.spaces import Actions
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.mining.quantisation import (
     SNAPPINGS,
@@ -127,7 +128,7 @@ class DividerStudy:
 
 
 def study_divider(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: str | Path | Agent,
     demonstrations: Demonstrations,
     *,
@@ -185,7 +186,7 @@ def study_divider(
     unchanged = run(expert)
     known = {(each.divided[0].divider, each.snapping): run(each) for each in variants}
     return DividerStudy(
-        env_id,
+        str(env_id),
         seed,
         tuple(dividers),
         quantisations,
@@ -199,7 +200,7 @@ def study_divider(
 
 
 def snapped_agents(
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     quantisations: Sequence[Sequence[Quantisation]],
     projections: Sequence[Snapping] = SNAPPINGS,
@@ -228,7 +229,7 @@ def snapped_agents(
     )
 
 
-def _check_actions(env_id: str, dimensions: Sequence[Quantisation]) -> None:
+def _check_actions(env_id: EnvironmentOrId, dimensions: Sequence[Quantisation]) -> None:
     description = describe_environment(env_id)
     if description.action_low is None or description.action_high is None:
         raise InputError(
