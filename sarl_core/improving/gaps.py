@@ -14,7 +14,7 @@ from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress
-from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -71,70 +71,6 @@ class Gaps:
         return pd.DataFrame(columns)
 
 
-def find_gaps(
-    env_id: EnvironmentOrId,
-    rules: RuleSet,
-    *,
-    agent: str | Agent = "novice",
-    episodes: int = 20,
-    seed: int = 0,
-    projection: Projection = "centre",
-    jobs: int = 1,
-    executor: Executor | None = None,
-    max_steps: int | None = None,
-    progress: Progress | None = None,
-) -> Gaps:
-    """Run a shielded agent and collect the states in which some dimension has no rule.
-
-    Args:
-        env_id: What ``gymnasium.make`` takes.
-        rules: The shield's.
-        agent: Who is shielded.
-        episodes: How many.
-        seed: Of the first.
-        projection: How the shield replaces a continuous action.
-        jobs: Processes.
-        executor: Whose processes they are; this machine's where not given.
-        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
-        progress: Called with (episodes done, in all); returning False stops.
-
-    Returns:
-        The states in the order they were met.
-
-    Raises:
-        InputError: If agent, rules and environment do not fit.
-        CancelledError: If `progress` returned False.
-    """
-    _, shield, notes = check_environment(env_id, Shield(rules, projection=projection))
-    assert shield is not None
-    played = rollout(
-        env_id,
-        agent,
-        shield=shield,
-        episodes=episodes,
-        seed=seed,
-        jobs=jobs,
-        executor=executor,
-        max_steps=max_steps,
-        progress=progress,
-    )
-    table = played.steps
-    assert table is not None
-    missing = table.rules < 0
-    rows = np.flatnonzero(missing.any(axis=1))
-    return Gaps(
-        feature_names=tuple(feature.name for feature in shield.rule_set.source.features),
-        episode=table.episode[rows],
-        step=table.step[rows],
-        observations=table.observation[rows],
-        missing=missing[rows],
-        met=len(table),
-        episodes=episodes,
-        cut=int(played.cut.sum()),
-        notes=tuple(dict.fromkeys((*notes, *played.notes))),
-    )
-
-
 def gaps_so_far(
     env_id: EnvironmentOrId,
     rules: RuleSet,
@@ -148,10 +84,10 @@ def gaps_so_far(
     max_steps: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Gaps]:
-    """Do what `find_gaps` does, a few episodes at a time.
+    """Run a shielded agent, and collect the states in which some dimension has no rule.
 
     Args:
-        env_id: As there, like all others.
+        env_id: What ``gymnasium.make`` takes.
         rules: The shield's.
         agent: Who is shielded.
         episodes: How many.
@@ -163,36 +99,53 @@ def gaps_so_far(
         progress: Called with (episodes done, in all); returning False stops.
 
     Yields:
-        Everything that has been found so far; the last is what `find_gaps` gives.
+        Every few episodes all states so far, in the order in which they were met.
 
     Raises:
         InputError: If agent, rules and environment do not fit.
         CancelledError: If `progress` returned False.
     """
     actor = make_agent(agent, env_id, seed=seed)  # once: an untrained one is of the first seed
+    _, shield, notes = check_environment(env_id, Shield(rules, projection=projection))
+    assert shield is not None
     size = max(_PIECE, jobs, -(-episodes // _PIECES))
     pieces: list[Gaps] = []
     for start in range(0, episodes, size):
-        count = min(size, episodes - start)
 
         def advance(done: int, _: int, start: int = start) -> bool | None:
             return progress(start + done, episodes) if progress is not None else None
 
-        pieces.append(
-            find_gaps(
-                env_id,
-                rules,
-                agent=actor,
-                episodes=count,
-                seed=seed + start,
-                projection=projection,
-                jobs=jobs,
-                executor=executor,
-                max_steps=max_steps,
-                progress=advance,
-            )
+        played = rollout(
+            env_id,
+            actor,
+            shield=shield,
+            episodes=min(size, episodes - start),
+            seed=seed + start,
+            jobs=jobs,
+            executor=executor,
+            max_steps=max_steps,
+            progress=advance,
         )
+        pieces.append(_gaps(played, shield, notes))
         yield join_gaps(pieces)
+
+
+def _gaps(played: Episodes, shield: Shield, notes: tuple[str, ...]) -> Gaps:
+    table = played.steps
+    assert table is not None
+    missing = table.rules < 0
+    rows = np.flatnonzero(missing.any(axis=1))
+    return Gaps(
+        feature_names=tuple(feature.name for feature in shield.rule_set.source.features),
+        episode=table.episode[rows],
+        step=table.step[rows],
+        observations=table.observation[rows],
+        missing=missing[rows],
+        met=len(table),
+        episodes=len(played),
+        cut=int(played.cut.sum()),
+        notes=tuple(dict.fromkeys((*notes, *played.notes))),
+    )
 
 
 def join_gaps(pieces: Sequence[Gaps]) -> Gaps:

@@ -14,7 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.improving.aggregation import Aggregation, aggregate
 from sarl_core.improving.aggregation_files import save_aggregation
-from sarl_core.improving.gaps import find_gaps
+from sarl_core.improving.gaps import gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Thresholds
@@ -266,7 +266,7 @@ def test_gaps_are_what_the_library_gives() -> None:
     run(app)
     assert not errors(app)
     rules = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
-    wanted = find_gaps("CartPole-v1", rules, episodes=12, seed=100_000)
+    *_, wanted = gaps_so_far("CartPole-v1", rules, episodes=12, seed=100_000)
     assert len(wanted)
     words = texts(app)
     assert f"**{len(wanted):,}** of the {wanted.met:,} states" in words

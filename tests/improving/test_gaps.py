@@ -7,7 +7,7 @@ import pytest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.agents.agent import EXPERT_FOLDER
-from sarl_core.improving.gaps import find_gaps, gaps_so_far
+from sarl_core.improving.gaps import gaps_so_far
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.shield import Shield
@@ -23,7 +23,7 @@ def cart():
 
 def test_gaps_are_the_states_without_a_rule(cart):
     rules = mine_rules(cart, supp_min=0.05, conf_min=0.95)
-    found = find_gaps(CART, rules, episodes=5, seed=3)
+    (found,) = gaps_so_far(CART, rules, episodes=5, seed=3)
     run = rollout(CART, "novice", shield=Shield(rules), episodes=5, seed=3)
     uncovered = ~np.any([rule.applies(run.steps.observation) for rule in rules.rules], axis=0)
     assert len(found) == uncovered.sum() > 0
@@ -47,12 +47,16 @@ def test_a_few_episodes_at_a_time_end_where_all_at_once_do(cart):
         seed=7,
         progress=lambda done, total: told.append((done, total)),
     )
-    whole = find_gaps(CART, rules, agent="untrained", episodes=10, seed=7)
+    run = rollout(CART, "untrained", shield=Shield(rules), episodes=10, seed=7)
+    missing = run.steps.rules < 0
+    gaps = missing.any(axis=1)
     assert [one.episodes for one in before] == [8]
     assert last.episodes == 10
-    assert last.met == whole.met
-    for name in ("episode", "step", "observations", "missing"):
-        assert np.array_equal(getattr(last, name), getattr(whole, name))
+    assert last.met == len(run.steps)
+    assert np.array_equal(last.missing, missing[gaps])
+    assert np.array_equal(last.observations, run.steps.observation[gaps])
+    assert np.array_equal(last.episode, run.steps.episode[gaps])
+    assert np.array_equal(last.step, run.steps.step[gaps])
     assert told == [(done, 10) for done in range(1, 11)]
 
 
