@@ -380,15 +380,15 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "open quotation mark csv": ("demo.csv", changed(2, '0,1,"0.25,1.25,1'), ("row 2",)),
     "truncated parquet": ("demo.parquet", parquet_bytes()[:-20], ("cut off",)),
     "damaged parquet": ("demo.parquet", b"PAR1" + b"\7" * 99 + b"PAR1", ("damaged",)),
-    "list column parquet": (
+    "ragged list column parquet": (
         "demo.parquet",
-        parquet_bytes({"obs": [[1.0, 2.0], [3.0, 4.0]], "action": [0, 1]}),
+        parquet_bytes({"obs": [[1.0, 2.0], [3.0]], "action": [0, 1]}),
         ("'obs'", "list"),
     ),
-    "struct column parquet": (
+    "list of structs column parquet": (
         "demo.parquet",
-        parquet_bytes({"obs_x": [{"a": 1.0}, {"a": 2.0}], "action": [0, 1]}),
-        ("'obs_x'", "struct"),
+        parquet_bytes({"obs_x": [[{"a": 1.0}], [{"a": 2.0}]], "action": [0, 1]}),
+        ("'obs_x'", "list", "taken apart"),
     ),
     # Metadata
     "metadata no JSON parquet": (

@@ -81,6 +81,13 @@ def one_long_text() -> bytes:
     return zstd(obs_a=["x" * 10**8, "1"], action=labels(2))
 
 
+def long_lists() -> bytes:
+    """Rows of two numbers, and one of a hundred million."""
+    values = pa.array(np.zeros(10**8 + 2, np.int8))
+    lists = pa.ListArray.from_arrays(pa.array([0, 2, 10**8 + 2], pa.int32()), values)
+    return zstd(obs_a=lists, action=labels(2))
+
+
 def long_bytes() -> bytes:
     return zstd(obs_a=pa.array([b"\0" * 10**8] * 2, pa.binary(10**8)), action=labels(2))
 
@@ -126,6 +133,7 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "plain texts": ("parquet", plain_texts, "0.3 GiB, more than the 0.125 GiB"),
     "one long text": ("parquet", one_long_text, "column 'obs_a' holds no numbers"),
     "long bytes": ("parquet", long_bytes, "column 'obs_a' holds no numbers"),
+    "long lists": ("parquet", long_lists, "column 'obs_a' holds a list in each row"),
     "zeros": ("parquet", lambda: zstd(obs_a=np.zeros(N), action=labels(N)), READ_LIMIT),
     "nothing": ("parquet", lambda: zstd(obs_a=pa.nulls(N), action=labels(N)), READ_LIMIT),
     "metadata": ("parquet", wide_metadata, "its metadata 'sarl' is too large: it unpacks to"),

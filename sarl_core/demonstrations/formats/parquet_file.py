@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -11,6 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats.arrow.nested import (
+    Leaf,
+    has_lists,
+    leaves_of,
+    refuse_nested,
+    values_in,
+)
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
@@ -37,16 +44,21 @@ class ParquetTable:
     """An opened Parquet file.
 
     Attributes:
-        names: Names of the columns.
+        leaves: Where each column stands in the file: itself, or in a list or an object in one.
         metadata: What the file says besides.
         file: The ``pyarrow.parquet.ParquetFile``.
         data: The whole file.
     """
 
-    names: tuple[str, ...]
+    leaves: Mapping[str, Leaf]
     metadata: Metadata
     file: Any
     data: memoryview
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.leaves)
 
     @property
     def named(self) -> bool:
@@ -65,31 +77,33 @@ class ParquetTable:
         Raises:
             InputError: If a column holds lists or text, or the file is damaged.
         """
-        with _refusing_damage():
+        with refusing_damage():
             schema, rows = self.file.schema_arrow, self.file.metadata.num_rows
-            for name in columns.used:
-                _require_flat(name, schema.field(name).type)
+            leaves = {name: self.leaves[name] for name in columns.used}
+            for name, leaf in leaves.items():
+                if not leaf.path:
+                    refuse_nested(name, schema.field(name).type)
             d = len(columns.observations)
             needed = len(self.data) + table_memory(rows, d, len(columns.used) - d)
             # Before a page is unpacked: a few bytes can stand for any number of rows, or of bytes.
             require_memory(needed)
-            places = _places(self.file)
-            used = [places[name] for name in columns.used]
-            require_memory(needed + largest_chunk(self.data, rows, used))
-            others = [name for name in columns.used if not _is_numeric(schema.field(name).type)]
-            size = largest_chunk(self.data, rows, [places[name] for name in others])
+            used = dict.fromkeys(leaf.column for leaf in leaves.values())
+            require_memory(needed + _largest_of(self.file, self.data, used))
+            flat = [name for name, leaf in leaves.items() if not leaf.path]
+            others = [name for name in flat if not _is_numeric(schema.field(name).type)]
             # It is refused in any case: it is read to name the row, where that takes little.
-            if _COPIES * size > read_limit():
+            if _COPIES * _largest_of(self.file, self.data, others) > read_limit():
                 raise InputError(
                     f"column {quoted(others[0])} holds no numbers; write numbers, or leave it out"
                 )
             # Texts by their dictionary: each stands there once, however often it occurs.
-            texts = [name for name in columns.used if _is_text(schema.field(name).type)]
+            texts = [name for name in flat if _is_text(schema.field(name).type)]
             file = _opened(self.data, texts)
-            return {
-                name: _column(file, name, np.float32 if name in columns.observations else None)
-                for name in columns.used
-            }
+            read: dict[str, TableColumn] = {}
+            for column in used:
+                wanted = {name: leaf for name, leaf in leaves.items() if leaf.column == column}
+                read |= _columns(file, column, wanted, columns.observations)
+            return {name: read[name] for name in columns.used}
 
 
 def open_parquet(data: memoryview) -> ParquetTable:
@@ -109,22 +123,24 @@ def open_parquet(data: memoryview) -> ParquetTable:
         raise InputError(
             "its list of columns and row groups is far too long; save it in fewer row groups"
         )
-    with _refusing_damage():
+    with refusing_damage():
         file = _opened(data)
-        names = tuple(file.schema_arrow.names)
+        check_names(file.schema_arrow.names)
         rows = file.metadata.num_rows
         described = (file.schema_arrow.metadata or {}).get(KEY.encode())
-    check_names(names)
     if rows == 0:
         raise InputError(
             "there are no steps, only columns; give at least two observations with their actions"
         )
     metadata = Metadata() if described is None else decode_metadata(described)
-    return ParquetTable(names, metadata, file, data)
+    with refusing_damage():
+        leaves = _leaves_of(file, data)
+    check_names(tuple(leaves))
+    return ParquetTable(leaves, metadata, file, data)
 
 
 @contextmanager
-def _refusing_damage() -> Iterator[None]:
+def refusing_damage() -> Iterator[None]:
     """Turn what Arrow raises on a damaged file into one sentence."""
     import pyarrow as pa
 
@@ -143,41 +159,65 @@ def _opened(data: memoryview, texts: Sequence[str] = ()) -> Any:
     return pq.ParquetFile(pa.BufferReader(pa.py_buffer(data)), read_dictionary=list(texts))
 
 
-def _column(file: Any, name: str, dtype: Any) -> TableColumn:
-    """One column, brought into its final form batch by batch."""
+def _columns(
+    file: Any, column: str, leaves: Mapping[str, Leaf], observations: Collection[str]
+) -> dict[str, TableColumn]:
+    """The leaves of one column, brought into their final form batch by batch."""
     rows = file.metadata.num_rows
-    values: NDArray[Any] | None = None
-    missing: NDArray[np.bool_] | None = None
+    values: dict[str, NDArray[Any]] = {}
+    missing: dict[str, NDArray[np.bool_]] = {}
     at = 0
-    for batch in file.iter_batches(_BATCH, columns=[name], use_threads=False):
-        part = column_from_arrow(name, batch.column(0), at)
-        end = at + len(part.values)
+    for batch in file.iter_batches(_BATCH, columns=[column], use_threads=False):
+        end = at + batch.num_rows
         if end > rows:
             raise _damaged()
-        if values is None:
-            values = np.empty(rows, dtype=dtype or part.values.dtype)
-        # What overflows float32 is found as infinite.
-        with np.errstate(over="ignore", invalid="ignore"):
-            values[at:end] = part.values
-        if part.missing is not None:
-            missing = np.zeros(rows, dtype=np.bool_) if missing is None else missing
-            missing[at:end] = part.missing
+        for name, leaf in leaves.items():
+            part = column_from_arrow(name, values_in(leaf, batch.column(0), at), at)
+            if name not in values:
+                dtype = np.float32 if name in observations else part.values.dtype
+                values[name] = np.empty(rows, dtype=dtype)
+            # What overflows float32 is found as infinite.
+            with np.errstate(over="ignore", invalid="ignore"):
+                values[name][at:end] = part.values
+            if part.missing is not None:
+                missing.setdefault(name, np.zeros(rows, dtype=np.bool_))[at:end] = part.missing
         at = end
-    if values is None or at != rows:
+    if len(values) < len(leaves) or at != rows:
         raise _damaged()
-    return TableColumn(values, missing)
+    return {name: TableColumn(values[name], missing.get(name)) for name in leaves}
 
 
-def _places(file: Any) -> dict[str, int]:
-    """Where columns stand among all flat ones, as a row group counts them."""
-    places: dict[str, int] = {}
-    at = 0
+def _leaves_of(file: Any, data: memoryview) -> dict[str, Leaf]:
+    """Where each column of single values stands."""
+    leaves: dict[str, Leaf] = {}
     for field in file.schema_arrow:
-        places[field.name] = at
-        at += _leaves(field.type)
+        first = None
+        # How long a list is stands in no schema; where its first row cannot be looked at for
+        # little memory, it stays one column, which is refused where it is needed.
+        if has_lists(field.type) and _largest_of(file, data, [field.name]) < read_limit():
+            batch = next(file.iter_batches(1, columns=[field.name], use_threads=False), None)
+            first = batch.column(0)[0] if batch is not None and batch.num_rows else None
+        leaves |= leaves_of(field.name, field.type, first)
+    return leaves
+
+
+def _largest_of(file: Any, data: memoryview, columns: Collection[str]) -> int:
+    """Bytes that the largest chunk of some columns unpacks to."""
+    import pyarrow as pa
+
+    flat: list[int] = []
+    nested: set[int] = set()
+    at = 0
+    for field in file.schema_arrow:  # a row group counts the flat columns within nested ones
+        end = at + _leaves(field.type)
+        if field.name in columns:
+            flat += range(at, end)
+            if pa.types.is_nested(field.type):
+                nested.update(range(at, end))
+        at = end
     if at != file.metadata.num_columns:
         raise _damaged()
-    return places
+    return largest_chunk(data, file.metadata.num_rows, flat, nested)
 
 
 def _leaves(kind: Any) -> int:
@@ -296,13 +336,3 @@ def _value(scalar: Any) -> Any:
     if isinstance(scalar, pa.BinaryScalar):
         return bytes(scalar.as_buffer()[:200])
     return str(scalar)
-
-
-def _require_flat(name: str, kind: Any) -> None:
-    import pyarrow as pa
-
-    if pa.types.is_nested(kind) or isinstance(kind, pa.BaseExtensionType):
-        raise InputError(
-            f"column {quoted(name)} holds a {str(kind).split('<')[0]} in each row; give each "
-            "number a column of its own"
-        )

@@ -8,12 +8,14 @@ where it is damaged.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from sarl_core.errors import InputError
 
 MOST_FOOTER = 2**23  # bytes; it takes a hundred times as much in memory
 _MOST_PAGES = 500_000
+_WIDEST = 8  # bytes of a number
 _DEEPEST = 16  # structures and lists within one another; a footer has nine levels
 # Fields of the footer, of a row group, of a chunk (one column in one row group), of what is said
 # of it, of a page's header, and of the headers of data pages within it.
@@ -30,16 +32,20 @@ def footer_size(data: memoryview) -> int:
     return int.from_bytes(data[-8:-4], "little")
 
 
-def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
+def largest_chunk(
+    data: memoryview, rows: int, columns: list[int], lists: Collection[int] = ()
+) -> int:
     """Bytes that the pages of one column in one row group unpack to, of the largest.
 
     Args:
         data: The whole file.
         rows: How many it has.
         columns: Which of its columns, from 0.
+        lists: Which of these hold lists, as many values as they like in each row.
 
     Returns:
-        The size; all pages of a chunk are counted, though they are not unpacked at once.
+        The size; all pages of a chunk are counted, though they are not unpacked at once. Values in
+        lists count besides: a few bytes can stand for any number of them.
 
     Raises:
         InputError: If the footer and the pages do not fit, or there are far too many pages.
@@ -50,7 +56,8 @@ def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
         for group in footer.get(_GROUPS) or ():
             group_rows += group[_ROWS]
             for column in columns:
-                size, count = _chunk(data, group[_CHUNKS][column][_SAID], group[_ROWS])
+                said = group[_CHUNKS][column][_SAID]
+                size, count = _chunk(data, said, None if column in lists else group[_ROWS])
                 largest, pages = max(largest, size), pages + count
                 if pages > _MOST_PAGES:
                     raise InputError(
@@ -63,16 +70,16 @@ def largest_chunk(data: memoryview, rows: int, columns: list[int]) -> int:
     return largest
 
 
-def _chunk(data: memoryview, said: dict[int, Any], rows: int) -> tuple[int, int]:
-    """Bytes and number of the pages of a chunk."""
-    if said[_CHUNK_VALUES] != rows:
+def _chunk(data: memoryview, said: dict[int, Any], rows: int | None) -> tuple[int, int]:
+    """Bytes and number of the pages of a chunk; without a number of rows, it holds lists."""
+    if rows is not None and said[_CHUNK_VALUES] != rows:
         raise _damaged()
     start = said[_FIRST_PAGE]
     if 0 < said.get(_DICTIONARY, 0) < start:
         start = said[_DICTIONARY]
     end = min(start + said[_CHUNK_SIZE], len(data))
     size = pages = values = 0
-    while values < rows:
+    while start < end if rows is None else values < rows:
         if not 0 <= start < end:
             raise _damaged()
         header, start = _structure(data, start, 0)
@@ -80,12 +87,12 @@ def _chunk(data: memoryview, said: dict[int, Any], rows: int) -> tuple[int, int]
         for field in (_DATA, _DATA_2):
             if field in header:
                 values += header[field][_VALUES]
-        if packed < 0 or unpacked < 0:
+        if packed < 0 or unpacked < 0 or values < 0:
             raise _damaged()
         start, size, pages = start + packed, size + unpacked, pages + 1
         if pages > _MOST_PAGES:
             break
-    return size, pages
+    return size + (_WIDEST * values if rows is None else 0), pages
 
 
 def _damaged() -> InputError:

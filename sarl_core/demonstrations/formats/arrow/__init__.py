@@ -1,0 +1,1 @@
+"""Arrow: its files and streams, and columns that hold several numbers in each row."""
