@@ -56,6 +56,18 @@ class Agent(Protocol):
         """
 
 
+@runtime_checkable
+class EpisodicAgent(Agent, Protocol):
+    """One that plays in this process, episode by episode, as what remembers has to."""
+
+    def begin_episode(self, seed: int) -> None:
+        """Forget what was before.
+
+        Args:
+            seed: Of the episode that begins.
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class PolicyAgent:
     """A trained (or an untrained) network.

@@ -54,7 +54,8 @@ def aggregate(
         typer.Option(
             "--expert",
             metavar="AGENT",
-            help="Who is asked: expert (the shipped one), the path of a trained policy, or none.",
+            help="Who is asked: expert (the shipped one), the path of a trained policy, "
+            "module:name as of --agent, or none.",
         ),
     ] = "expert",
     normalise: Normalise = None,
@@ -141,7 +142,10 @@ def aggregate(
         )
     written, card = save_aggregation(aggregation, out, command=_command(context))
     if not aggregation.is_finished:
-        raise terminal.StoppedError(_what_is_left(aggregation, written, out))
+        left = _what_is_left(aggregation, written, out)
+        if aggregation.fault:
+            raise InputError(f"{aggregation.fault}; {left}")
+        raise terminal.StoppedError(left)
     notes = tuple(dict.fromkeys((*notes, *aggregation.remarks)))
     if as_json:
         terminal.print_json({**card, "notes": list(notes)})

@@ -20,6 +20,7 @@ from sarl_core.cli.options import (
     Stochastic,
     out_option,
 )
+from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
@@ -43,15 +44,24 @@ def record(
     terminal.check_output(out, (".parquet", ".csv", ".npz"))
     with terminal.working("Recording") as advance:
         from sarl_core.demonstrations.formats import save_demonstrations
+        from sarl_core.improving.aggregation_files import stopped_path
+        from sarl_core.rollouts.recording import RecordingFaultError
         from sarl_core.rollouts.recording import record as record_demonstrations
 
-        demonstrations = record_demonstrations(
-            env,
-            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
-            steps=steps,
-            seed=seed,
-            progress=advance,
-        )
+        try:
+            demonstrations = record_demonstrations(
+                env,
+                read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
+                steps=steps,
+                seed=seed,
+                progress=advance,
+            )
+        except RecordingFaultError as error:
+            written = stopped_path(out)
+            save_demonstrations(error.recorded, written)
+            raise InputError(
+                f"{error}; the {len(error.recorded):,} steps before it are in {written}"
+            ) from error
         save_demonstrations(demonstrations, out)
     _tell_demonstrations(demonstrations, out, as_json)
 

@@ -53,27 +53,38 @@ def evaluate(
     --episodes 50 --seed 1 --json`
     """
     with terminal.working("Running episodes") as advance:
-        from sarl_core.rollouts.episodes import rollout
+        from sarl_core.rollouts.episodes import finished_before, rollout
+        from sarl_core.rollouts.player import EpisodeFaultError
 
         shield = read_shield(rules, projection, outside, on_invalid)
-        played = rollout(
-            env,
-            read_agent(agent, env, normalise, stochastic=stochastic, seed=seed),
-            shield=shield,
-            episodes=episodes,
-            seed=seed,
-            keep_steps=False,
-            max_steps=max_steps,
-            progress=advance,
-        )
+        actor = read_agent(agent, env, normalise, stochastic=stochastic, seed=seed)
+        fault: EpisodeFaultError | None = None
+        try:
+            played = rollout(
+                env,
+                actor,
+                shield=shield,
+                episodes=episodes,
+                seed=seed,
+                keep_steps=False,
+                max_steps=max_steps,
+                progress=advance,
+            )
+        except EpisodeFaultError as error:
+            finished = finished_before(error, env, actor, seed)
+            if finished is None:
+                raise
+            fault, played = error, finished
         document = played.to_dict()
     if as_json:
         terminal.print_json(document)
-        return
-    from sarl_core.cli.answers import print_episodes
+    else:
+        from sarl_core.cli.answers import print_episodes
 
-    shielded = "unshielded" if rules is None else f"shielded by {rules}"
-    print_episodes(document, env, f"{played.agent} in {env}, {shielded}", shield)
+        shielded = "unshielded" if rules is None else f"shielded by {rules}"
+        print_episodes(document, env, f"{played.agent} in {env}, {shielded}", shield)
+    if fault is not None:
+        raise InputError(f"{fault}; the answer is of the {len(played)} before that one")
 
 
 def render(

@@ -38,7 +38,10 @@ def read_agent(
         InputError: If there is no such agent, or it does not fit the environment.
     """
     from sarl_core.agents.agent import PolicyAgent, make_agent
+    from sarl_core.agents.own import is_own, own_agent
 
+    if is_own(agent) and normalise is None:
+        return own_agent(agent, env_id, stochastic=stochastic)
     made = make_agent(agent, env_id, stochastic=stochastic, seed=seed, normalise=normalise)
     if isinstance(made, PolicyAgent):
         terminal.print_notes(made.notes)

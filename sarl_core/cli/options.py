@@ -33,7 +33,9 @@ AgentName = Annotated[
         metavar="AGENT",
         show_default=False,
         help="novice (uniform random actions), untrained (fresh PPO weights, sampled), expert (the "
-        "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip.",
+        "shipped one), a path to an .npz policy or to a Stable-Baselines3 .zip, or module:name: a "
+        "function of yours from observations (B, d) to actions, an object with predict, or what "
+        "makes one without arguments.",
     ),
 ]
 Normalise = Annotated[

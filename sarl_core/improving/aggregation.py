@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
@@ -31,6 +32,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
+from sarl_core.rollouts.player import EpisodeFaultError
 from sarl_core.rollouts.seeds import RunSeeds
 from sarl_core.shielding.shield import Shield
 
@@ -86,6 +88,7 @@ class Aggregation:
         reported: Episodes that nothing was chosen by; None where the run was stopped before.
         demonstrations: All pairs of the chosen round.
         seeds: Which episodes served for what.
+        fault: Why it was stopped, where agent or expert failed; else "".
     """
 
     env_id: str
@@ -99,6 +102,7 @@ class Aggregation:
     reported: Episodes | None
     demonstrations: Demonstrations
     seeds: RunSeeds
+    fault: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -137,7 +141,8 @@ def aggregate(
         plan: How many rules, rounds and episodes.
         env_id: Environment; that of `start` where not given.
         agent: Who is shielded, as in `make_agent`.
-        expert: Who is asked: a trained policy.
+        expert: Who is asked: a trained policy, or an agent of the caller's own. One with a
+            memory is asked about each episode from its start.
         jobs: Processes; changes the speed, never the result.
         executor: Whose processes they are; this machine's where not given.
         progress: Called with (units done, in all); returning False stops.
@@ -165,9 +170,11 @@ def aggregate(
         run.select(clock)
         run.refine(clock)
         run.report(clock)
-    except (CancelledError, KeyboardInterrupt):
+    except (CancelledError, KeyboardInterrupt, AgentFaultError, EpisodeFaultError) as error:
         if not run.rounds:
             raise
+        fault = str(error) if isinstance(error, InputError) else ""
+        return replace(run.result(), fault=fault)
     return run.result()
 
 
@@ -299,7 +306,7 @@ class _Run:
         )
         table = played.steps
         assert table is not None
-        wanted = ask(self.expert, table.observation)
+        wanted = ask(self.expert, table.observation, table.episode)
         covered = table.rules >= 0
         said = np.array([rule.action for rule in rules.rules] or [0])[np.maximum(table.rules, 0)]
         labels = np.stack(

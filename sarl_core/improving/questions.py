@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, PolicyAgent
+from sarl_core.agents.agent import Agent, EpisodicAgent, PolicyAgent
+from sarl_core.agents.own import AgentFaultError
 from sarl_core.agents.spaces import Actions
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import in_order_of
@@ -25,25 +26,37 @@ _ROUNDS_KEPT = 12
 _LEAST_LOG_PROBABILITY = -4.0
 
 
-def ask(expert: Agent, observations: NDArray[np.float32]) -> Actions:
+def ask(expert: Agent, observations: NDArray[np.float32], episodes: NDArray[np.int64]) -> Actions:
     """What the expert would do.
 
     Args:
         expert: Deterministic.
         observations: Shape (B, d), float32.
+        episodes: Of each state, (B,); equal ones stand together, in the order of the steps.
 
     Returns:
         Its actions with one column a dimension, (B, m).
 
     Raises:
-        InputError: If it does not always do the same in the same state.
+        InputError: If it does not always do the same in the same state, or fails.
     """
     if expert.n_uniforms:
         raise InputError(
             f"the agent {expert.name!r} acts at random and cannot be asked what is right; "
             "name a trained policy as the expert"
         )
-    return expert.act(observations, None)
+    if not isinstance(expert, EpisodicAgent):
+        return expert.act(observations, None)
+    answers: list[Actions] = []
+    for rows in np.split(np.arange(len(episodes)), np.flatnonzero(np.diff(episodes)) + 1):
+        expert.begin_episode(int(episodes[rows[0]]))
+        try:
+            answers.append(expert.act(observations[rows], None))
+        except AgentFaultError as error:
+            raise AgentFaultError(
+                f"asked about the states of episode {episodes[rows[0]]}, {error}"
+            ) from error
+    return cast(Actions, np.concatenate(answers))
 
 
 def scores(expert: Agent, observations: NDArray[np.float32]) -> NDArray[np.float64] | None:
@@ -141,7 +154,7 @@ class Answers:
         start = in_order_of(start, describe_environment(env_id)).demonstrations
         self._env_id, self._expert = env_id, expert
         self._observations = [start.observations]
-        self._actions: list[Actions] = [ask(expert, start.observations)]
+        self._actions: list[Actions] = [ask(expert, start.observations, start.episodes)]
         self._episodes = [start.episodes]
         self._steps = [np.arange(len(start)) if start.steps is None else start.steps]
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent, EpisodicAgent, make_agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import failed, failure_known
 from sarl_core.errors import SarlError, require_whole
@@ -26,7 +26,7 @@ from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.player import Observer, play
+from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
 from sarl_core.rollouts.statistics import Rate, ReturnStatistics, rate_of, summarise
 from sarl_core.rollouts.steps import StepTable, concatenate
 
@@ -433,7 +433,7 @@ def rollout(
         report(progress, done, episodes)
 
     work = partial(run_seeds, batch=batch, keep_steps=keep_steps, max_steps=most)
-    workers = executor_of(jobs, executor)
+    workers = None if isinstance(actor, EpisodicAgent) else executor_of(jobs, executor)
     if workers is None:
         return work(env_id, actor, shield, seeds, finished=lambda: finished(1))
     # None larger than what runs side by side: who stops a long run need not wait for a part of it.
@@ -447,6 +447,29 @@ def rollout(
             parts[place] = part
             finished(len(part))
     return join([parts[place] for place in range(len(pieces))])
+
+
+def finished_before(
+    fault: EpisodeFaultError, env_id: EnvironmentOrId, agent: Agent, seed: int
+) -> Episodes | None:
+    """The episodes that were finished before an agent failed.
+
+    Args:
+        fault: What it raised in `rollout`.
+        env_id: Environment.
+        agent: Who acted.
+        seed: Of the first episode.
+
+    Returns:
+        Those episodes; None where there are none.
+    """
+    played = fault.played
+    count = 0 if played is None else int((played.terminated | played.truncated).sum())
+    if played is None or not count:
+        return None
+    seeds = np.arange(seed, seed + len(played.lengths), dtype=np.int64)
+    whole = Episodes(env_id=str(env_id), agent=agent.name, seeds=seeds, **played._asdict())
+    return whole.part(0, count)
 
 
 def run_seeds(

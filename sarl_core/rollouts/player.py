@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, order_notes
+from sarl_core.agents.agent import Agent, EpisodicAgent, order_notes
+from sarl_core.agents.own import AgentFaultError
 from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId
@@ -40,6 +41,16 @@ class EpisodeArrays(NamedTuple):
     costs: NDArray[np.float64]
     notes: tuple[str, ...]
     invalid: NDArray[np.int64] | None
+
+
+class EpisodeFaultError(InputError):
+    """An agent of the caller's own failed in the middle of an episode.
+
+    Attributes:
+        played: The steps before it, those of that episode included; None where there are none.
+    """
+
+    played: EpisodeArrays | None = None
 
 
 class CheckedActions(NamedTuple):
@@ -103,7 +114,7 @@ def play(
         agent: Chooses the actions.
         shield: Checks them, or None.
         seeds: Shape (E,).
-        batch: Environments side by side.
+        batch: Environments side by side; an `EpisodicAgent` plays in one after the other.
         max_steps: An episode that has not ended by then is cut off.
         keep_steps: Whether to keep the record of every step.
         finished: Called after every episode; may raise to stop.
@@ -115,7 +126,9 @@ def play(
 
     Raises:
         InputError: If the environment cannot be used, or the shield is not for it.
+        EpisodeFaultError: If an agent of the caller's own fails.
     """
+    batch = 1 if isinstance(agent, EpisodicAgent) else batch
     run = _Lanes(env_id, agent, shield, seeds, max_steps, keep_steps, observer, render_mode)
     try:
         for _ in range(min(batch, len(seeds))):
@@ -124,6 +137,8 @@ def play(
             for _ in range(run.step()):
                 if finished is not None:
                     finished()
+    except AgentFaultError as error:
+        raise run.fault(error) from error
     finally:
         for lane in run.lanes:
             lane.env.close()
@@ -174,6 +189,8 @@ class _Lanes:
         )
         self.lanes.append(lane)
         self.started += 1
+        if isinstance(self.agent, EpisodicAgent):
+            self.agent.begin_episode(int(self.seeds[lane.episode]))
         try:
             observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
         except Exception as error:  # other people's code, which may raise anything
@@ -278,30 +295,42 @@ class _Lanes:
             self.start()
         return len(ended)
 
-    def outcome(self) -> EpisodeArrays:
-        """What the episodes brought."""
+    def fault(self, error: AgentFaultError) -> EpisodeFaultError:
+        """What is to be said where the agent failed; it plays one episode after the other."""
+        episode = self.started - 1
+        fault = EpisodeFaultError(
+            f"in step {self.lengths[episode]} of the episode with seed {self.seeds[episode]}, "
+            f"{error}"
+        )
+        if played := episode + bool(self.lengths[episode]):
+            fault.played = self.outcome(played)
+        return fault
+
+    def outcome(self, count: int | None = None) -> EpisodeArrays:
+        """What the first episodes brought; all of them where no number is given."""
         steps = None
-        if self.keep_steps:
+        if self.keep_steps and self.chunks:
             columns = [np.concatenate(column) for column in zip(*self.chunks, strict=True)]
             order = np.lexsort((columns[1], columns[0]))
             steps = StepTable(*(column[order] for column in columns))
+        passes = self.shield is not None and self.shield.on_invalid == "pass"
         return EpisodeArrays(
-            self.returns,
-            self.lengths,
-            self.interventions,
-            self.covered,
-            self.terminated,
-            self.truncated,
-            self.last_rewards,
+            self.returns[:count],
+            self.lengths[:count],
+            self.interventions[:count],
+            self.covered[:count],
+            self.terminated[:count],
+            self.truncated[:count],
+            self.last_rewards[:count],
             steps,
-            self.flips,
-            self.outside,
-            self.withheld,
-            self.cut,
-            self.free / self.lengths,
-            self.costs,
+            self.flips[:count],
+            self.outside[:count],
+            self.withheld[:count],
+            self.cut[:count],
+            self.free[:count] / self.lengths[:count],
+            self.costs[:count],
             self.notes,
-            None if self.shield is None or self.shield.on_invalid == "raise" else self.invalid,
+            self.invalid[:count] if passes else None,
         )
 
 

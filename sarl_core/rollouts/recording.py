@@ -11,9 +11,9 @@ from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.errors import require_whole
+from sarl_core.errors import InputError, require_whole
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.player import EpisodeArrays, play
+from sarl_core.rollouts.player import EpisodeArrays, EpisodeFaultError, play
 from sarl_core.rollouts.steps import concatenate
 
 SHIPPED = {
@@ -26,6 +26,19 @@ SHIPPED = {
 SHIPPED_STEPS = 15_000  # the paper's amount
 
 _BATCH = 16
+_FEWEST = 2  # steps that demonstrations have
+
+
+class RecordingFaultError(InputError):
+    """An agent of the caller's own failed while it was recorded.
+
+    Attributes:
+        recorded: The steps before it.
+    """
+
+    def __init__(self, message: str, recorded: Demonstrations) -> None:
+        super().__init__(message)
+        self.recorded = recorded
 
 
 def record(
@@ -53,6 +66,7 @@ def record(
 
     Raises:
         InputError: If a number is out of range or the agent does not fit the environment.
+        RecordingFaultError: If an agent of the caller's own fails after two steps or more.
         CancelledError: If `progress` returned False.
     """
     require_whole("steps", steps, 1)
@@ -66,9 +80,16 @@ def record(
         count = 1 if not episodes else min(_BATCH, 1 + (steps - done) * episodes // done)
         seeds = np.arange(seed + episodes, seed + episodes + count, dtype=np.int64)
         # One step more than is kept, so that this limit never shows in the recording.
-        outcomes.append(
-            play(env_id, actor, None, seeds, batch=count, max_steps=steps + 1, keep_steps=True)
-        )
+        try:
+            outcomes.append(
+                play(env_id, actor, None, seeds, batch=count, max_steps=steps + 1, keep_steps=True)
+            )
+        except EpisodeFaultError as error:
+            outcomes += [] if error.played is None else [error.played]
+            if (done := sum(int(outcome.lengths.sum()) for outcome in outcomes)) < _FEWEST:
+                raise
+            part = _demonstrations(env_id, actor.name, seed, outcomes, min(done, steps))
+            raise RecordingFaultError(str(error), part) from error
         episodes += count
         done += int(outcomes[-1].lengths.sum())
         report(progress, min(done, steps), steps)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent
+from sarl_core.agents.agent import Agent, EpisodicAgent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_core.processes import completed
@@ -135,7 +135,8 @@ def run_tasks(
 
     Args:
         tasks: What to run.
-        executor: Its processes do the work; here, one piece after the other, where there is none.
+        executor: Its processes do the work; here, one piece after the other, where there is none,
+            or where an agent is an `EpisodicAgent`.
 
     Yields:
         Pieces as they are finished; of one task, in the order of the seeds.
@@ -144,7 +145,7 @@ def run_tasks(
         WorkError: If a process ended in the middle of its work.
         SarlError: Without an executor, if episodes cannot be run.
     """
-    if executor is None:
+    if executor is None or any(isinstance(task.agent, EpisodicAgent) for task in tasks):
         yield from _run_here(tasks)
         return
     paces: defaultdict[tuple[EnvironmentOrId, int], _Pace] = defaultdict(_Pace)

@@ -1,0 +1,1 @@
+"""Rules held against a log of what somebody did, with no environment."""
