@@ -121,7 +121,7 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
             f"differ); {advice}"
         )
     try:
-        said = conformed(document, _Document)
+        said = conformed(document, _CheckpointDocument)
         learner.set_parameters(said.parameters)
         learner.num_timesteps = said.steps
         _remember(learner, said.memory)
@@ -130,7 +130,7 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
         raise InputError(f"{path} lacks a part of its learner ({error}); {advice}") from error
 
 
-class _Document(Struct):
+class _CheckpointDocument(Struct):
     steps: Count
     curve: Columns
     seconds: NotNegative

@@ -74,7 +74,7 @@ class Relevance:
                 value.flags.writeable = False
 
     @property
-    def kept(self) -> NDArray[np.int64]:
+    def obeyed(self) -> NDArray[np.int64]:
         """Steps at which a rule applied and the action broke none, (R, K, P + 1)."""
         return np.asarray(self.applied - self.broken)
 
@@ -84,10 +84,10 @@ class Relevance:
         return np.asarray(self.applied / self.test_steps)
 
     @property
-    def kept_share(self) -> NDArray[np.float64]:
+    def obeyed_share(self) -> NDArray[np.float64]:
         """Share of the steps with a rule at which it was kept; NaN without any, (R, K, P + 1)."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.kept / self.applied)
+            return np.asarray(self.obeyed / self.applied)
 
     def to_frame(self) -> pd.DataFrame:
         """One row a test and rule set.
@@ -108,7 +108,7 @@ class Relevance:
                 "learned_steps": self.learned_steps[p],
                 "test_steps": self.test_steps,
                 "applied": self.applied.reshape(-1),
-                "kept": self.kept.reshape(-1),
+                "kept": self.obeyed.reshape(-1),
                 "broken": self.broken.reshape(-1),
                 "mean_return": self.returns[k, p],
             }

@@ -175,7 +175,7 @@ def load_run(path: Path) -> LearningRun:
     """
     document = read_json(path)
     try:
-        entry = conformed(document, _RunWithCurve)
+        entry = conformed(document, _StoredRunWithCurve)
         return entry.read(entry.curve.read())
     except MisfitError as error:
         raise InputError(f"{path} lacks a part of its run ({error}); delete it") from error
@@ -291,7 +291,7 @@ class _Plan(Struct):
     trial_episodes: Count
 
 
-class _Run(Struct):
+class _StoredRun(Struct):
     arm: str
     seed: Count
     steps_done: Count
@@ -313,12 +313,12 @@ class _Run(Struct):
         )
 
 
-class _RunWithCurve(_Run):
+class _StoredRunWithCurve(_StoredRun):
     curve: Columns
 
 
 class _Results(Struct):
-    runs: tuple[_Run, ...] = ()
+    runs: tuple[_StoredRun, ...] = ()
 
 
 def _arm(name: str) -> LearningArm:

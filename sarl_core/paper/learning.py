@@ -101,7 +101,7 @@ def _numbers(frame: pd.DataFrame) -> dict[str, Any]:
                 f"{word}_{when}": interval(values)
                 for word, parts in (
                     ("applied", relevance.applied_share[number]),
-                    ("kept", relevance.kept_share[number]),
+                    ("kept", relevance.obeyed_share[number]),
                     ("broken_of_all", relevance.broken[number] / relevance.test_steps),
                 )
                 for when, values in (("first", parts[:, 0]), ("last", end_of(parts)))
@@ -124,13 +124,13 @@ def _exchanged(frame: pd.DataFrame, rng: np.random.Generator) -> pd.DataFrame:
 
 
 def _draw(frame: pd.DataFrame, _: str, dark: bool) -> tuple[Drawing, ...]:
-    from sarl_core.explaining.figures.relevance import applied_figure, kept_figure, learner_figure
+    from sarl_core.explaining.figures.relevance import applied_figure, learner_figure, obeyed_figure
 
     relevance = relevance_from_frame(frame)
     return (
         Drawing(
             "How often the rule that applied was kept or broken",
-            kept_figure(relevance, confidence=FILTERED.confidence),
+            obeyed_figure(relevance, confidence=FILTERED.confidence),
             share=1.0,
             alt="Shares of kept and broken rules against steps learned, filtered and unfiltered",
         ),

@@ -193,7 +193,7 @@ def parse_report(document: Any) -> PaperReport:
     if document.get("version") != VERSION:
         raise ValueError(f"its version is {quoted(document.get('version'))} and not {VERSION}")
     studies = {}
-    for name, entry in conformed(document, _Document).studies.items():
+    for name, entry in conformed(document, _ReportDocument).studies.items():
         try:
             studies[name] = conformed(entry, Entry)
         except MisfitError as error:
@@ -201,5 +201,5 @@ def parse_report(document: Any) -> PaperReport:
     return PaperReport(studies)
 
 
-class _Document(Struct):
+class _ReportDocument(Struct):
     studies: dict[str, Any]

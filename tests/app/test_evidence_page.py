@@ -11,10 +11,10 @@ from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.words.cross_fit import judged_sentence
 from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
+    episodes_text,
     held_out_text,
     mined_text,
     more_text,
-    told_by_episodes,
     verdict_counts,
 )
 from sarl_core.mining.language import share_text
@@ -109,7 +109,7 @@ def test_junk_in_a_link_holds_nothing_out() -> None:
 def test_the_rules_page_shows_both_confidences_and_filters_by_the_lower_bound() -> None:
     app = open_page("rules", **HELD)
     rules = sorted(tried().rules, key=lambda rule: -rule.samples)
-    told = told_by_episodes(rules[0].held_out, what="it was right")
+    told = episodes_text(rules[0].held_out, what="it was right")
     assert f"{mined_text(rules[0])} that it was mined from. {told}" in html(app)
     table = app.dataframe[0].value
     assert table["Held out"].tolist() == [held_out_text(rule.held_out) for rule in rules]
@@ -153,7 +153,7 @@ def test_the_rules_page_says_in_red_what_other_episodes_refute() -> None:
     told = html(open_page("rules", **unfiltered, rule=low.id))
     red = f"{VERDICT_COLOURS['below']} 75%, currentColor"
     assert f'{red})">{mined_text(low)} that it was mined from. In ' in told
-    assert told_by_episodes(low.held_out, what="it was right") in told
+    assert episodes_text(low.held_out, what="it was right") in told
 
 
 def test_the_maps_have_a_held_out_layer() -> None:

@@ -179,10 +179,10 @@ def test_the_feature_in_which_gaps_differ_most_comes_first():
     assert first.difference == pytest.approx(1.0)
     assert second.difference < 0.05
     for one in (first, second):
-        assert one.shown.sum() == pytest.approx(1.0)
+        assert one.demonstrated.sum() == pytest.approx(1.0)
         assert one.missing.sum() == pytest.approx(1.0)
     # The demonstrated states fill the left of the common range, the gaps the right.
-    assert first.shown[:2].sum() == pytest.approx(1.0)
+    assert first.demonstrated[:2].sum() == pytest.approx(1.0)
     assert first.missing[8:].sum() == pytest.approx(1.0)
 
 

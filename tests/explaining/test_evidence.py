@@ -19,6 +19,7 @@ from sarl_core.explaining.tables.evidence import (
 )
 from sarl_core.explaining.words.evidence import (
     band_text,
+    episodes_text,
     evidence_text,
     held_out_interval_text,
     held_out_text,
@@ -28,7 +29,6 @@ from sarl_core.explaining.words.evidence import (
     range_text,
     remedy_text,
     shortfall_text,
-    told_by_episodes,
     verdict_counts,
 )
 from sarl_core.mining.evidence import HeldOut, Interval
@@ -113,7 +113,7 @@ def test_an_interval_is_said_or_why_there_is_none():
     ],
 )
 def test_other_episodes_are_told_as_a_sentence(held, told):
-    assert told_by_episodes(HeldOut(*held), what="it was right") == told
+    assert episodes_text(HeldOut(*held), what="it was right") == told
 
 
 def test_an_episode_that_moves_a_number_is_named():

@@ -38,7 +38,7 @@ def test_every_step_of_a_test_counts_and_no_other(found: Relevance) -> None:
     assert (found.applied[2] == 333).all()
     assert (found.applied[1] == 333).all()  # these rules cover every state
     assert ((found.applied[0] > 0) & (found.applied[0] < 333)).all()
-    assert (found.kept + found.broken == found.applied).all()
+    assert (found.obeyed + found.broken == found.applied).all()
     assert found.learned_steps.tolist() == [0, 60, 120]
 
 
@@ -55,7 +55,7 @@ def test_before_learning_it_is_the_untrained_policy_that_is_watched(
         assert found.applied_share[number, :, 0].mean() == pytest.approx(applied / 20_000, abs=0.12)
         # A fresh policy is all but a coin, whatever the rules.
         assert broken / applied == pytest.approx(0.5, abs=0.05)
-        assert found.kept_share[number, :, 0].mean() == pytest.approx(0.5, abs=0.12)
+        assert found.obeyed_share[number, :, 0].mean() == pytest.approx(0.5, abs=0.12)
 
 
 def test_the_rules_only_watch(found: Relevance, rules: dict[str, RuleSet]) -> None:
@@ -123,5 +123,5 @@ def test_rules_of_another_environment_are_refused(rules: dict[str, RuleSet]) -> 
 def test_the_share_kept_of_no_step_is_no_number() -> None:
     none = np.zeros((1, 1, 1), dtype=np.int64)
     empty = Relevance("X", ("a",), (0,), none[0, 0], none[0, 0], 5, none, none, np.zeros((1, 1)))
-    assert np.isnan(empty.kept_share).all()
+    assert np.isnan(empty.obeyed_share).all()
     assert (empty.applied_share == 0).all()

@@ -226,9 +226,9 @@ def _row(outcome: Replacement, program: Program) -> str:
     numbers = [outcome.low, outcome.high]
     if outcome.value is not None:
         numbers.insert(0, outcome.value)
-    shown = [f"(float){_number(value)}" for value in numbers]
+    literals = [f"(float){_number(value)}" for value in numbers]
     flags = [str(int(outcome.open_low)), str(int(outcome.open_high))]
-    return f"{{{', '.join([*shown, *flags])}}}"
+    return f"{{{', '.join([*literals, *flags])}}}"
 
 
 def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
@@ -263,12 +263,12 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     text = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
     if not rule.conditions:
         return [f"    {text}"]
-    asked = [
+    queries = [
         _query(feature, threshold, negated=op == ">") for feature, op, threshold in rule.conditions
     ]
     return [
         f"    /* {comment(conditions_text(rule, rule_set))} */",
-        f"    if ({' && '.join(asked)})",
+        f"    if ({' && '.join(queries)})",
         f"        {text}",
     ]
 
@@ -293,8 +293,8 @@ def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str:
 
 
 def _query(feature: int, threshold: float, *, negated: bool = False) -> str:
-    asked = f"(double)x[{feature}] <= {_number(threshold)}"
-    return f"!({asked})" if negated else asked
+    query = f"(double)x[{feature}] <= {_number(threshold)}"
+    return f"!({query})" if negated else query
 
 
 def _number(value: float) -> str:
@@ -312,9 +312,9 @@ def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
 def _valid(program: Program) -> str:
     """Whether the rules can be asked at all."""
     table = []
-    asked = "!isfinite(proposed[i])"
+    refusal = "!isfinite(proposed[i])"
     if not program.continuous:
-        asked = "proposed[i] < shield_first[i] || proposed[i] > shield_last[i]"
+        refusal = "proposed[i] < shield_first[i] || proposed[i] > shield_last[i]"
         first, last = (
             ", ".join(f"INT64_C({end})" for end in ends)
             for ends in zip(*program.labels, strict=True)
@@ -334,7 +334,7 @@ def _valid(program: Program) -> str:
             "        if (!isfinite(state[i]))",
             "            return 0;",
             "    for (int i = 0; i < SHIELD_ACTIONS; i++)",
-            f"        if ({asked})",
+            f"        if ({refusal})",
             "            return 0;",
             "    return 1;",
             "}",

@@ -253,13 +253,13 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     text = f"return {place}  # {_rule_comment(rule, rule_set)}"
     if not rule.conditions:
         return [f"    {text}"]
-    asked = [
+    queries = [
         f"{'not ' if op == '>' else ''}x[{feature}] <= {_number(threshold)}"
         for feature, op, threshold in rule.conditions
     ]
     return [
         f"    # {one_line(conditions_text(rule, rule_set))}",
-        f"    if {' and '.join(asked)}:",
+        f"    if {' and '.join(queries)}:",
         f"        {text}",
     ]
 

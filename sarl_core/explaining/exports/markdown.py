@@ -66,7 +66,7 @@ def _text(text: str) -> str:
 
 def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     features = rule_set.source.features
-    asked = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    intervals = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
     action = _text(action_text(rule.action, rule_set.actions[rule.dimension]))
     name = rule_set.name_of(rule)
     if rule.origin == "manual":
@@ -75,7 +75,7 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
         name += ", pinned"
     cells = [
         f"{name}{'' if rule.enabled else ', off'}",
-        " and ".join(asked) or "always",
+        " and ".join(intervals) or "always",
         action,
         share_text(rule.confidence) if rule.samples else "–",
         f"{rule.samples:,}",

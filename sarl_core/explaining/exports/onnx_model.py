@@ -317,7 +317,7 @@ def _replace_continuous(graph: _Graph, program: Program) -> None:
     keeps_low = graph.add("Or", [open_low, not_under], "keeps_low")
     keeps_high = graph.add("Or", [open_high, not_over], "keeps_high")
     allowed = graph.add("And", [keeps_low, keeps_high], "allowed")
-    kept = graph.add("Or", [none, allowed], "kept")
+    unchanged = graph.add("Or", [none, allowed], "kept")
     if program.projection == "clip":
         over_low = graph.add("Greater", ["proposed", low], "over_low")
         raised = graph.add("Where", [over_low, "proposed", low], "raised")
@@ -325,4 +325,4 @@ def _replace_continuous(graph: _Graph, program: Program) -> None:
         value = graph.add("Where", [under_high, raised, high], "value")
     else:
         value = looked_up("value", np.float32)
-    _execute(graph, program, graph.add("Where", [kept, "proposed", value], "decided"))
+    _execute(graph, program, graph.add("Where", [unchanged, "proposed", value], "decided"))

@@ -41,11 +41,11 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         left: float, top: float, text: str, room: float, *, right: bool = False, muted: bool = False
     ) -> None:
         used = small if muted else font
-        shown = one_line(text)
-        while len(shown) > 1 and pen.textlength(shown, font=used) > room * _SCALE:
-            shown = f"{shown[:-2]}…" if shown.endswith("…") else f"{shown[:-1]}…"
-        at = left + room - pen.textlength(shown, font=used) / _SCALE if right else left
-        pen.text((at * _SCALE, top * _SCALE), shown, fill=_MUTED if muted else _INK, font=used)
+        line = one_line(text)
+        while len(line) > 1 and pen.textlength(line, font=used) > room * _SCALE:
+            line = f"{line[:-2]}…" if line.endswith("…") else f"{line[:-1]}…"
+        at = left + room - pen.textlength(line, font=used) / _SCALE if right else left
+        pen.text((at * _SCALE, top * _SCALE), line, fill=_MUTED if muted else _INK, font=used)
 
     def box(left: float, top: float, right: float, bottom: float, colour: str) -> None:
         pen.rectangle([left * _SCALE, top * _SCALE, right * _SCALE, bottom * _SCALE], fill=colour)

@@ -197,12 +197,12 @@ def _values(dimension: LabelledDimension) -> NDArray[Any]:
 
 def _typical_values(rule_set: RuleSet) -> NDArray[np.float32]:
     """A value amid the thresholds of each feature, 0 where nothing is asked."""
-    asked: dict[int, list[float]] = {}
+    by_feature: dict[int, list[float]] = {}
     for rule in rule_set.rules:
         for feature, _, threshold in rule.conditions:
-            asked.setdefault(feature, []).append(threshold)
+            by_feature.setdefault(feature, []).append(threshold)
     values = np.zeros(len(rule_set.source.features), dtype=np.float32)
-    for feature, thresholds in asked.items():
+    for feature, thresholds in by_feature.items():
         values[feature] = largest_float32(float(np.median(thresholds)))
     return values
 
@@ -233,15 +233,15 @@ def _at(
     """States that reach a query: at its threshold, a step below and a step above."""
     low: dict[int, float] = {}
     high: dict[int, float] = {}
-    for asked, op, value in path:
+    for bounded, op, value in path:
         if op == "<=":
-            high[asked] = min(value, high.get(asked, np.inf))
+            high[bounded] = min(value, high.get(bounded, np.inf))
         else:
-            low[asked] = max(value, low.get(asked, -np.inf))
+            low[bounded] = max(value, low.get(bounded, -np.inf))
     state = typical.copy()
-    for asked in low.keys() | high.keys():
-        state[asked] = _between(
-            low.get(asked, -np.inf), high.get(asked, np.inf), float(typical[asked]), rng
+    for bounded in low.keys() | high.keys():
+        state[bounded] = _between(
+            low.get(bounded, -np.inf), high.get(bounded, np.inf), float(typical[bounded]), rng
         )
     at = largest_float32(threshold)
     places = []

@@ -161,11 +161,11 @@ def ablation_figure(ablation: Ablation, effects: Sequence[RuleEffect]) -> go.Fig
     figure.add_vline(x=0, line={"color": MUTED_COLOUR, "width": 1, "dash": "dot"})
     for verdict in VERDICTS:
         rows = [row for row, effect in enumerate(effects) if effect.verdict == verdict]
-        shown = [effects[row].difference for row in rows]
+        intervals = [effects[row].difference for row in rows]
         if not rows:
             continue
         figure.add_scatter(
-            x=[one.mean for one in shown],
+            x=[one.mean for one in intervals],
             y=rows,
             mode="markers",
             name=verdict,
@@ -173,8 +173,8 @@ def ablation_figure(ablation: Ablation, effects: Sequence[RuleEffect]) -> go.Fig
             error_x={
                 "type": "data",
                 "symmetric": False,
-                "array": [one.high - one.mean for one in shown],
-                "arrayminus": [one.mean - one.low for one in shown],
+                "array": [one.high - one.mean for one in intervals],
+                "arrayminus": [one.mean - one.low for one in intervals],
                 "thickness": 2,
                 "width": 4,
                 "color": VERDICT_COLOURS[verdict],

@@ -26,19 +26,19 @@ class GapHistogram:
     Attributes:
         feature: Its index.
         edges: Of B bins, (B + 1,); values outside count to the outermost.
-        shown: Share of the demonstrated states in each bin, (B,).
+        demonstrated: Share of the demonstrated states in each bin, (B,).
         missing: Share of the states without a rule in each bin, (B,).
     """
 
     feature: int
     edges: NDArray[np.float64]
-    shown: NDArray[np.float64]
+    demonstrated: NDArray[np.float64]
     missing: NDArray[np.float64]
 
     @property
     def difference(self) -> float:
         """How far the two are apart, 0 (alike) to 1 (nowhere the same)."""
-        return float(np.abs(self.shown - self.missing).sum() / 2)
+        return float(np.abs(self.demonstrated - self.missing).sum() / 2)
 
 
 def gap_histograms(
@@ -56,15 +56,17 @@ def gap_histograms(
     """
     histograms = []
     for index in range(gaps.observations.shape[1]):
-        shown, missing = demonstrations.observations[:, index], gaps.observations[:, index]
-        ends = [np.quantile(values, [_TAIL, 1 - _TAIL]) for values in (shown, missing)]
+        demonstrated, missing = demonstrations.observations[:, index], gaps.observations[:, index]
+        ends = [np.quantile(values, [_TAIL, 1 - _TAIL]) for values in (demonstrated, missing)]
         low, high = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
         if not low < high:
             low, high = low - 0.5, high + 0.5
         edges = np.linspace(low, high, bins + 1)
         histograms.append(
             GapHistogram(
-                index, edges, *(_shares(values, low, high, bins) for values in (shown, missing))
+                index,
+                edges,
+                *(_shares(values, low, high, bins) for values in (demonstrated, missing)),
             )
         )
     return tuple(sorted(histograms, key=lambda one: -one.difference))
@@ -94,7 +96,7 @@ def gap_figure(histogram: GapHistogram, feature: Feature) -> go.Figure:
     ]
     figure = go.Figure()
     for name, shares, fill in (
-        ("demonstrated states", histogram.shown, faded(MUTED_COLOUR, 0.6)),
+        ("demonstrated states", histogram.demonstrated, faded(MUTED_COLOUR, 0.6)),
         ("states without a rule", histogram.missing, faded(MARKER_COLOUR, 0.65)),
     ):
         figure.add_bar(
@@ -126,6 +128,6 @@ def gap_figure(histogram: GapHistogram, feature: Feature) -> go.Figure:
         nticks=6,
         title={"text": plain(feature.unit), "standoff": 4},
     )
-    most = float(max(histogram.shown.max(), histogram.missing.max()))
+    most = float(max(histogram.demonstrated.max(), histogram.missing.max()))
     figure.update_yaxes(**share_ticks(0.0, 1.05 * most, 4), fixedrange=True, zeroline=False)
     return figure

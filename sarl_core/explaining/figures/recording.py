@@ -48,7 +48,7 @@ def recordings_figure(
     def text(value: float) -> str:
         return share_text(min(max(value, 0.0), 1.0)) if share else f"{value:,.1f}"
 
-    def told(mean: MeanInterval) -> str:
+    def spread(mean: MeanInterval) -> str:
         recordings = f"{counted(len(experts), 'recording')} of {counted(len(names), 'expert')}"
         if math.isnan(mean.low):
             return recordings
@@ -85,7 +85,8 @@ def recordings_figure(
                 "width": 7,
                 "color": colour,
             },
-            hovertemplate=f"{plain(name)}: <b>{text(mean.mean)}</b><br>{told(mean)}<extra></extra>",
+            hovertemplate=f"{plain(name)}: <b>{text(mean.mean)}</b><br>{spread(mean)}"
+            "<extra></extra>",
         )
     rows = len(values)
     axis = {"range": [-0.04, 1.06], **share_ticks(0, 1)} if share else {"nticks": 6}

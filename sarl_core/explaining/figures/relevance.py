@@ -16,12 +16,12 @@ from sarl_core.mining.language import share_text
 from sarl_core.rollouts.statistics import mean_interval
 
 # As in the paper: green is kept, red is broken; solid is filtered, dashed is unfiltered.
-KEPT_COLOUR, BROKEN_COLOUR = LABEL_COLOURS[2], "#D55E00"
+OBEYED_COLOUR, BROKEN_COLOUR = LABEL_COLOURS[2], "#D55E00"
 _DASHES = ("solid", "dash", "dot", "dashdot")
 Floats = NDArray[np.float64]
 
 
-def kept_figure(relevance: Relevance, *, confidence: float | None = None) -> go.Figure:
+def obeyed_figure(relevance: Relevance, *, confidence: float | None = None) -> go.Figure:
     """How often the rule that applied was kept and how often it was broken (Figure 4).
 
     Args:
@@ -34,10 +34,10 @@ def kept_figure(relevance: Relevance, *, confidence: float | None = None) -> go.
     """
     figure = go.Figure()
     for number, name in enumerate(relevance.names):
-        kept = relevance.kept_share[number]
+        obeyed = relevance.obeyed_share[number]
         for word, shares, colour in (
-            ("kept", kept, KEPT_COLOUR),
-            ("broken", 1.0 - kept, BROKEN_COLOUR),
+            ("kept", obeyed, OBEYED_COLOUR),
+            ("broken", 1.0 - obeyed, BROKEN_COLOUR),
         ):
             _add_line(
                 figure,

@@ -138,23 +138,23 @@ def tracks(
         For each dimension what the agent wanted and what was done, then the interventions, and
         at last, where there are any, those outside the data of their rules.
     """
-    found = []
+    rows = []
     for index, dimension in enumerate(dimensions):
         name = f"{dimension.name}: " if len(dimensions) > 1 else ""
         executed = dimension.labels_of(steps.executed[:, index]).astype(np.float64)
         if not shielded:
-            found.append(Track(f"{name}action", executed, dimension))
+            rows.append(Track(f"{name}action", executed, dimension))
             continue
         wanted = dimension.labels_of(steps.proposed[:, index]).astype(np.float64)
-        found.append(Track(f"{name}wanted", wanted, dimension))
-        found.append(Track(f"{name}done", executed, dimension))
+        rows.append(Track(f"{name}wanted", wanted, dimension))
+        rows.append(Track(f"{name}done", executed, dimension))
     if shielded:
         marks = np.where(steps.intervened, 0.0, np.nan)
-        found.append(Track("changed", marks, None))
+        rows.append(Track("changed", marks, None))
         if steps.outside.any():
             beyond = np.where(steps.outside, 0.0, np.nan)
-            found.append(Track("outside data", beyond, None, OUTSIDE_COLOUR))
-    return tuple(found)
+            rows.append(Track("outside data", beyond, None, OUTSIDE_COLOUR))
+    return tuple(rows)
 
 
 def shortened(name: str) -> str:

@@ -85,10 +85,10 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
     least = _least(landscape) if layer in ("fidelity", "held_out_fidelity") else 0.0
     if style.share:
         bar |= share_ticks(least, 1)
-    shown = values
+    shades = values
     if layer == "rule_count":
         # From one rule to thousands: by powers of ten.
-        shown = np.log10(1.0 + values)
+        shades = np.log10(1.0 + values)
         ticks = _power_ticks(float(values.max()))
         bar |= {
             "tickmode": "array",
@@ -96,7 +96,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
             "ticktext": [f"{tick:,}" for tick in ticks],
         }
     figure.add_heatmap(
-        z=np.round(shown.T, 4),
+        z=np.round(shades.T, 4),
         colorscale=layer_scale(dark=dark),
         hoverinfo="skip",
         colorbar=bar,

@@ -49,20 +49,20 @@ def tree_figure(
     rules = np.zeros(tree.n_nodes, dtype=np.bool_)
     rules[cut] = True
     path = np.array(tree.path(node), dtype=np.int64)
-    shown = _shown(tree, keep=np.concatenate([cut, path]))
+    drawn = _drawn_nodes(tree, keep=np.concatenate([cut, path]))
     kinds = []
     for label in range(tree.dimension.n_labels):
         name = plain(label_text(label, tree.dimension))
-        mine = shown[tree.label[shown] == label]
+        mine = drawn[tree.label[drawn] == label]
         for part, opacity, what in (
             (mine[~below[mine] & ~rules[mine]], 0.26, "on the way"),
             (mine[rules[mine]], 0.95, "a rule"),
         ):
             kinds.append((part, faded(label_colour(label), opacity), f"{name}, {what}"))
     grey = faded(MUTED_COLOUR, 0.22 if dark else 0.16)
-    kinds.append((shown[below[shown]], grey, "cut off below a rule"))
+    kinds.append((drawn[below[drawn]], grey, "cut off below a rule"))
     figure = go.Figure()
-    _add_hover(figure, tree, shown)
+    _add_hover(figure, tree, drawn)
     _add_path(figure, tree, path, dark=dark)
     bottom = int(tree.depth.max()) + 1
     figure.update_layout(
@@ -132,8 +132,8 @@ def node_lines(tree: PolicyTree, node: int) -> list[str]:
     ]
     feature = int(tree.feature[node])
     if feature != LEAF:
-        asked = tree.source.features[feature]
-        lines.append(f"asks: {asked.name} ≤ {limit_text(float(tree.threshold[node]), asked)}?")
+        queried = tree.source.features[feature]
+        lines.append(f"asks: {queried.name} ≤ {limit_text(float(tree.threshold[node]), queried)}?")
     return lines
 
 
@@ -181,7 +181,7 @@ def window_around(tree: PolicyTree, node: int) -> tuple[int, int, int, int]:
     return left, left + width, int(tree.depth[top]), min(depth + 4, int(tree.depth.max()) + 1)
 
 
-def _shown(tree: PolicyTree, keep: NDArray[np.int64]) -> NDArray[np.int64]:
+def _drawn_nodes(tree: PolicyTree, keep: NDArray[np.int64]) -> NDArray[np.int64]:
     """The nodes that are drawn, and those to keep."""
     nodes = np.flatnonzero(tree.samples > 0)
     if len(nodes) > MAX_BOXES:

@@ -15,12 +15,12 @@ _WIDTH = 88  # percent of the table that the columns share
 
 
 def confusion_html(
-    found: Disagreement, dimension: int, *, names: tuple[str, str], noun: str = "state"
+    disagreement: Disagreement, dimension: int, *, names: tuple[str, str], noun: str = "state"
 ) -> Markup:
     """How many states the first set says one thing of and the second another.
 
     Args:
-        found: The comparison.
+        disagreement: The comparison.
         dimension: Action dimension.
         names: What the two sets are called.
         noun: What a state is called.
@@ -30,8 +30,8 @@ def confusion_html(
         last. Where both say the same the cells are grey; elsewhere the darker the more states.
         Above it the numbers of states by kind; it may be wider than the screen and then scrolls.
     """
-    action = found.first.actions[dimension]
-    counts = found.confusion(dimension)
+    action = disagreement.first.actions[dimension]
+    counts = disagreement.confusion(dimension)
     size = len(counts)
     said = [said_text(label, action) for label in range(size)]
     most = int((counts - np.diag(np.diag(counts))).max())
@@ -42,10 +42,10 @@ def confusion_html(
         cells = []
         for column in range(size):
             count = int(counts[row, column])
-            told = f"{names[0]}: {said[row]}; {names[1]}: {said[column]}; {counted(count, noun)}"
+            tip = f"{names[0]}: {said[row]}; {names[1]}: {said[column]}; {counted(count, noun)}"
             same = row == column
             look = ("", "") if same or not count else layer_colour(count / most)
-            cells.append((f"{count:,}" if count else "", told, same, *look))
+            cells.append((f"{count:,}" if count else "", tip, same, *look))
         rows.append((head, cells))
     return render(
         "parts/confusion",
@@ -54,13 +54,13 @@ def confusion_html(
         rows=rows,
         width=f"{_WIDTH / size:.2f}%",  # all as wide, whatever they are called
         title=f"What {names[0]} says against what {names[1]} says, in numbers of states",
-        caption=_caption(found, dimension, names),
+        caption=_caption(disagreement, dimension, names),
     )
 
 
-def _caption(found: Disagreement, dimension: int, names: tuple[str, str]) -> str:
+def _caption(disagreement: Disagreement, dimension: int, names: tuple[str, str]) -> str:
     grey = "Grey: both say the same."
-    if not found.differs[:, dimension].any():
+    if not disagreement.differs[:, dimension].any():
         return grey
-    told = (f"the first ({names[0]})", f"the second ({names[1]})")
-    return f"Differently: {kinds_text(found, dimension, told)}. {grey}"
+    sides = (f"the first ({names[0]})", f"the second ({names[1]})")
+    return f"Differently: {kinds_text(disagreement, dimension, sides)}. {grey}"

@@ -57,8 +57,8 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
     floor = max(min([threshold, *ends]) - 0.03, 0.0)
     across, upwards = Scale(0.5, len(rules) + 0.5), Scale(floor, 1.01)
     parts = []
-    for at, found, share, colour in drawn:
-        interval = found or Interval(share, share)
+    for at, held_out_interval, share, colour in drawn:
+        interval = held_out_interval or Interval(share, share)
         parts.append(
             Part(
                 "whisker",
@@ -69,7 +69,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
         )
     parts.append(Part("least", f"bottom:{upwards.place(threshold)}"))
     counts = verdict_counts(rules, threshold)
-    told = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
+    verdicts = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
     named = (
         [float(place) for place in range(1, len(rules) + 1)]
         if len(rules) <= _NAMED
@@ -91,7 +91,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
             "Confidence",
         ),
         label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
-        f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {told}",
+        f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {verdicts}",
         height=262,
         tips=[_tip(rule, rule_set) for rule in rules],
         css=f"sarl-overview{' sarl-few' * few}{' sarl-close' * (len(named) > _CLOSE)}",

@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from sarl_core.explaining.html.evidence_bar import evidence_bar
 from sarl_core.explaining.templates import render
-from sarl_core.explaining.words.evidence import VERDICT_COLOURS, mined_text, told_by_episodes
+from sarl_core.explaining.words.evidence import VERDICT_COLOURS, episodes_text, mined_text
 from sarl_core.mining.language import counted, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
@@ -74,10 +74,10 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> Mark
 
 def _sureness(rule: Rule, threshold: float) -> tuple[str, str]:
     """How sure the rule is, on what it was mined from and held out, and a colour that warns."""
-    told = f"{mined_text(rule)} that it was mined from."
+    sentences = f"{mined_text(rule)} that it was mined from."
     if rule.held_out is None:
-        return told, ""
-    told += f" {told_by_episodes(rule.held_out, what='it was right')}"
+        return sentences, ""
+    sentences += f" {episodes_text(rule.held_out, what='it was right')}"
     if verdict(rule, threshold) == "below":
-        return f"{told} That is too low.", VERDICT_COLOURS["below"]
-    return told, ""
+        return f"{sentences} That is too low.", VERDICT_COLOURS["below"]
+    return sentences, ""

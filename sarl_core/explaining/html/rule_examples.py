@@ -27,11 +27,11 @@ def examples_html(demonstrations: Demonstrations, tree: PolicyTree, rule: Rule) 
         A table with a state a row, and what the expert did there.
     """
     columns = example_columns(demonstrations, tree, rule)
-    shown = [
+    headings = [
         Column(name, "m" if name == _DID else "" if name == _AGREES else "n") for name in columns
     ]
     texts = [[_text(name, value) for value in values] for name, values in columns.items()]
-    return table_html(shown, list(zip(*texts, strict=True)), "States to which the rule applies")
+    return table_html(headings, list(zip(*texts, strict=True)), "States to which the rule applies")
 
 
 def _text(name: str, value: object) -> str:

@@ -24,12 +24,12 @@ _EVERYWHERE = faded(MUTED_COLOUR, 0.55)
 
 
 def features_html(
-    found: Sequence[FeatureEvidence], features: Sequence[Feature], colour: str
+    evidence: Sequence[FeatureEvidence], features: Sequence[Feature], colour: str
 ) -> Markup:
     """A figure for each feature that a rule asks about, as many side by side as there is room for.
 
     Args:
-        found: The evidence, see `feature_evidence`; the first `MOST` are drawn.
+        evidence: The evidence, see `feature_evidence`; the first `MOST` are drawn.
         features: All features of the demonstrations.
         colour: Of the rule's label.
 
@@ -37,14 +37,14 @@ def features_html(
         Two histograms over each other in each figure, each of its own states, the rule's interval
         shaded.
     """
-    reached = any(one.at_rule.any() for one in found)
+    reached = any(one.at_rule.any() for one in evidence)
     key = [("all states", _EVERYWHERE)]
     if reached:
         key.append(("states of the rule", faded(colour, 0.75)))
     key.append(("the interval asked for", faded(MARKER_COLOUR, 0.25)))
-    if len(found) > MOST:
-        key.append((f"the first {MOST} of {len(found)} features", ""))
-    figures = [_figure(one, features[one.feature], colour) for one in found[:MOST]]
+    if len(evidence) > MOST:
+        key.append((f"the first {MOST} of {len(evidence)} features", ""))
+    figures = [_figure(one, features[one.feature], colour) for one in evidence[:MOST]]
     return render("rules/features", key=key, figures=figures)
 
 
@@ -100,7 +100,7 @@ def _tips(one: FeatureEvidence, feature: Feature) -> list[str]:
     unit = f" {feature.unit}" if feature.unit else ""
     edges = one.edges.tolist()
     reached = one.at_rule.any()
-    told = []
+    tips = []
     for index, (everywhere, at_rule) in enumerate(
         zip(one.everywhere.tolist(), one.at_rule.tolist(), strict=True)
     ):
@@ -109,8 +109,8 @@ def _tips(one: FeatureEvidence, feature: Feature) -> list[str]:
         words += f": {share_text(everywhere)} of all states"
         if reached:
             words += f", {share_text(at_rule)} of those of the rule"
-        told.append(words if everywhere or at_rule else "")
-    return told
+        tips.append(words if everywhere or at_rule else "")
+    return tips
 
 
 def _in_words(one: FeatureEvidence, feature: Feature) -> str:

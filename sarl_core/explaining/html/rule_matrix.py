@@ -129,7 +129,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     Returns:
         Columns in the order of the features.
     """
-    asked = sorted({bounds.feature for rule in rule_set.rules for bounds in rule.bounds})
+    queried = sorted({bounds.feature for rule in rule_set.rules for bounds in rule.bounds})
     features = rule_set.source.features
     if demonstrations is not None and demonstrations.observations.shape[1] != len(features):
         demonstrations = None
@@ -140,7 +140,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
         rule_set,
         tuple(
             MatrixColumn(feature, features[feature], *_range(feature, rule_set, demonstrations))
-            for feature in asked
+            for feature in queried
         ),
         (*placed, *others),
     )
@@ -186,10 +186,10 @@ def matrix_document(matrix: RuleMatrix) -> Markup:
 
 def _key(rules: Sequence[Rule], rule_set: RuleSet) -> list[tuple[str, str]]:
     """What the colours and marks of some rows mean; a mark has no colour."""
-    shown = {(rule.dimension, rule.action) for rule in rule_set.rules}
+    actions = {(rule.dimension, rule.action) for rule in rule_set.rules}
     entries = [
         (_action(label, rule_set, dimension), label_colour(label))
-        for dimension, label in sorted(shown)
+        for dimension, label in sorted(actions)
     ]
     if any(rule.placed for rule in rules):
         entries.append((PLACED_LEGEND, ""))
@@ -256,14 +256,14 @@ def _range(
         low, high = float(values.min()), float(values.max())
     else:
         boxes = [rule.box for rule in rule_set.rules if rule.box is not None]
-        asked = [
+        thresholds = [
             threshold
             for rule in rule_set.rules
             for one, _, threshold in rule.conditions
             if one == feature
         ]
-        low = min([*(box.least[feature] for box in boxes), *asked])
-        high = max([*(box.most[feature] for box in boxes), *asked])
+        low = min([*(box.least[feature] for box in boxes), *thresholds])
+        high = max([*(box.most[feature] for box in boxes), *thresholds])
     return (low, high) if low < high else (low - 1.0, high + 1.0)
 
 

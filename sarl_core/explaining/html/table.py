@@ -16,12 +16,12 @@ class Column(NamedTuple):
     Attributes:
         title: The heading.
         css: "n" for numbers, "m" and "w" for words that want some room and much, or "".
-        told: What the heading means, "" where it says so itself.
+        meaning: What the heading means, "" where it says so itself.
     """
 
     title: str
     css: str = ""
-    told: str = ""
+    meaning: str = ""
 
 
 def table_html(columns: Sequence[Column], rows: Sequence[Sequence[str]], label: str) -> Markup:

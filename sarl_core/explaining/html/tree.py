@@ -66,7 +66,7 @@ def place_html(
     return render(
         "rules/tree",
         dark=dark,
-        told=f"The tree around the rule: {counted(len(path) - 1, 'condition')} lead to "
+        description=f"The tree around the rule: {counted(len(path) - 1, 'condition')} lead to "
         f"{counted(int(tree.samples[node]), 'state')}, {label}",
         rows=[
             f"top:{_share(depth - top, height)};height:{_share(_BOX, height)};"

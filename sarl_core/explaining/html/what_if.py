@@ -27,7 +27,7 @@ from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Decision, Outside
 
 PLACED = "A person gave this rule its place: it is asked before the tree is."
-_SHOWN = 3  # features beyond the data that are named
+_MOST_OUTSIDE = 3  # features beyond the data that are named
 
 _WIDTH = "interquartile range, the width of the middle half of its demonstrated values"
 _CHANGES = (
@@ -112,7 +112,7 @@ def decision_html(
     rows = [(one.condition, one.value, one.room) for one in condition_views(rule, values, rule_set)]
     caption = "The rule's conditions and the state's values"
     beyond = outside_texts(rule, values, rule_set.source.features)
-    others = len(beyond) - _SHOWN
+    others = len(beyond) - _MOST_OUTSIDE
     more = f"; and {counted(others, 'feature')} more" if others > 0 else ""
     return render(
         "states/decision",
@@ -121,7 +121,7 @@ def decision_html(
         rule=rule_set.name_of(rule),
         sentence=sentence(rule, rule_set, state=values),
         conditions=table_html(_CONDITIONS, rows, caption) if rows else "",
-        outside=f"{'; '.join(beyond[:_SHOWN])}{more}",
+        outside=f"{'; '.join(beyond[:_MOST_OUTSIDE])}{more}",
         note="The state lies inside this rule's data: every feature is between the least and the "
         "largest value seen where it applies."
         if rule.box is not None

@@ -26,7 +26,7 @@ class _Row(NamedTuple):
     """A bar, as the template draws it."""
 
     name: str
-    told: str
+    description: str
     now: str
     place: str
     parts: list[tuple[str, str]]
@@ -83,25 +83,27 @@ def stretches(
     """
     low, high = ends
     executed = line.decisions.executed[:, dimension]
-    shown = rule_set.actions[dimension].labels_of(executed).tolist()
+    executed_labels = rule_set.actions[dimension].labels_of(executed).tolist()
     # A rule that abstains is in force, and something else is executed.
     ruled = [
         rule >= 0 and rule_set.rules[rule].action == label
-        for rule, label in zip(line.decisions.rules[:, dimension].tolist(), shown, strict=True)
+        for rule, label in zip(
+            line.decisions.rules[:, dimension].tolist(), executed_labels, strict=True
+        )
     ]
     starts = [-np.inf, *line.starts[1:].astype(np.float64).tolist()]
-    found: list[tuple[float, float, int, bool]] = []
+    joined: list[tuple[float, float, int, bool]] = []
     for place, start in enumerate(starts):
         end = starts[place + 1] if place + 1 < len(starts) else np.inf
         left, right = max(start, low), min(end, high)
         if left >= right:
             continue
-        looks = (shown[place], ruled[place])
-        if found and found[-1][2:] == looks:
-            found[-1] = (found[-1][0], right, *looks)
+        looks = (executed_labels[place], ruled[place])
+        if joined and joined[-1][2:] == looks:
+            joined[-1] = (joined[-1][0], right, *looks)
         else:
-            found.append((left, right, *looks))
-    return found
+            joined.append((left, right, *looks))
+    return joined
 
 
 def _row(
@@ -113,15 +115,15 @@ def _row(
 ) -> _Row:
     low, high = ends
     # The narrowest last: they are drawn wider than they are, and stay on top of their neighbours.
-    shown = sorted(parts, key=lambda part: part[0] - part[1])
+    widest_first = sorted(parts, key=lambda part: part[0] - part[1])
     near = decimal_text(decimal_on_scale(value, low, high))
     now = f"{feature.name} is {with_unit(near, feature)}"
     return _Row(
         feature.name,
-        f"{now}: {_told(parts, value, feature, labels)}",
+        f"{now}: {_described(parts, value, feature, labels)}",
         now,
         f"{100 * (value - low) / (high - low):.2f}%",
-        [_part(part, ends, feature, labels) for part in shown],
+        [_part(part, ends, feature, labels) for part in widest_first],
         [
             with_unit(number_text(end, apart_from=other), feature)
             for end, other in ((low, high), (high, low))
@@ -150,7 +152,7 @@ def _part(
     return f"{between}: {_done(part, labels)}", f"{side};width:{width};background:{colour}"
 
 
-def _told(
+def _described(
     parts: Sequence[tuple[float, float, int, bool]],
     value: float,
     feature: Feature,

@@ -362,11 +362,11 @@ def _crashes(one: Result) -> str:
         return _NONE
     if one.crashes is None or one.cut == one.episodes:
         return _NOT_KNOWN
-    told = at_least_text(one.crashes, one.cut)
+    share = at_least_text(one.crashes, one.cut)
     if one.crash_ends is None:
-        return told
+        return share
     low, high = map(share_text, one.crash_ends)
-    return f"{told} ({low} to {high})"
+    return f"{share} ({low} to {high})"
 
 
 def _gained(one: Result) -> str:
@@ -380,15 +380,15 @@ def _gained(one: Result) -> str:
 def _more(one: Result) -> tuple[str, ...]:
     """A text for each of `_HEADINGS`."""
 
-    def told(value: float | None) -> str:
+    def share_or_unknown(value: float | None) -> str:
         return _UNKNOWN if value is None else share_text(value)
 
     return (
         _crashes(one),
         _gained(one),
-        told(one.changed),
-        told(one.freedom),
-        told(one.covered),
+        share_or_unknown(one.changed),
+        share_or_unknown(one.freedom),
+        share_or_unknown(one.covered),
         _UNKNOWN if one.rules is None else f"{one.rules:,}",
         f"{one.episodes:,}",
     )

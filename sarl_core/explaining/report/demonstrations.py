@@ -72,7 +72,7 @@ class FeatureSummary:
 
 
 @dataclass(frozen=True)
-class Shown:
+class DemonstrationsPart:
     """What was demonstrated.
 
     Attributes:
@@ -92,7 +92,9 @@ class Shown:
     notes: tuple[str, ...]
 
 
-def shown(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> Shown:
+def demonstrations_part(
+    rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally
+) -> DemonstrationsPart:
     """What was demonstrated.
 
     Args:
@@ -104,7 +106,7 @@ def shown(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> Sh
         The part of the report.
     """
     picture, text = _returns(demonstrations)
-    return Shown(
+    return DemonstrationsPart(
         sentences=_sentences(demonstrations),
         actions=tuple(
             action_shares(np.bincount(tally.labels[:, index], minlength=one.n_labels), one)
@@ -176,7 +178,7 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     who = f"The agent “{demonstrations.agent}”" if demonstrations.agent else "An expert"
     where = f" in {demonstrations.env_id}" if demonstrations.env_id else ""
     seen = counted(demonstrations.observations.shape[1], "number")
-    found = [
+    sentences = [
         f"{who} acted{where} for {counted(len(demonstrations), 'step')} in "
         f"{counted(demonstrations.n_episodes, 'episode')}. At every step it saw the state of the "
         f"task, {seen} listed below, and chose an action. An episode is one attempt from start "
@@ -190,7 +192,7 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
             if summary.return_std is None
             else f" (give or take {number_text(summary.return_std)}, one standard deviation)"
         )
-        found.append(
+        sentences.append(
             f"The task gives points at every step; their sum is the return. On average {ended} "
             f"returned {number_text(summary.return_mean)}{spread}, after "
             f"{counted(round(summary.length_mean), 'step')}."
@@ -198,8 +200,8 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     if finished is not None and not finished.all():
         count = int((~finished).sum())
         cut = "1 episode was" if count == 1 else f"{count:,} episodes were"
-        found.append(f"{cut} cut short by the end of the recording.")
-    return tuple(found)
+        sentences.append(f"{cut} cut short by the end of the recording.")
+    return tuple(sentences)
 
 
 def _returns(demonstrations: Demonstrations) -> tuple[Markup, str]:

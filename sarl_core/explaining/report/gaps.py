@@ -145,8 +145,8 @@ def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
 def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
     if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
         return ""
-    found = find_contradictions(demonstrations, divider=divider)
-    count = int(found.contradicting().sum())
+    contradictions = find_contradictions(demonstrations, divider=divider)
+    count = int(contradictions.contradicting().sum())
     if not count:
         return (
             "None was found: wherever it came to the same state again, or nearly the same in "
@@ -165,13 +165,13 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
     rules = [
         (index, rule) for index, rule in enumerate(rule_set.rules) if rule.enabled and rule.samples
     ]
-    found = []
+    doubts = []
 
     def doubt(chosen: Sequence[int], one: str, many: str) -> None:
         if chosen:
             named = [rule_set.name_of(rule_set.rules[index]) for index in sorted(chosen)]
             text = f"1 rule {one}" if len(chosen) == 1 else f"{len(chosen):,} rules {many}"
-            found.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
+            doubts.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
 
     few = [index for index, rule in rules if rule.origin == "mined" and rule.samples < FEW_STATES]
     doubt(
@@ -210,7 +210,7 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
         )
     off = [index for index, rule in enumerate(rule_set.rules) if not rule.enabled]
     doubt(off, "is switched off and does nothing.", "are switched off and do nothing.")
-    return tuple(found)
+    return tuple(doubts)
 
 
 def _beyond(
@@ -233,7 +233,7 @@ def _far(
     seen: NDArray[np.float32], rules: NDArray[np.int64], rule_set: RuleSet
 ) -> NDArray[np.bool_]:
     """Whether a rule in force lies beyond the states it was made from, (T,)."""
-    found = np.zeros(len(seen), dtype=np.bool_)
+    beyond = np.zeros(len(seen), dtype=np.bool_)
     for index in np.unique(rules[rules >= 0]).tolist():
         rule = rule_set.rules[index]
         if rule.box is not None:
@@ -241,5 +241,5 @@ def _far(
             inside = (seen[rows] >= np.float32(rule.box.least)) & (
                 seen[rows] <= np.float32(rule.box.most)
             )
-            found[rows] |= ~inside.all(axis=1)
-    return found
+            beyond[rows] |= ~inside.all(axis=1)
+    return beyond

@@ -45,21 +45,21 @@ def facts(
         Names and values.
     """
     source = rule_set.source
-    found = [
+    entries = [
         ("Demonstrations", _named(demonstrations.digest, demonstrations_name)),
         ("Rules", _named(rules_digest(rule_set), rules_name)),
     ]
     if not tally.same:
         size = f"{source.steps:,} steps in {counted(source.episodes, 'episode')}"
-        found.append(("Rules were made from", _named(source.digest, size)))
+        entries.append(("Rules were made from", _named(source.digest, size)))
     if demonstrations.seed is not None:
-        found.append(("Seed of the demonstrations", str(demonstrations.seed)))
+        entries.append(("Seed of the demonstrations", str(demonstrations.seed)))
     if seeds is not None:
-        found.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
-    found += [("Which feature is which", note) for note in notes]
+        entries.append(("Seeds of the pictures", f"{seeds[0]} to {seeds[1]}"))
+    entries += [("Which feature is which", note) for note in notes]
     versions = [f"Python {platform.python_version()}"]
     versions += [f"{package} {_version(package)}" for package in _PACKAGES]
-    return (*found, ("Versions", ", ".join(versions)))
+    return (*entries, ("Versions", ", ".join(versions)))
 
 
 def _named(digest: str, name: str) -> str:

@@ -18,12 +18,12 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
 from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.comparison import Result, compared
-from sarl_core.explaining.report.demonstrations import shown
+from sarl_core.explaining.report.demonstrations import demonstrations_part
 from sarl_core.explaining.report.gaps import gaps
 from sarl_core.explaining.report.provenance import commands_that_hold, facts, mined_again
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
-from sarl_core.explaining.report.thresholds import kept
+from sarl_core.explaining.report.thresholds import thresholds_part
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.files import as_path, whole_file
@@ -199,8 +199,8 @@ def make_report(
         title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
         elsewhere=_elsewhere(as_given, demonstrations, trees),
-        shown=shown(rule_set, demonstrations, counts),
-        kept=kept(rule_set, counts, trees, card),
+        demonstrations=demonstrations_part(rule_set, demonstrations, counts),
+        thresholds=thresholds_part(rule_set, counts, trees, card),
         rules=rules_part(rule_set, demonstrations, counts, order, examples),
         pictures=_about_pictures(examples, without, wishes, demonstrations),
         frame_size=examples.size if examples is not None else (0, 0),
@@ -221,7 +221,7 @@ def make_report(
         html=html,
         rules=len(rule_set),
         in_full=len(order[0]),
-        pictures=sum(len(found) for found in examples.frames.values()) if examples else 0,
+        pictures=sum(len(of_rule) for of_rule in examples.frames.values()) if examples else 0,
         without=without,
         notes=tuple(
             dict.fromkeys((*demonstrations.notes, *notes, *(examples.remarks if examples else ())))
@@ -263,7 +263,7 @@ def _examples(
         # Gymnasium imports the module of "module:Id", and this id is a stranger's.
         return None, f"the environment {env_id!r} names a module to import, which a file may not do"
     players = _players(env_id, wishes)
-    found = try_example_frames(
+    examples = try_example_frames(
         env_id,
         rule_set,
         usable,
@@ -274,11 +274,11 @@ def _examples(
         max_steps=wishes.max_steps,
         progress=progress,
     )
-    if not isinstance(found, SarlError):
-        return found, ""
+    if not isinstance(examples, SarlError):
+        return examples, ""
     if wishes.agent is not None or wishes.env_id:
-        raise found  # who asked for it by name is to know
-    return None, str(found).split(";")[0]
+        raise examples  # who asked for it by name is to know
+    return None, str(examples).split(";")[0]
 
 
 def _players(env_id: str, wishes: Wishes) -> tuple[Player, ...]:

@@ -177,30 +177,30 @@ def tags(rule: Rule) -> tuple[str, ...]:
     Returns:
         As ("switched off", "written by hand").
     """
-    found = []
+    labels = []
     if not rule.enabled:
-        found.append("switched off")
+        labels.append("switched off")
     if rule.origin == "manual":
-        found.append("written by hand")
+        labels.append("written by hand")
     if rule.pinned:
-        found.append("put in its place by hand")
-    return tuple(found)
+        labels.append("put in its place by hand")
+    return tuple(labels)
 
 
 def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
-    told = f"{decided:,}" if decided else "none"
+    number = f"{decided:,}" if decided else "none"
     if tally.same and rule.origin == "mined" and rule.samples == applying:
         return (
             f"Applies in {share_text(rule.support)} of the demonstrated states "
             f"({counted(rule.samples, 'state')})"
-            + (f"; it decides {told} of them." if decided != applying else ".")
+            + (f"; it decides {number} of them." if decided != applying else ".")
         )
     text = f"Applies in {share_text(applying / len(tally.rules))} of this report's states "
     text += f"({applying:,})"
     if rule.origin == "mined" and rule.samples:
         text += f", and in {share_text(rule.support)} of those it was made from"
     if decided != applying:
-        text += f"; it decides {told} of this report's"
+        text += f"; it decides {number} of this report's"
     return f"{text}."
 
 
@@ -208,17 +208,17 @@ def _evidence(
     rule: Rule, rule_set: RuleSet, index: int, tally: Tally, applying: int
 ) -> tuple[Evidence, ...]:
     threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
-    found = []
+    evidence = []
     if rule.origin == "mined":
-        found.append(_mined(Share(rule.correct, rule.samples), threshold))
+        evidence.append(_mined(Share(rule.correct, rule.samples), threshold))
     if rule.held_out is not None:
         source = "of episodes kept aside, which it was not made from"
-        found.append(_tried(source, rule.held_out, threshold))
+        evidence.append(_tried(source, rule.held_out, threshold))
     if not (tally.same or tally.split) or rule.origin != "mined":
         here = tally.by_episode[index]
         decided = "that it decides " if here.samples != applying else ""
-        found.append(_tried(f"{decided}of this report's demonstrations", here, threshold))
-    return tuple(found)
+        evidence.append(_tried(f"{decided}of this report's demonstrations", here, threshold))
+    return tuple(evidence)
 
 
 def _states(share: Share) -> str:
@@ -239,25 +239,27 @@ def _mined(share: Share, threshold: float | None) -> Evidence:
     return Evidence(source, _states(share), "", bar, below=False)
 
 
-def _tried(source: str, found: HeldOut, threshold: float | None) -> Evidence:
-    if not found.samples:
+def _tried(source: str, held_out: HeldOut, threshold: float | None) -> Evidence:
+    if not held_out.samples:
         return _nothing(source)
-    interval = found.interval
+    interval = held_out.interval
     below = threshold is not None and interval is not None and interval.high < threshold
-    if found.share is None:  # an older file counted states alone
-        told, share = (
+    if held_out.share is None:  # an older file counted states alone
+        interval_text, share = (
             "the file does not say in how many episodes they lie",
-            found.correct / found.samples,
+            held_out.correct / held_out.samples,
         )
     else:
-        share = found.share
-        told = f"{share_text(share)} of its states in an episode, on average over "
-        told += f"{counted(found.episodes, 'episode')}; "
-        told += "these are too few to say more" if interval is None else what_tells(interval)
+        share = held_out.share
+        interval_text = f"{share_text(share)} of its states in an episode, on average over "
+        interval_text += f"{counted(held_out.episodes, 'episode')}; "
+        interval_text += (
+            "these are too few to say more" if interval is None else what_tells(interval)
+        )
     return Evidence(
         source=source,
-        text=_states(Share(found.correct, found.samples)),
-        interval=f"{told}{', below the threshold' if below else ''}",
+        text=_states(Share(held_out.correct, held_out.samples)),
+        interval=f"{interval_text}{', below the threshold' if below else ''}",
         bar=evidence_bar(share, interval, below=below, threshold=threshold),
         below=below,
     )

@@ -162,24 +162,24 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
     )
     if any(not rule.enabled for rule in rule_set.rules):
         applying += " A rule that is switched off decides nothing."
-    found = [f"Of several conditions in a rule all must hold. {applying}"]
+    sentences = [f"Of several conditions in a rule all must hold. {applying}"]
     if rest:
         each = ", as many of each action," if len(rule_set.actions) > 1 else ""
-        found.append(
+        sentences.append(
             f"There are {len(rule_set.rules):,} rules. The {full:,} that apply most often{each} "
             f"are shown in full, the other {rest:,} in a table after them."
         )
     if tally.split:
-        found.append(
+        sentences.append(
             f"The rules were mined from {counted(rule_set.source.episodes, 'episode')} of these "
             "demonstrations; the others were kept aside to try the rules on."
         )
     elif not tally.same:
-        found.append(
+        sentences.append(
             "The rules were made from other data than the demonstrations of this report (from "
             f"{counted(rule_set.source.steps, 'state')}); both counts are shown."
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _line(rule_set: RuleSet, index: int) -> RuleLine:

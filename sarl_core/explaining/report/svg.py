@@ -99,20 +99,20 @@ def evidence_bar(
 
 
 def interval_bar(
-    scale: SvgScale, data: tuple[float, float], asked: tuple[float, float], states: Sequence[float]
+    scale: SvgScale, data: tuple[float, float], bounds: tuple[float, float], states: Sequence[float]
 ) -> Markup:
     """What a rule asks of a feature, against the data; said in words beside it.
 
     Args:
         scale: From left to right.
         data: Least and largest demonstrated value.
-        asked: The rule's bounds, infinite where there is none.
+        bounds: The rule's bounds, infinite where there is none.
         states: Least and largest value of the rule's own states; () where it has none.
 
     Returns:
         SVG.
     """
-    low, high = (scale.place(value) for value in asked)
+    low, high = (scale.place(value) for value in bounds)
     parts = [
         _box(scale.place(data[0]), scale.place(data[1]), 5, 6, "track"),
         _box(low, high, 3, 10, "asked"),
@@ -120,7 +120,7 @@ def interval_bar(
     if states:
         first, last = (scale.place(value) for value in states)
         parts.append(_box(first, max(last, first + 0.006), 6, 4, "states"))
-    for place, bound in ((low, asked[0]), (high, asked[1])):
+    for place, bound in ((low, bounds[0]), (high, bounds[1])):
         if math.isfinite(bound):
             parts.append(_line(place, 0, 16, "edge"))
     return _picture("bar", 16, parts)

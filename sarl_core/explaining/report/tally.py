@@ -91,14 +91,14 @@ def report_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Fitted:
         InputError: If features or actions are others.
     """
     fitted = rules_for(rule_set, demonstrations)
-    for rules, shown in zip(fitted.rule_set.actions, demonstrations.action_dimensions, strict=True):
+    for rules, data in zip(fitted.rule_set.actions, demonstrations.action_dimensions, strict=True):
         if not rules.is_interval and (rules.n_labels, rules.first) != (
-            len(shown.labels),
-            shown.first,
+            len(data.labels),
+            data.first,
         ):
             raise InputError(
                 f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
-                f"{len(shown.labels)} in the demonstrations; give the demonstrations the rules "
+                f"{len(data.labels)} in the demonstrations; give the demonstrations the rules "
                 "were mined from"
             )
     return fitted
@@ -132,21 +132,23 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     """
     rule_set = report_rules(rule_set, demonstrations).rule_set
     actions = demonstrations.action_columns
-    found = Shield(rule_set).rules_in_force(demonstrations.observations)
+    in_force = Shield(rule_set).rules_in_force(demonstrations.observations)
     labels = np.stack(
         [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
     )
     said = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
-    inside = found >= 0
-    right = inside & (said[np.maximum(found, 0)] == labels)
+    inside = in_force >= 0
+    right = inside & (said[np.maximum(in_force, 0)] == labels)
     count = len(rule_set.rules)
     row, _ = np.nonzero(inside)
-    by_episode = count_applied(count, found[inside], row, right[inside], demonstrations).held_out()
+    by_episode = count_applied(
+        count, in_force[inside], row, right[inside], demonstrations
+    ).held_out()
     shares = tuple(Share(one.correct, one.samples) for one in by_episode)
     return Tally(
         same=rule_set.source.digest == demonstrations.digest,
         split=_is_split(rule_set, demonstrations, shares),
-        rules=found,
+        rules=in_force,
         labels=labels,
         shares=shares,
         by_episode=tuple(by_episode),

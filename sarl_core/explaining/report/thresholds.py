@@ -80,7 +80,7 @@ class Neighbour:
 
 
 @dataclass(frozen=True)
-class Kept:
+class ThresholdsPart:
     """Which rules were kept, and why.
 
     Attributes:
@@ -144,12 +144,12 @@ def read_card(rules: Path) -> Mapping[str, Any] | None:
     return read_object(path, "mend this card or take it away")
 
 
-def kept(
+def thresholds_part(
     rule_set: RuleSet,
     tally: Tally,
     trees: Sequence[PolicyTree] | None,
     card: Mapping[str, Any] | None,
-) -> Kept:
+) -> ThresholdsPart:
     """Which rules were kept, and why.
 
     Args:
@@ -166,7 +166,7 @@ def kept(
     edits = edits_sentence(rule_set)
     then = (edits,) if edits else ()
     if rule_set.cut == "leaves" or trees is None:
-        return Kept((*_built(rule_set, said), *then), None, "", (), facts)
+        return ThresholdsPart((*_built(rule_set, said), *then), None, "", (), facts)
     limits = rule_set.thresholds
     landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
     same = (
@@ -182,7 +182,9 @@ def kept(
     if edits:
         text += " It counts the rules as they were mined, before the changes by hand."
     sentences = (*_cut(rule_set), *then)
-    return Kept(sentences, _plane(landscape, limits), text, _neighbours(trees, limits), facts)
+    return ThresholdsPart(
+        sentences, _plane(landscape, limits), text, _neighbours(trees, limits), facts
+    )
 
 
 # --- thresholds --------------------------------------------------------------------------------
@@ -191,7 +193,7 @@ def kept(
 def _cut(rule_set: RuleSet) -> tuple[str, ...]:
     limits, steps = rule_set.thresholds, rule_set.source.steps
     least = math.ceil(limits.support * steps - 1e-9)
-    found = [
+    sentences = [
         "Rules come from a decision tree: questions about the state, asked one after the other. "
         "Each way through the tree ends at the first point that is good enough to be a rule.",
         f"A rule was kept if it applies to at least {share_text(limits.support)} of the "
@@ -200,26 +202,26 @@ def _cut(rule_set: RuleSet) -> tuple[str, ...]:
         f"{share_text(limits.confidence)} of those (its confidence).",
     ]
     if limits.lift > 0:
-        found.append(
+        sentences.append(
             "It also had to name its action at least "
             f"{number_text(limits.lift)} times as often as the action occurs in all states "
             "(its lift)."
         )
     if limits.max_depth is not None:
-        found.append(f"No rule may ask more than {counted(limits.max_depth, 'question')}.")
+        sentences.append(f"No rule may ask more than {counted(limits.max_depth, 'question')}.")
     named = [name for name, pair in NAMED_SETTINGS.items() if pair == limits]
-    found.append(
+    sentences.append(
         f"This is the setting “{named[0]}” of the paper behind the method."
         if named
         else "These thresholds were chosen by whoever made the rules; they are not one of the two "
         "settings that the paper behind the method names."
     )
     if any(action.is_interval for action in rule_set.actions):
-        found.append(
+        sentences.append(
             f"Each continuous action was divided into {rule_set.divider} equal intervals, and a "
             "rule names one of them."
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _landscape(
@@ -272,12 +274,12 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
         pairs["more confidence"] = (support, float(np.round((confidence + 1) / 2, 6)))
     for name, setting in (("“filtered”", FILTERED), ("“unfiltered”", UNFILTERED)):
         pairs[name] = (setting.support, setting.confidence)
-    found: dict[tuple[float, float], Neighbour] = {}
+    neighbours: dict[tuple[float, float], Neighbour] = {}
     for name, pair in pairs.items():
-        if pair in found:
+        if pair in neighbours:
             continue
         at = _landscape(trees, Thresholds(*pair, limits.lift, limits.max_depth), (), ())
-        found[pair] = Neighbour(
+        neighbours[pair] = Neighbour(
             name=name,
             thresholds=f"{_short(pair[0])} %, {_short(pair[1])} %",
             rules=f"{int(at.rule_count[0, 0]):,}",
@@ -286,7 +288,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
             followed=share_text(float(at.fidelity[0, 0])),
             chosen=name == "in force",
         )
-    return tuple(found.values())
+    return tuple(neighbours.values())
 
 
 # --- a budget ----------------------------------------------------------------------------------
@@ -295,7 +297,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
 def _built(rule_set: RuleSet, card: _Card) -> tuple[str, ...]:
     if rule_set.cut != "leaves":
         return _cut(rule_set)
-    found = [
+    sentences = [
         "These rules were not cut out by thresholds. A tree of a few questions was built so that "
         "in every state exactly one rule for each action applies: few rules that do as much as "
         "possible. So these rules leave an agent nothing to choose from: they are a policy that "
@@ -303,25 +305,25 @@ def _built(rule_set: RuleSet, card: _Card) -> tuple[str, ...]:
     ]
     if card.budget is not None:
         each = " for each action" if len(rule_set.actions) > 1 else ""
-        asked = (
+        rounds_text = (
             f" In {counted(len(card.rounds), 'round')} the rules were let act, the expert was "
             "asked what it would have done in the states they led to, and the rules were built "
             "anew from all its answers."
             if card.rounds
             else ""
         )
-        found.append(f"The budget was {card.budget:,} rules{each}.{asked}")
+        sentences.append(f"The budget was {card.budget:,} rules{each}.{rounds_text}")
         if card.refined:
-            found.append(
+            sentences.append(
                 "Then the thresholds in the rules were moved to where the rules achieve more "
                 "when they act. They are therefore no plain record of what the expert did most "
                 "often: a rule may say what only a part of its states show."
             )
-    found.append(
+    sentences.append(
         "So judge these rules by what they achieve (see the card below and the comparison), and "
         "read the share of states in which the expert did the same as how far they follow it."
     )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _card_facts(card: _Card) -> Iterator[tuple[str, str]]:

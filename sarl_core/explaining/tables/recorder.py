@@ -125,7 +125,7 @@ def filter_text(chosen: StepFilter, rows: int, total: int, rule: str = "") -> st
     Returns:
         As "12 of 300 steps: changed by the rules, under R14"; "300 steps" without a filter.
     """
-    asked = [
+    filters = [
         words
         for words, on in (
             ("changed by the rules", chosen.intervened),
@@ -135,9 +135,9 @@ def filter_text(chosen: StepFilter, rows: int, total: int, rule: str = "") -> st
         )
         if on
     ]
-    if not asked:
+    if not filters:
         return counted(total, "step")
-    return f"{rows:,} of {counted(total, 'step')}: {', '.join(asked)}"
+    return f"{rows:,} of {counted(total, 'step')}: {', '.join(filters)}"
 
 
 def _titled(text: str) -> str:

@@ -115,11 +115,11 @@ def feature_evidence(
         One entry a feature, in the order of the rule's conditions.
     """
     rows = tree.rows(node_of(rule))
-    found = []
+    evidence = []
     for bounds in rule.bounds:
         values = demonstrations.observations[:, bounds.feature]
         edges = _edges(values, values[rows], bounds, _BINS)
-        found.append(
+        evidence.append(
             FeatureEvidence(
                 bounds.feature,
                 bounds,
@@ -128,7 +128,7 @@ def feature_evidence(
                 _shares(values[rows], edges),
             )
         )
-    return tuple(found)
+    return tuple(evidence)
 
 
 def _edges(
@@ -202,9 +202,9 @@ def example_columns(
         "Expert did": list(did),
         "As the rule says": (labels == rule.action).tolist(),
     }
-    asked = [bounds.feature for bounds in rule.bounds]
-    others = [index for index in range(len(demonstrations.features)) if index not in asked]
-    for index in (*asked, *others):
+    queried = [bounds.feature for bounds in rule.bounds]
+    others = [index for index in range(len(demonstrations.features)) if index not in queried]
+    for index in (*queried, *others):
         feature = demonstrations.features[index]
         name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         values = demonstrations.observations[rows, index].astype(np.float64)

@@ -75,15 +75,15 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
         rule that has none is NaN.
     """
 
-    def told(rule: Rule, value: float) -> float:
+    def mined_value(rule: Rule, value: float) -> float:
         return value if rule.samples else math.nan
 
     return {
         "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
         "Support": [100 * rule.support for rule in rules],
-        "Confidence": [told(rule, 100 * rule.confidence) for rule in rules],
-        "Lift": [told(rule, rule.lift) for rule in rules],
+        "Confidence": [mined_value(rule, 100 * rule.confidence) for rule in rules],
+        "Lift": [mined_value(rule, rule.lift) for rule in rules],
         "Joint support": [100 * rule.joint_support for rule in rules],
         "States": [rule.samples for rule in rules],
         "Length": [rule.length for rule in rules],

@@ -34,7 +34,7 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
     effect = shield_effect(alone, shielded)
     before, after = (rounded_text(episodes.statistics.iqm) for episodes in (alone, shielded))
     mean = effect.returns.mean
-    if not _is_shown(effect):
+    if not _is_clear(effect):
         change = (
             f"does not clearly change ({after}, without them {before}; "
             f"{_difference(effect, alone, shielded)})"
@@ -70,7 +70,7 @@ def verdict_on_all(agent: str, alone: Episodes, shielded: Sequence[tuple[str, Ep
     return "; ".join([first, *(_clause(name, alone, episodes) for name, episodes in others)]) + "."
 
 
-def _is_shown(effect: ShieldEffect) -> bool:
+def _is_clear(effect: ShieldEffect) -> bool:
     """Whether a difference in return is said to be one; of few episodes with a caution."""
     return effect.return_p < ERROR_RATE or (effect.too_few and effect.returns.mean != 0.0)
 
@@ -99,7 +99,7 @@ def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     if effect.effect == "harms":
         notes.append("these rules harm it")
     text = "; ".join(notes)
-    if not _is_shown(effect):
+    if not _is_clear(effect):
         return f"with {shield} it does not clearly change ({after}; {text})"
     word = "rises" if shielded.statistics.iqm > alone.statistics.iqm else "falls"
     return f"with {shield} it {word} to {after} ({text})"

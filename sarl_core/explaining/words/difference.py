@@ -20,7 +20,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.shielding.disagreement import Disagreement
 
 NO_RULE_TEXT = "no rule"
-_SHOWN = 10  # rules of each kind in the text for a terminal
+_MOST_IN_TEXT = 10  # rules of each kind in the text for a terminal
 
 
 def said_text(label: int, dimension: LabelledDimension) -> str:
@@ -245,8 +245,8 @@ def difference_lines(
     ):
         if rules:
             often = sorted(rules, key=lambda rule: -rule.samples)
-            told_rules = [f"{rule_set.name_of(rule)}: {sentence(rule, rule_set)}" for rule in often]
-            lines += ["", f"{title}:", *_first_few(told_rules)]
+            sentences = [f"{rule_set.name_of(rule)}: {sentence(rule, rule_set)}" for rule in often]
+            lines += ["", f"{title}:", *_first_few(sentences)]
     if difference.changed:
         changes = [
             f"{before if before == after else f'{before} (now {after})'}: "
@@ -260,10 +260,10 @@ def difference_lines(
 
 
 def _first_few(lines: list[str]) -> list[str]:
-    shown = [f"  {line}" for line in lines[:_SHOWN]]
-    if len(lines) > _SHOWN:
-        shown.append(f"  and {len(lines) - _SHOWN:,} more; --json lists them all")
-    return shown
+    first = [f"  {line}" for line in lines[:_MOST_IN_TEXT]]
+    if len(lines) > _MOST_IN_TEXT:
+        first.append(f"  and {len(lines) - _MOST_IN_TEXT:,} more; --json lists them all")
+    return first
 
 
 def _lower(text: str) -> str:

@@ -123,7 +123,7 @@ def held_out_interval_text(held_out: HeldOut | None) -> str:
     return "too few episodes" if interval is None else range_text(interval)
 
 
-def told_by_episodes(held_out: HeldOut, *, what: str) -> str:
+def episodes_text(held_out: HeldOut, *, what: str) -> str:
     """What other episodes say, for whoever has never heard of an interval.
 
     Args:

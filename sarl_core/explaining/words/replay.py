@@ -108,9 +108,9 @@ def named_description(
         with suppress(InputError):  # of other features: the environment's own names it is
             candidates.append(names_of(in_order_of(demonstrations, description).demonstrations))
     for names in candidates:
-        found = renamed_description(description, names)
-        if found is not None:
-            return found
+        renamed = renamed_description(description, names)
+        if renamed is not None:
+            return renamed
     return description
 
 
@@ -157,7 +157,7 @@ def step_view(
             )
         )
     in_force = steps.rules[row].tolist() if rule_set is not None else []
-    asked = [
+    bounds_of_rules = [
         bounds
         for rule in in_force
         if rule_set is not None and rule >= 0
@@ -169,7 +169,7 @@ def step_view(
             value_text(
                 float(value),
                 rule_set.source.features[index] if rule_set is not None else feature,
-                [bounds for bounds in asked if bounds.feature == index],
+                [bounds for bounds in bounds_of_rules if bounds.feature == index],
             ),
             feature.unit,
         )

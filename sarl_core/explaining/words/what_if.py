@@ -178,13 +178,13 @@ def by_use(rule_set: RuleSet) -> tuple[int, ...]:
         Indexes of all d features; first those that the rules of the most states ask about.
     """
     count = len(rule_set.source.features)
-    asked, rules = np.zeros(count), np.zeros(count)
+    states, rules = np.zeros(count), np.zeros(count)
     for rule in rule_set.rules:
         if rule.enabled:
             for bounds in rule.bounds:
-                asked[bounds.feature] += rule.samples
+                states[bounds.feature] += rule.samples
                 rules[bounds.feature] += 1
-    return tuple(sorted(range(count), key=lambda index: (-asked[index], -rules[index], index)))
+    return tuple(sorted(range(count), key=lambda index: (-states[index], -rules[index], index)))
 
 
 def _is_contact(change: FeatureChange, feature: Feature) -> bool:

@@ -98,23 +98,23 @@ def _lowest(relevance: Relevance, share: Floats) -> tuple[int, Floats]:
 
 def converges(learners: Learners) -> Measurement:
     """How far from their minimum confidence filtered rules are kept at the end."""
-    kept = end_of(learners.of(learners.relevance.kept_share, "filtered"))
-    end = over_recordings(kept, learners.experts)
+    obeyed = end_of(learners.of(learners.relevance.obeyed_share, "filtered"))
+    end = over_recordings(obeyed, learners.experts)
     return Measurement(
-        learners.sample(kept - FILTERED.confidence),
+        learners.sample(obeyed - FILTERED.confidence),
         f"Over the last tests, filtered rules were kept at {shares(end)} of the steps with a rule, "
-        f"with the least of the learners at {share_text(float(kept.min()))} and the most at "
-        f"{share_text(float(kept.max()))}.",
+        f"with the least of the learners at {share_text(float(obeyed.min()))} and the most at "
+        f"{share_text(float(obeyed.max()))}.",
         {"kept": end.mean},
     )
 
 
 def does_not_converge(learners: Learners) -> Measurement:
     """How far below that confidence unfiltered rules are kept at the end."""
-    kept = end_of(learners.of(learners.relevance.kept_share, "unfiltered"))
-    end = over_recordings(kept, learners.experts)
+    obeyed = end_of(learners.of(learners.relevance.obeyed_share, "unfiltered"))
+    end = over_recordings(obeyed, learners.experts)
     return Measurement(
-        learners.sample(FILTERED.confidence - kept),
+        learners.sample(FILTERED.confidence - obeyed),
         f"Unfiltered rules were kept at {shares(end)} of the steps.",
         {"kept": end.mean},
     )
@@ -134,7 +134,7 @@ def every_state(learners: Learners) -> Measurement:
 
 def smaller_effect(learners: Learners) -> Measurement:
     """How much more often unfiltered rules are broken than filtered ones."""
-    broken = 1.0 - learners.relevance.kept_share
+    broken = 1.0 - learners.relevance.obeyed_share
     some, many = (end_of(learners.of(broken, name)) for name in ("filtered", "unfiltered"))
     return Measurement(
         learners.sample(many - some),
