@@ -9,7 +9,14 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import EnvOfFile, Json, OnInvalidName, ProjectionName, out_option
+from sarl_core.cli.options import (
+    EnvOfFile,
+    Json,
+    OnInvalidName,
+    ProjectionName,
+    out_option,
+    with_environment,
+)
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,6 +27,7 @@ _ENDINGS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
 _MOST_THRESHOLDS = 5
 
 
+@with_environment
 def export(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rule file.", show_default=False)

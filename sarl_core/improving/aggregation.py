@@ -122,6 +122,29 @@ class Aggregation:
         return self.reported is not None
 
 
+def recorded_environment(demonstrations: Demonstrations) -> str:
+    """The environment that demonstrations name, to be played in.
+
+    Args:
+        demonstrations: From a file, perhaps.
+
+    Returns:
+        Its id.
+
+    Raises:
+        InputError: If they name none, or one whose module would have to be imported.
+    """
+    env_id = demonstrations.env_id
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    if ":" in env_id:  # what a file names is not imported
+        raise InputError(
+            f"the demonstrations name the environment {env_id!r}, which would be imported, and a "
+            f"file may not say what is; say so yourself, with --env {env_id}"
+        )
+    return env_id
+
+
 def aggregate(
     start: Demonstrations,
     plan: Plan,
@@ -156,9 +179,7 @@ def aggregate(
         InputError: If agent, expert and environment do not fit, or the expert acts at random.
         CancelledError: If `progress` returned False before the first round was finished.
     """
-    env_id = env_id or start.env_id
-    if not env_id:
-        raise InputError("the demonstrations name no environment; say which with --env")
+    env_id = env_id or recorded_environment(start)
     agents = make_agent(agent, env_id), make_agent(expert, env_id)
     run = _Run(start, plan, env_id, *agents, jobs, executor)
     clock = _Clock(run.planned_units(), progress)

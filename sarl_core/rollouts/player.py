@@ -440,7 +440,7 @@ def check_environment(env_id: EnvironmentOrId, shield: Shield | None) -> Ready:
     try:
         if shield is None:
             return Ready(adapter, None, ())
-        from sarl_core.shielding.observation_layers import observed
+        from sarl_core.environments.observation_layers import observed
         from sarl_core.shielding.wrappers import fitted
 
         spaces = adapter.observation_space, adapter.action_space

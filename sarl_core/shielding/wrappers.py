@@ -11,9 +11,9 @@ import numpy as np
 
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import NamedFeatures
+from sarl_core.environments.observation_layers import Observed, observed
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.rule_order import fitted_rules
-from sarl_core.shielding.observation_layers import Observed, observed
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import Shield
 
