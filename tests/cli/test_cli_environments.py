@@ -91,3 +91,26 @@ def test_no_module_is_imported_because_demonstrations_name_it(
     )
     assert main(["aggregate", str(recorded), "--out", str(here / "out.json")]) == 2
     assert "a file may not say what is" in capsys.readouterr().err
+
+
+def test_what_was_recorded_before_an_environment_failed_is_written(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "late_wrappers.py").write_text(
+        "import crane_wrappers\n\n"
+        "class Late(crane_wrappers.Fails):\n"
+        "    def reset(self, *, seed=None, options=None):\n"
+        "        answer = super().reset(seed=seed)\n"
+        "        self.left = 7 if seed == 3 else -1\n"
+        "        return answer\n"
+    )
+    out = here / "part.parquet"
+    env = ("--env", "CartPole-v1", "--wrapper", "late_wrappers:Late")
+    code = main(
+        ["record", *env, "--agent", "novice", "--steps", "9000", "--seed", "0", "--out", str(out)]
+    )
+    assert code == 2
+    assert "in the episode with seed 3, at step 6" in capsys.readouterr().err
+    part = load_demonstrations(out)
+    assert part.n_episodes == 4
+    assert (part.episodes == 3).sum() == 6
