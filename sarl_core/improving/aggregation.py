@@ -109,12 +109,12 @@ class Aggregation:
         """What a person should know of how the episodes came about, as clauses."""
         cut, of = sum(one.cut for one in self.rounds), sum(len(one.returns) for one in self.rounds)
         steps = self.plan.max_steps or MAX_STEPS
-        said = (
+        clauses = (
             (cut_text(self.env_id, cut, of, steps, episodes="episodes of the rounds"),)
             if cut
             else ()
         )
-        return (*said, *(() if self.reported is None else self.reported.remarks))
+        return (*clauses, *(() if self.reported is None else self.reported.remarks))
 
     @property
     def is_finished(self) -> bool:
@@ -329,7 +329,9 @@ class _Run:
         assert table is not None
         wanted = ask(self.expert, table.observation, table.episode)
         covered = table.rules >= 0
-        said = np.array([rule.action for rule in rules.rules] or [0])[np.maximum(table.rules, 0)]
+        rule_labels = np.array([rule.action for rule in rules.rules] or [0])[
+            np.maximum(table.rules, 0)
+        ]
         labels = np.stack(
             [
                 dimension.labels_of(column)
@@ -337,7 +339,7 @@ class _Run:
             ],
             axis=1,
         )
-        otherwise = covered & (said != labels)
+        otherwise = covered & (rule_labels != labels)
         self.trees.append(trees)
         self.rounds.append(
             AggregationRound(
