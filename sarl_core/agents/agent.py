@@ -13,6 +13,7 @@ from typing import Any, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.agents.driver import Driver
 from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
@@ -22,6 +23,7 @@ from sarl_core.errors import InputError, require
 from sarl_core.shipped import DATA
 
 EXPERT_FOLDER = DATA / "experts"
+_SCRIPTED = {"Driving-v0": Driver}
 
 _FAR = 8.0  # standard deviations
 _ODD_SHARE = 0.1  # of the states; features that hardly vary in training may jump now and then
@@ -204,6 +206,8 @@ def make_agent(
         return PolicyAgent("untrained", _untrained(env_id, seed), True, first)
     notes: tuple[str, ...] = ()
     if spec == "expert":
+        if scripted := _SCRIPTED.get(_own_id(env_id)):
+            return scripted()
         name, policy = "expert", _expert(str(env_id))
     else:
         name = Path(spec).stem
@@ -231,6 +235,20 @@ def shipped_experts(folder: Path = EXPERT_FOLDER) -> dict[str, Path]:
     """
     experts = {MlpPolicy.load(path).env_id: path for path in folder.glob("*.npz")}
     return dict(sorted(experts.items()))
+
+
+def has_expert(env_id: EnvironmentOrId) -> bool:
+    """Whether an expert is shipped for an environment.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+    """
+    return _own_id(env_id) in {*shipped_experts(), *_SCRIPTED}
+
+
+def _own_id(env_id: EnvironmentOrId) -> str:
+    """An environment's id without the module that registers it."""
+    return str(env_id).rsplit(":", 1)[-1]
 
 
 def _novice(env_id: EnvironmentOrId, first: NDArray[np.int64]) -> UniformAgent:
@@ -274,10 +292,11 @@ def _untrained(env_id: EnvironmentOrId, seed: int) -> MlpPolicy:
 
 def _expert(env_id: str) -> MlpPolicy:
     experts = shipped_experts()
-    policy = experts.get(env_id.rsplit(":", 1)[-1])
+    policy = experts.get(_own_id(env_id))
     if policy is None:
         raise InputError(
-            f"there is no shipped expert for {env_id!r}, only for {', '.join(experts) or 'none'}; "
+            f"there is no shipped expert for {env_id!r}, only for "
+            f"{', '.join([*experts, *_SCRIPTED])}; "
             "train one with `train-expert` and give its path"
         )
     return MlpPolicy.load(policy)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sarl_core.cli import terminal
-from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 def read_agent(
     agent: str,
-    env_id: EnvironmentOrId,
+    env_id: str,
     normalise: str | None,
     *,
     stochastic: bool = False,
@@ -49,7 +48,7 @@ def read_agent(
     return made
 
 
-def read_demonstrations(file: Path, env_id: EnvironmentOrId | None) -> Demonstrations:
+def read_demonstrations(file: Path, env_id: str | None) -> Demonstrations:
     """Read a file of demonstrations.
 
     Args:

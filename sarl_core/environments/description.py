@@ -76,6 +76,13 @@ _LUNAR_LANDER_FEATURES = (
     ("right leg contact", ""),
 )
 
+_TRAFFIC = tuple(
+    (f"{quantity} {direction} on the {side}", unit)
+    for side in ("left", "right")
+    for direction in ("ahead", "behind")
+    for quantity, unit in (("gap", "m"), ("time to collision", "s"))
+)
+
 _CATALOGUE: dict[str, EnvironmentNames] = {
     "CartPole": EnvironmentNames(
         (
@@ -139,7 +146,23 @@ _CATALOGUE: dict[str, EnvironmentNames] = {
         ("torque",),
         (("torque -1 Nm", "no torque", "torque +1 Nm"),),
     ),
+    "Driving": EnvironmentNames(
+        (
+            ("speed", "m/s"),
+            ("distance to the lane aimed at", "m"),
+            ("lanes to the left", ""),
+            ("lanes to the right", ""),
+            ("gap ahead", "m"),
+            ("time to collision ahead", "s"),
+            *_TRAFFIC,
+        ),
+        ("manoeuvre",),
+        (("change to the left lane", "keep on", "change to the right lane", "faster", "slower"),),
+    ),
 }
+
+# Ours, registered as other people's are, by the module that Gymnasium imports first.
+_OWN_MODULES = {"Driving-v0": "sarl_core.environments.driving"}
 
 _UNKNOWN = re.compile(r"unexpected keyword argument '(\w+)'")
 
@@ -162,13 +185,16 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
 
     environment = as_environment(environment)
     env_id, parameters = environment.id, environment.keywords
+    module = _OWN_MODULES.get(env_id)
     if render_mode is not None:  # an environment that draws nothing need not take the parameter
         parameters["render_mode"] = render_mode
     try:
         with warnings.catch_warnings():
             # Of versions out of date, say; if it cannot be made, the error says so in one line.
             warnings.simplefilter("ignore")
-            env: Any = gymnasium.make(env_id, disable_env_checker=True, **parameters)
+            env: Any = gymnasium.make(
+                f"{module}:{env_id}" if module else env_id, disable_env_checker=True, **parameters
+            )
     except Exception as error:  # other people's code, which may raise anything
         text = str(error).strip()
         if (unknown := _UNKNOWN.search(text)) and unknown[1] in environment.keywords:

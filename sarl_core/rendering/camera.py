@@ -134,7 +134,7 @@ def no_display() -> Iterator[None]:
     """Let pygame draw where there is no screen and no sound; leaves the environment as it was."""
     wanted = {"PYGAME_HIDE_SUPPORT_PROMPT": "1", "SDL_AUDIODRIVER": "dummy"}
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        wanted["SDL_VIDEODRIVER"] = "dummy"
+        wanted["SDL_VIDEODRIVER"] = "offscreen"  # with "dummy", highway-env draws nothing
     added = {name: value for name, value in wanted.items() if name not in os.environ}
     os.environ.update(added)
     try:

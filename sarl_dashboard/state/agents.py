@@ -13,6 +13,7 @@ from pathlib import Path
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_core.agents import agent as library
 from sarl_core.agents.agent import (
     EXPERT_FOLDER,
     Agent,
@@ -40,7 +41,9 @@ def _latest_expert() -> int:
 @cached()
 def _expert_digest(env_id: str, stamp: int) -> str:
     path = shipped_experts().get(env_id)
-    return digest_of(path.read_bytes()) if path is not None else ""
+    if path is None:
+        return "scripted" if library.has_expert(env_id) else ""
+    return digest_of(path.read_bytes())
 
 
 def has_expert(env_id: str) -> bool:

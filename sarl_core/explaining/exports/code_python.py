@@ -160,13 +160,13 @@ def rules_to_python(
         for index, order in enumerate(program.orders)
         for part in _finders(index, order, rule_set)
     ]
-    docstring, answer = _INVALID[on_invalid]
+    said, answer = _INVALID[on_invalid]
     body = _CONTINUOUS if program.continuous else _DISCRETE
     finders = ", ".join(_finder(index, 0) for index in range(len(program.orders)))
     return (
         "\n".join(
             [
-                _HEAD.format(invalid=docstring),
+                _HEAD.format(invalid=said),
                 *_names(program),
                 *_table(program),
                 *functions,

@@ -1,0 +1,127 @@
+"""Driving on a motorway: highway-env's task, with what a driver looks at as its features.
+
+The simulator is Eleurent's `highway-env` (https://github.com/Farama-Foundation/HighwayEnv), which
+tells positions and speeds of the vehicles around in a table. Nobody reads a rule about "vehicle 3:
+vx"; here the same scene is told as gaps and times to collision in the three lanes that matter.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+ENV_ID = "Driving-v0"
+
+N_FEATURES = 14
+FAR = 100.0  # metres; further away is nobody
+LONG = 20.0  # seconds; later is never
+_VEHICLE_LENGTH = 5.0
+
+
+class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any]):
+    """Gaps and times to collision in the own lane and in the lanes beside it.
+
+    The features are called as `describe_environment("Driving-v0")` says, shape (14,): speed,
+    distance to the lane aimed at, number of lanes to the left and to the right, then gap and time
+    to collision ahead, and ahead and behind on the left, and on the right.
+
+    A gap is counted from bumper to bumper, up to 100 m; a time to collision is the gap over the
+    speed at which it closes, up to 20 s. Where there is no lane, all four are 0. While the vehicle
+    changes lanes, "ahead" is the nearer of who is ahead in the lane that it leaves and in the lane
+    that it aims at.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        """Wrap an environment of highway-env with parallel lanes.
+
+        Args:
+            env: As ``gymnasium.make("highway_env:highway-fast-v0")``.
+        """
+        super().__init__(env)
+        gaps = [FAR, LONG] * ((N_FEATURES - 4) // 2)
+        high = np.array([np.inf, np.inf, np.inf, np.inf, *gaps], dtype=np.float32)
+        self.observation_space = spaces.Box(np.minimum(-high, 0.0) * np.isinf(high), high)
+
+    def observation(self, observation: Any) -> NDArray[np.float32]:
+        """The features of the present scene, shape (14,), whatever the simulator's own table."""
+        scene: Any = self.unwrapped
+        start, end, aimed_at = scene.vehicle.target_lane_index
+        lanes = scene.road.network.graph[start][end]
+
+        def traffic(lane: int) -> list[float]:
+            """Gap and time to collision ahead, then behind."""
+            if not 0 <= lane < len(lanes):
+                return [0.0] * 4
+            ahead, behind = _neighbours(scene, (start, end, lane))
+            return [*_gap(scene.vehicle, ahead), *_gap(behind, scene.vehicle)]
+
+        leaves = scene.vehicle.lane_index[2]
+        ahead = np.minimum(traffic(leaves)[:2], traffic(aimed_at)[:2])
+        aside = abs(lanes[aimed_at].local_coordinates(scene.vehicle.position)[1])
+        return np.array(
+            [
+                scene.vehicle.speed,
+                aside,
+                aimed_at,
+                len(lanes) - 1 - aimed_at,
+                *ahead,
+                *traffic(aimed_at - 1),
+                *traffic(aimed_at + 1),
+            ],
+            dtype=np.float32,
+        )
+
+
+def _neighbours(scene: Any, index: tuple[str, str, int]) -> tuple[Any, Any]:
+    """Who is next ahead and next behind in a lane; who changes into it is in it already."""
+    lane, own = scene.road.network.get_lane(index), scene.vehicle
+    place = lane.local_coordinates(own.position)[0]
+    ahead = behind = None
+    nearest_ahead, nearest_behind = np.inf, -np.inf
+    for vehicle in scene.road.vehicles:
+        along, aside = lane.local_coordinates(vehicle.position)
+        if vehicle is own or not (
+            vehicle.target_lane_index == index
+            or lane.on_lane(vehicle.position, along, aside, margin=1)
+        ):
+            continue
+        if 0.0 <= along - place < nearest_ahead:
+            ahead, nearest_ahead = vehicle, along - place
+        elif nearest_behind < along - place < 0.0:
+            behind, nearest_behind = vehicle, along - place
+    return ahead, behind
+
+
+def _gap(follower: Any, leader: Any) -> tuple[float, float]:
+    """The gap between two vehicles (m), and the time until it is closed (s)."""
+    if follower is None or leader is None:
+        return FAR, LONG
+    gap = max(float(leader.position[0] - follower.position[0]) - _VEHICLE_LENGTH, 0.0)
+    closing = float(follower.speed - leader.speed)
+    if gap >= FAR or closing <= 0.0:
+        return min(gap, FAR), LONG
+    return gap, min(gap / closing, LONG)
+
+
+def make_driving(**arguments: Any) -> gymnasium.Env[Any, Any]:
+    """The task as ``gymnasium.make("Driving-v0")`` makes it.
+
+    Args:
+        arguments: Of `highway-env`'s own environment: `render_mode`, `config`.
+
+    Returns:
+        Three lanes, 20 vehicles, 30 decisions of a second each.
+    """
+    # The simulator's own table is made each step and not looked at; the smallest is the fastest.
+    config = {"observation": {"type": "Kinematics", "vehicles_count": 1, "normalize": False}}
+    arguments["config"] = config | arguments.get("config", {})
+    made = gymnasium.make("highway_env:highway-fast-v0", disable_env_checker=True, **arguments)
+    return TrafficFeatures(made)
+
+
+if ENV_ID not in gymnasium.registry:
+    gymnasium.register(ENV_ID, make_driving, disable_env_checker=True)
