@@ -118,6 +118,6 @@ if absurd := absurd_parameters():
     st.switch_page(page, query_params=without(absurd))
 st.html(style_sheet())
 show_left_out(page.title)
-sidebar(thresholds_shown=page.title != "Thresholds")
+sidebar(with_thresholds=page.title != "Thresholds")
 page.run()
 settle(page.title)

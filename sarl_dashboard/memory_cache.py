@@ -110,14 +110,14 @@ def size_of(value: object) -> int:
     return _size(value, set())
 
 
-def _size(value: object, seen: set[int]) -> int:
+def _size(value: object, visited: set[int]) -> int:
     if value is None or isinstance(value, (bool, int, float, np.generic, type)):
         return 32
-    if id(value) in seen:
+    if id(value) in visited:
         return 0
-    seen.add(id(value))
+    visited.add(id(value))
     if isinstance(value, np.ndarray):
-        return value.nbytes if value.base is None else max(value.nbytes, _size(value.base, seen))
+        return value.nbytes if value.base is None else max(value.nbytes, _size(value.base, visited))
     if isinstance(value, (pd.DataFrame, pd.Series)):
         return int(np.sum(value.memory_usage(deep=False)))
     if isinstance(value, (str, bytes, bytearray)):
@@ -127,19 +127,21 @@ def _size(value: object, seen: set[int]) -> int:
     if isinstance(value, dict):
         return (
             sys.getsizeof(value)
-            + _size_of_all(value.keys(), seen)
-            + _size_of_all(value.values(), seen)
+            + _size_of_all(value.keys(), visited)
+            + _size_of_all(value.values(), visited)
         )
     if isinstance(value, (tuple, list, set, frozenset)):
-        return sys.getsizeof(value) + _size_of_all(value, seen)
+        return sys.getsizeof(value) + _size_of_all(value, visited)
     if dataclasses.is_dataclass(value) or hasattr(value, "__dict__"):
         # With what it has worked out and keeps, too.
-        return 64 + _size_of_all(list(vars(value).values()), seen)
+        return 64 + _size_of_all(list(vars(value).values()), visited)
     return sys.getsizeof(value)
 
 
-def _size_of_all(values: Iterable[object], seen: set[int]) -> int:
+def _size_of_all(values: Iterable[object], visited: set[int]) -> int:
     entries = list(values)
     step = max(len(entries) // _LOOKED_AT, 1)
     looked_at = entries[::step]
-    return sum(_size(entry, seen) for entry in looked_at) * len(entries) // max(len(looked_at), 1)
+    return (
+        sum(_size(entry, visited) for entry in looked_at) * len(entries) // max(len(looked_at), 1)
+    )

@@ -17,7 +17,7 @@ from sarl_core.errors import InputError, quoted
 
 MAX_BYTES = 16 * 2**20
 _MAX_INSTRUCTIONS = 100_000  # statistics of observations take some hundred
-_LONGEST_SHOWN = 90
+_LONGEST_NAME = 90
 
 _VALUES = frozenset(
     {
@@ -104,7 +104,7 @@ def named(text: str) -> str:
     Returns:
         At most some hundred characters.
     """
-    return quoted(text, _LONGEST_SHOWN)
+    return quoted(text, _LONGEST_NAME)
 
 
 class _Machine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,12 +21,14 @@ from sarl_core.cli.options import (
     ProjectionName,
     Seed,
     out_option,
+    with_environment,
 )
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.environments.environment import EnvironmentOrId
     from sarl_core.improving.aggregation import Aggregation
     from sarl_core.improving.gaps import Gaps
     from sarl_core.improving.plan import Plan
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
 _NOBODY = "none"
 
 
+@with_environment
 def aggregate(
     context: typer.Context,
     file: File,
@@ -105,6 +109,7 @@ def aggregate(
     with terminal.working("Starting"):
         from sarl_core.demonstrations.names import in_order_of
         from sarl_core.environments.description import describe_environment
+        from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
 
         plan = Plan(
@@ -120,12 +125,13 @@ def aggregate(
             max_steps=max_steps,
         )
         start = read_demonstrations(file, env)
-        agents = _agents(agent, expert, env or start.env_id, normalise)
+        environment = env or recorded_environment(start)
+        agents = _agents(agent, expert, environment, normalise)
         read = start.notes
-        start, notes = in_order_of(start, describe_environment(env or start.env_id))
+        start, notes = in_order_of(start, describe_environment(environment))
         notes = tuple(dict.fromkeys((*read, *notes)))
     if nobody:
-        _gaps(start, plan, env or start.env_id, agents[0], out, jobs, as_json, notes)
+        _gaps(start, plan, environment, agents[0], out, jobs, as_json, notes)
         return
     with terminal.working("Asking the expert") as advance:
         from sarl_core.improving.aggregation import aggregate as run
@@ -134,7 +140,7 @@ def aggregate(
         aggregation = run(
             start,
             plan,
-            env_id=env,
+            env_id=environment,
             agent=agents[0],
             expert=agents[1],
             jobs=jobs,
@@ -190,11 +196,9 @@ def _beside(reported: dict[str, Any], env_id: str) -> list[str]:
 
 
 def _agents(
-    agent: str, expert: str, env_id: str, normalise: str | None
+    agent: str, expert: str, env_id: EnvironmentOrId, normalise: str | None
 ) -> tuple[Agent, Agent | str]:
     """Who is shielded and who is asked; `normalise` is of the one that is a .zip."""
-    if not env_id:
-        raise InputError("the demonstrations name no environment; say which with --env")
     zipped = [name.lower().endswith(".zip") for name in (agent, expert)]
     if normalise is not None and all(zipped):
         raise InputError(
@@ -234,7 +238,7 @@ def _thresholds(support: float | None, confidence: float | None) -> Thresholds |
 def _gaps(
     start: Demonstrations,
     plan: Plan,
-    env_id: str,
+    env_id: EnvironmentOrId,
     agent: Agent,
     out: Path,
     jobs: int,
@@ -276,7 +280,7 @@ def _gaps(
     _write_gaps(gaps, out)
     if gaps.cut:
         steps = plan.max_steps or MAX_STEPS
-        notes = (*notes, cut_text(env_id, gaps.cut, gaps.episodes, steps))
+        notes = (*notes, cut_text(str(env_id), gaps.cut, gaps.episodes, steps))
     notes = tuple(dict.fromkeys((*notes, *gaps.notes)))
     document: dict[str, Any] = {
         "file": str(out),
@@ -328,5 +332,6 @@ def _command(context: typer.Context) -> str:
         if parameter.name in ("as_json", "jobs") or value is None or value == parameter.default:
             continue
         option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
-        words += [*option, str(value)]
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            words += [*option, shlex.quote(str(one))]
     return " ".join(words)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sarl_core.rendering.replay import Replay
     from sarl_core.shielding.shield import Shield
 
-_RULES_SHOWN = 5
+_MOST_RULES = 5
 
 
 def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[str, Any]:
@@ -329,7 +329,7 @@ def print_rules(
     if not len(rule_set):
         terminal.print_lines([none_left(tried)])
         return
-    often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_RULES_SHOWN]
+    often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_MOST_RULES]
     terminal.print_lines(["", "The rules that apply most often:"])
     terminal.print_lines(
         f"  {number}. {rule_line(rule, rule_set)}" for number, rule in enumerate(often, 1)

@@ -19,6 +19,7 @@ from sarl_core.cli.options import (
     Seed,
     Stochastic,
     out_option,
+    with_environment,
 )
 from sarl_core.errors import InputError
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
 
 
+@with_environment
 def record(
     env: Env,
     agent: AgentName,
@@ -66,6 +68,7 @@ def record(
     _tell_demonstrations(demonstrations, out, as_json)
 
 
+@with_environment
 def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
     """Read and check demonstrations, and print what is in them.
 

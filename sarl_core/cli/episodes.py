@@ -22,10 +22,12 @@ from sarl_core.cli.options import (
     Seed,
     Stochastic,
     out_option,
+    with_environment,
 )
 from sarl_core.errors import InputError
 
 
+@with_environment
 def evaluate(
     env: Env,
     agent: AgentName,
@@ -82,11 +84,12 @@ def evaluate(
         from sarl_core.cli.answers import print_episodes
 
         shielded = "unshielded" if rules is None else f"shielded by {rules}"
-        print_episodes(document, env, f"{played.agent} in {env}, {shielded}", shield)
+        print_episodes(document, str(env), f"{played.agent} in {env}, {shielded}", shield)
     if fault is not None:
         raise InputError(f"{fault}; the answer is of the {len(played)} before that one")
 
 
+@with_environment
 def render(
     env: Env,
     agent: AgentName,

@@ -9,7 +9,14 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import EnvOfFile, Json, OnInvalidName, ProjectionName, out_option
+from sarl_core.cli.options import (
+    EnvOfFile,
+    Json,
+    OnInvalidName,
+    ProjectionName,
+    out_option,
+    with_environment,
+)
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,9 +24,10 @@ if TYPE_CHECKING:
     from sarl_core.mining.rule_set import RuleSet
 
 _ENDINGS = (".json", ".csv", ".md", ".py", ".c", ".onnx")
-_SHOWN = 5
+_MOST_THRESHOLDS = 5
 
 
+@with_environment
 def export(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rule file.", show_default=False)
@@ -106,13 +114,13 @@ def _document(prepared: Prepared, out: Path, vectors: Path) -> dict[str, Any]:
             "rounded": rounding.rounded,
             "kept": [
                 {
-                    "dimension": prepared.rule_set.actions[kept.dimension].name,
-                    "feature": prepared.rule_set.source.features[kept.feature].name,
-                    "threshold": kept.threshold,
-                    "rules": list(kept.rules),
-                    "why": kept.why,
+                    "dimension": prepared.rule_set.actions[one.dimension].name,
+                    "feature": prepared.rule_set.source.features[one.feature].name,
+                    "threshold": one.threshold,
+                    "rules": list(one.rules),
+                    "why": one.why,
                 }
-                for kept in rounding.unrounded
+                for one in rounding.unrounded
             ],
         },
     }
@@ -134,9 +142,14 @@ def _lines(prepared: Prepared, out: Path, vectors: Path) -> list[str]:
     )
     if rounding.unrounded:
         lines.append(f"{counted(len(rounding.unrounded), 'threshold')} stayed:")
-        lines += [f"  {_unrounded(one, prepared.rule_set)}" for one in rounding.unrounded[:_SHOWN]]
-        if len(rounding.unrounded) > _SHOWN:
-            lines.append(f"  and {len(rounding.unrounded) - _SHOWN:,} more; --json lists them all.")
+        lines += [
+            f"  {_unrounded(one, prepared.rule_set)}"
+            for one in rounding.unrounded[:_MOST_THRESHOLDS]
+        ]
+        if len(rounding.unrounded) > _MOST_THRESHOLDS:
+            lines.append(
+                f"  and {len(rounding.unrounded) - _MOST_THRESHOLDS:,} more; --json lists them all."
+            )
     return lines
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sarl_core.cli import terminal
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def read_agent(
     agent: str,
-    env_id: str,
+    env_id: EnvironmentOrId,
     normalise: str | None,
     *,
     stochastic: bool = False,
@@ -48,7 +49,7 @@ def read_agent(
     return made
 
 
-def read_demonstrations(file: Path, env_id: str | None) -> Demonstrations:
+def read_demonstrations(file: Path, env_id: EnvironmentOrId | None) -> Demonstrations:
     """Read a file of demonstrations.
 
     Args:

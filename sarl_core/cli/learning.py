@@ -13,13 +13,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.options import Env, Json, MaxSteps, ProjectionName, Rules, Seed, out_option
+from sarl_core.cli.options import (
+    Env,
+    Json,
+    MaxSteps,
+    ProjectionName,
+    Rules,
+    Seed,
+    out_option,
+    with_environment,
+)
 
 if TYPE_CHECKING:
     from sarl_core.learning.study_files import LearningStudy
     from sarl_core.learning.summary import ArmSummary
 
 
+@with_environment
 def learn(
     env: Env,
     steps: Annotated[
@@ -119,6 +129,7 @@ def learn(
     print_notes(notes)
 
 
+@with_environment
 def train_expert(
     env: Env,
     out: Annotated[

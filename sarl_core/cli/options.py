@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
+from sarl_core.environments.environment import Environment
+from sarl_core.errors import InputError
+
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
+# Commands with an option `--env` are `with_environment`.
 EnvOfFile = Annotated[
-    str | None,
+    Environment | None,
     typer.Option(
         "--env",
         metavar="ENV",
@@ -18,7 +25,7 @@ EnvOfFile = Annotated[
     ),
 ]
 Env = Annotated[
-    str,
+    Environment,
     typer.Option(
         "--env",
         metavar="ENV",
@@ -107,6 +114,26 @@ Divider = Annotated[
         help="Intervals of each continuous action dimension.",
     ),
 ]
+_EnvArguments = Annotated[
+    str | None,
+    typer.Option(
+        "--env-args",
+        metavar="JSON",
+        show_default=False,
+        help="What the environment is made with, as a JSON object: '{\"g\": 3.7}'.",
+    ),
+]
+_Wrappers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--wrapper",
+        metavar="MODULE:NAME",
+        show_default=False,
+        help="Put this around the environment: a gymnasium.Wrapper class, or a function that takes "
+        "an environment and gives one, imported from where you are. May be given several times, "
+        "the innermost first.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
@@ -121,3 +148,40 @@ def out_option(text: str, *, metavar: str = "FILE") -> Any:
         For `Annotated`.
     """
     return typer.Option("--out", metavar=metavar, show_default=False, help=text)
+
+
+def with_environment(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command take what belongs to ``--env``, and hand it one environment.
+
+    Args:
+        command: With a parameter `env` that is `Env`, `EnvOfFile`, or annotated like them.
+
+    Returns:
+        The command as Typer reads it: with a text for `env`, and further options beside it.
+    """
+    parameters: list[inspect.Parameter] = []
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    for one in inspect.signature(command, eval_str=True).parameters.values():
+        if one.name != "env":
+            parameters.append(one.replace(kind=keyword))
+            continue
+        environment, option = get_args(one.annotation)
+        text: Any = str if environment is Environment else str | None
+        parameters.append(one.replace(kind=keyword, annotation=Annotated[text, option]))
+        for name, annotation in (("env_args", _EnvArguments), ("wrapper", _Wrappers)):
+            parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
+
+    @wraps(command)
+    def run(
+        *, env: str | None, env_args: str | None, wrapper: list[str] | None, **others: Any
+    ) -> None:
+        if env is None and (env_args is not None or wrapper):
+            option = "--wrapper" if env_args is None else "--env-args"
+            raise InputError(f"{option} belongs to an environment; name it with --env")
+        environment = None
+        if env is not None:
+            environment = Environment(env, env_args or "{}", tuple(wrapper or ()))
+        command(env=environment, **others)
+
+    vars(run)["__signature__"] = inspect.Signature(parameters)
+    return run

@@ -10,7 +10,8 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
-from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option
+from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option, with_environment
+from sarl_core.environments.environment import Environment, EnvironmentOrId
 
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 _IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
 
 
+@with_environment
 def report(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
@@ -53,7 +55,7 @@ def report(
         int, typer.Option("--frames", min=0, help="Pictures a rule; 0 for none.")
     ] = _FRAMES,
     env: Annotated[
-        str | None,
+        Environment | None,
         typer.Option(
             "--env",
             metavar="ENV",
@@ -104,7 +106,7 @@ def report(
             "--comparison": comparison,
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
-            "--env": env,
+            **({} if env is None else env.options),
             "--agent": agent,
             "--normalise": normalise,
             "--seed": None if seed == _SEED else seed,
@@ -160,7 +162,9 @@ def report(
     print_notes(document.notes)
 
 
-def _player(agent: str | None, env_id: str, normalise: str | None) -> Agent | str | None:
+def _player(
+    agent: str | None, env_id: EnvironmentOrId, normalise: str | None
+) -> Agent | str | None:
     """Who plays for the pictures: sampled, if it can be, and so comes by more states."""
     from sarl_core.agents.agent import PolicyAgent
 

@@ -15,10 +15,12 @@ from sarl_core.cli.options import (
     File,
     Json,
     out_option,
+    with_environment,
 )
 from sarl_core.errors import InputError
 
 
+@with_environment
 def mine(
     file: File,
     out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
@@ -166,6 +168,7 @@ def mine(
         print_rules(rule_set, out, tried, judged)
 
 
+@with_environment
 def landscape(
     file: File,
     out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],

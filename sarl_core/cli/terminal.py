@@ -95,7 +95,7 @@ def _code(result: object) -> int:
 
 def _failed(error: BaseException) -> int:
     """Say in one line what went wrong, and give the exit code."""
-    sentence, code = _told(error)
+    sentence, code = _sentence_and_code(error)
     _complain(sentence)
     return code
 
@@ -104,7 +104,7 @@ def _complain(sentence: str) -> None:
     print(f"error: {' '.join(sentence.split())}", file=sys.stderr)  # noqa: T201
 
 
-def _told(error: BaseException) -> tuple[str, int]:
+def _sentence_and_code(error: BaseException) -> tuple[str, int]:
     """An exception as a sentence and an exit code."""
     if isinstance(error, typer.TyperException):
         return error.format_message(), 2

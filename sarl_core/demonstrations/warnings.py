@@ -10,7 +10,7 @@ from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.giveaways import find_giveaways
 
-_SHOWN_WARNINGS = 5  # of one kind; the rest is counted
+_MOST_WARNINGS = 5  # of one kind; the rest is counted
 
 
 def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
 
 def _shortened(sentences: list[str], rest: str) -> list[str]:
     """The first few sentences, and the number of the others."""
-    more = len(sentences) - _SHOWN_WARNINGS
+    more = len(sentences) - _MOST_WARNINGS
     if more <= 1:
         return sentences
-    return [*sentences[:_SHOWN_WARNINGS], f"{more:,} more {rest}"]
+    return [*sentences[:_MOST_WARNINGS], f"{more:,} more {rest}"]

@@ -64,6 +64,26 @@ class Environment:
         return self.id if self == Environment(self.id) else json.dumps([self.id, *others])
 
     @property
+    def options(self) -> dict[str, str | tuple[str, ...] | None]:
+        """What a command line says of it; None where nothing has to be said."""
+        return {
+            "--env": self.id,
+            "--env-args": self.arguments if self.arguments != "{}" else None,
+            "--wrapper": self.wrappers or None,
+            "--failure": self.failure or None,
+            "--cost": self.cost or None,
+        }
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The same, word by word."""
+        words: list[str] = []
+        for name, value in self.options.items():
+            for one in [value] if isinstance(value, str) else value or ():
+                words += [name, one]
+        return tuple(words)
+
+    @property
     def keywords(self) -> dict[str, Any]:
         """The arguments, as ``gymnasium.make`` takes them."""
         return dict(json.loads(self.arguments))

@@ -27,12 +27,12 @@ class NamedFeatures(NamedTuple):
     """One of two things that meet.
 
     Attributes:
-        whose: What it is in a sentence, as "the rules" or "CartPole-v1".
+        owner: What it is in a sentence, as "the rules" or "CartPole-v1".
         names: Of its features, in its own order.
         env_id: Environment it is of, "" where unknown.
     """
 
-    whose: str
+    owner: str
     names: tuple[str, ...]
     env_id: str = ""
 
@@ -76,12 +76,12 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
         InputError: If there are not as many, or their names are of different things.
     """
     if len(first.names) != len(second.names):
-        several = [_SEVERAL.fullmatch(side.whose) is not None for side in (first, second)]
+        several = [_SEVERAL.fullmatch(side.owner) is not None for side in (first, second)]
         asks = "ask about" if several[0] else "asks about"
         if what != "features":
             asks = "are for" if several[0] else "is for"
         raise InputError(
-            f"{first.whose} {asks} {len(first.names)} {what} and {second.whose} "
+            f"{first.owner} {asks} {len(first.names)} {what} and {second.owner} "
             f"{'have' if several[1] else 'has'} {len(second.names)}; give two of the same "
             "environment"
         )
@@ -96,18 +96,18 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
         return FeatureOrder(
             "permuted",
             places,
-            f"the {what} of {first.whose} were put into the order of "
-            f"{second.whose}, by their names",
+            f"the {what} of {first.owner} were put into the order of "
+            f"{second.owner}, by their names",
         )
     if any(nameless):
         who = " and ".join(
-            side.whose for side, empty in zip((first, second), nameless, strict=True) if empty
+            side.owner for side, empty in zip((first, second), nameless, strict=True) if empty
         )
         return FeatureOrder(
             "trusted",
             as_they_are,
             f"the {what} of {who} have no names, so they were trusted to be in the order of "
-            f"{'each other' if all(nameless) else first.whose if nameless[1] else second.whose}",
+            f"{'each other' if all(nameless) else first.owner if nameless[1] else second.owner}",
         )
     stands = {name: place for place, name in enumerate(one)}
     if known and all(stands.get(name, place) == place for place, name in enumerate(other)):
@@ -119,15 +119,15 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
         return FeatureOrder(
             "trusted",
             as_they_are,
-            f"some {what} have other names in {first.whose} than in {second.whose} "
+            f"some {what} have other names in {first.owner} than in {second.owner} "
             f"({shortened(renamed)}); both are of {_bare(first.env_id)}, so their order was "
             "trusted",
         )
     at = next(place for place, name in enumerate(one) if name != other[place])
     mine, theirs = (shortened(side.names[at : at + 1]) for side in (first, second))
     raise InputError(
-        f"{first.whose} and {second.whose} have different {what}: number {at + 1} is {mine!r} in "
-        f"{first.whose} and {theirs!r} in {second.whose} ({shortened(first.names)}; "
+        f"{first.owner} and {second.owner} have different {what}: number {at + 1} is {mine!r} in "
+        f"{first.owner} and {theirs!r} in {second.owner} ({shortened(first.names)}; "
         f"{shortened(second.names)}); give two of the same environment, or name them alike"
     )
 

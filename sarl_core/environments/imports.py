@@ -29,7 +29,7 @@ def named_object(text: str, what: str) -> Any:
     if not (name and all(part.isidentifier() for part in [*module.split("."), *name.split(".")])):
         raise InputError(f"{what} {text!r} must be module:name, as my_crane:Crane; write it so")
     try:
-        found: Any = importlib.import_module(module)
+        member: Any = importlib.import_module(module)
     except Exception as error:  # the caller's code, which may raise anything
         raise InputError(
             f"{what} {text!r} cannot be imported ({reason(error)}); check the name, and that the "
@@ -37,12 +37,12 @@ def named_object(text: str, what: str) -> Any:
         ) from error
     for part in name.split("."):
         try:
-            found = getattr(found, part)
+            member = getattr(member, part)
         except AttributeError as error:
             raise InputError(
                 f"{what} {text!r} cannot be imported: {module} has no {name}; check the name"
             ) from error
-    return found
+    return member
 
 
 def reason(error: BaseException) -> str:

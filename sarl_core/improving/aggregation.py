@@ -109,17 +109,40 @@ class Aggregation:
         """What a person should know of how the episodes came about, as clauses."""
         cut, of = sum(one.cut for one in self.rounds), sum(len(one.returns) for one in self.rounds)
         steps = self.plan.max_steps or MAX_STEPS
-        said = (
+        clauses = (
             (cut_text(self.env_id, cut, of, steps, episodes="episodes of the rounds"),)
             if cut
             else ()
         )
-        return (*said, *(() if self.reported is None else self.reported.remarks))
+        return (*clauses, *(() if self.reported is None else self.reported.remarks))
 
     @property
     def is_finished(self) -> bool:
         """Whether it was not stopped before its report."""
         return self.reported is not None
+
+
+def recorded_environment(demonstrations: Demonstrations) -> str:
+    """The environment that demonstrations name, to be played in.
+
+    Args:
+        demonstrations: From a file, perhaps.
+
+    Returns:
+        Its id.
+
+    Raises:
+        InputError: If they name none, or one whose module would have to be imported.
+    """
+    env_id = demonstrations.env_id
+    if not env_id:
+        raise InputError("the demonstrations name no environment; say which with --env")
+    if ":" in env_id:  # what a file names is not imported
+        raise InputError(
+            f"the demonstrations name the environment {env_id!r}, which would be imported, and a "
+            f"file may not say what is; say so yourself, with --env {env_id}"
+        )
+    return env_id
 
 
 def aggregate(
@@ -156,9 +179,7 @@ def aggregate(
         InputError: If agent, expert and environment do not fit, or the expert acts at random.
         CancelledError: If `progress` returned False before the first round was finished.
     """
-    env_id = env_id or start.env_id
-    if not env_id:
-        raise InputError("the demonstrations name no environment; say which with --env")
+    env_id = env_id or recorded_environment(start)
     agents = make_agent(agent, env_id), make_agent(expert, env_id)
     run = _Run(start, plan, env_id, *agents, jobs, executor)
     clock = _Clock(run.planned_units(), progress)
@@ -308,7 +329,9 @@ class _Run:
         assert table is not None
         wanted = ask(self.expert, table.observation, table.episode)
         covered = table.rules >= 0
-        said = np.array([rule.action for rule in rules.rules] or [0])[np.maximum(table.rules, 0)]
+        rule_labels = np.array([rule.action for rule in rules.rules] or [0])[
+            np.maximum(table.rules, 0)
+        ]
         labels = np.stack(
             [
                 dimension.labels_of(column)
@@ -316,7 +339,7 @@ class _Run:
             ],
             axis=1,
         )
-        otherwise = covered & (said != labels)
+        otherwise = covered & (rule_labels != labels)
         self.trees.append(trees)
         self.rounds.append(
             AggregationRound(

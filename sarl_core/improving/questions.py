@@ -21,7 +21,7 @@ from sarl_core.rollouts.steps import StepTable
 _PAIRS_A_ROUND = 25_000
 # Rules learn from what was shown at first and from where the latest rules led: what earlier ones
 # got into, the present ones may never meet.
-_ROUNDS_KEPT = 12
+_ROUNDS_USED = 12
 # A label with less than 2 % is one the expert does not want; how much less says nothing.
 _LEAST_LOG_PROBABILITY = -4.0
 
@@ -184,10 +184,10 @@ class Answers:
         Returns:
             The pairs of the start and of the latest rounds.
         """
-        rounds_kept = [0, *range(max(1, rounds + 1 - _ROUNDS_KEPT), rounds + 1)]
+        rounds_used = [0, *range(max(1, rounds + 1 - _ROUNDS_USED), rounds + 1)]
 
         def column(parts: list[Any]) -> Any:
-            return np.concatenate([parts[index] for index in rounds_kept])
+            return np.concatenate([parts[index] for index in rounds_used])
 
         return answered(
             self._env_id,

@@ -52,9 +52,9 @@ class _Parameters:
             shares = tree.counts[leaves] / np.maximum(tree.samples[leaves], 1)[:, None]
             likely = np.log(np.maximum(shares, _LEAST_SHARE))
             # What the leaf says is ahead, if only by nothing.
-            said = tree.label[leaves][:, None]
+            labels = tree.label[leaves][:, None]
             best = likely.max(axis=1, keepdims=True)
-            np.put_along_axis(likely, said, best, axis=1)
+            np.put_along_axis(likely, labels, best, axis=1)
             parts += [np.zeros(int((~leaves).sum())), (likely - best).reshape(-1)]
         return np.concatenate(parts)
 

@@ -121,11 +121,11 @@ def load_checkpoint(path: Path, learner: BaseAlgorithm, identity: Mapping[str, A
             f"differ); {advice}"
         )
     try:
-        said = conformed(document, _CheckpointDocument)
-        learner.set_parameters(said.parameters)
-        learner.num_timesteps = said.steps
-        _remember(learner, said.memory)
-        return Rest(said.curve.read(), said.seconds, said.sittings)
+        checkpoint = conformed(document, _CheckpointDocument)
+        learner.set_parameters(checkpoint.parameters)
+        learner.num_timesteps = checkpoint.steps
+        _remember(learner, checkpoint.memory)
+        return Rest(checkpoint.curve.read(), checkpoint.seconds, checkpoint.sittings)
     except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
         raise InputError(f"{path} lacks a part of its learner ({error}); {advice}") from error
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import platform
+import shlex
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.policy_files import write_card
+from sarl_core.environments.description import make_environment
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import EXPERT_CHOICE, EXPERT_REPORT
@@ -117,7 +120,7 @@ RECIPES: dict[str, Recipe] = {
 
 
 def train_expert(
-    env_id: str,
+    env_id: EnvironmentOrId,
     *,
     out: Path,
     seed: int = 0,
@@ -139,10 +142,10 @@ def train_expert(
     Raises:
         InputError: If there is no recipe for the environment.
     """
-    if env_id not in RECIPES:
+    if str(env_id) not in RECIPES:
         known = ", ".join(sorted(RECIPES))
-        raise InputError(f"there is no training recipe for {env_id!r}; recipes: {known}")
-    recipe = RECIPES[env_id]
+        raise InputError(f"there is no training recipe for {str(env_id)!r}; recipes: {known}")
+    recipe = RECIPES[str(env_id)]
     total = steps or recipe.steps
     started = time.monotonic()
     model, env = _make_learner(env_id, recipe, seed)
@@ -220,14 +223,16 @@ def _bounds(values: NDArray[Any]) -> NDArray[np.float32]:
     return values.reshape(-1).astype(np.float32)
 
 
-def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm, VecEnv]:
+def _make_learner(
+    env_id: EnvironmentOrId, recipe: Recipe, seed: int
+) -> tuple[BaseAlgorithm, VecEnv]:
     import stable_baselines3
     import torch
     from stable_baselines3.common.env_util import make_vec_env
     from stable_baselines3.common.vec_env import VecNormalize
 
     torch.set_num_threads(1)  # the networks are too small to gain from more
-    env: VecEnv = make_vec_env(env_id, n_envs=recipe.n_envs, seed=seed)
+    env: VecEnv = make_vec_env(lambda: make_environment(env_id), n_envs=recipe.n_envs, seed=seed)
     if recipe.normalise:
         env = VecNormalize(env, gamma=recipe.gamma)
     # A copy: the learner fills in what it was not told.
@@ -242,7 +247,10 @@ def _make_learner(env_id: str, recipe: Recipe, seed: int) -> tuple[BaseAlgorithm
 
 
 def _keep_best(
-    env_id: str, recipe: Recipe, total: int, progress: Callable[[int, int, float], None] | None
+    env_id: EnvironmentOrId,
+    recipe: Recipe,
+    total: int,
+    progress: Callable[[int, int, float], None] | None,
 ) -> Any:
     """A callback of Stable-Baselines3 that validates as it goes and remembers the best policy."""
     from stable_baselines3.common.callbacks import BaseCallback
@@ -260,7 +268,7 @@ def _keep_best(
             return True
 
         def validate(self) -> None:
-            policy = export_policy(self.model, env_id=env_id)
+            policy = export_policy(self.model, env_id=str(env_id))
             returns = _returns(env_id, policy, episodes=50, seed=EXPERT_CHOICE)
             score = float(np.mean(returns))
             if self.best is None or score >= self.best[0]:
@@ -277,7 +285,12 @@ def _keep_best(
 
 
 def _returns(
-    env_id: str, policy: MlpPolicy, *, episodes: int, seed: int, stochastic: bool = False
+    env_id: EnvironmentOrId,
+    policy: MlpPolicy,
+    *,
+    episodes: int,
+    seed: int,
+    stochastic: bool = False,
 ) -> NDArray[np.float64]:
     """Returns of a policy, episode by episode."""
     first = np.zeros(policy.n_dimensions, dtype=np.int64)
@@ -286,7 +299,7 @@ def _returns(
 
 
 def _card(
-    env_id: str,
+    env_id: EnvironmentOrId,
     recipe: Recipe,
     seed: int,
     steps: int,
@@ -311,8 +324,8 @@ def _card(
 
     return {
         "what": f"expert for {env_id}",
-        "command": f"python -m sarl_core train-expert --env {env_id} --seed {seed} --steps {steps}"
-        f" --out {out.as_posix()}",
+        "command": f"python -m sarl_core train-expert {shlex.join(as_environment(env_id).words)} "
+        f"--seed {seed} --steps {steps} --out {out.as_posix()}",
         "algorithm": recipe.algorithm,
         "policy": "MlpPolicy",
         "seed": seed,

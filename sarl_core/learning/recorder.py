@@ -19,7 +19,7 @@ from sarl_core.learning.curves import Columns, LearningEpisodes
 from sarl_core.learning.learners import MaskedPPO
 from sarl_core.learning.replay_buffers import HandoverVecEnv
 
-_TOLD_EVERY = 0.3  # seconds
+_REPORTED_EVERY = 0.3  # seconds
 _SAVED_EVERY = 20.0  # seconds; what a power cut may cost
 
 
@@ -67,7 +67,7 @@ class Recorder(BaseCallback):
         self.generator = np.random.default_rng(seed)
         count = env.num_envs
         self.returns, self.lengths, self.interventions, self.covered = np.zeros((4, count))
-        self.told = self.saved = time.monotonic()
+        self.reported = self.saved = time.monotonic()
         self._share(np.arange(count))
 
     def curve(self) -> LearningEpisodes:
@@ -91,8 +91,8 @@ class Recorder(BaseCallback):
         if now - self.saved > _SAVED_EVERY:
             self.keep(self.curve())
             self.saved = time.monotonic()
-        if now - self.told > _TOLD_EVERY:
-            self.told = now
+        if now - self.reported > _REPORTED_EVERY:
+            self.reported = now
             self.stopped = not self.tell(self.curve(), self.num_timesteps)
         return not self.stopped and (self.num_timesteps < self.steps or self._fills_rollout())
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
 from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes
@@ -54,7 +55,7 @@ class LearningPlan:
         max_steps: After which one of these is cut off; `episodes.MAX_STEPS` where None.
     """
 
-    env_id: str
+    env_id: EnvironmentOrId
     rules: RuleSet | None
     arms: tuple[LearningArm, ...]
     steps: int
@@ -99,7 +100,13 @@ class LearningPlan:
         return {
             "format": FORMAT,
             "version": VERSION,
-            "env_id": self.env_id,
+            "env_id": str(self.env_id),
+            "made_with": {
+                name.strip("-"): value
+                for name, value in as_environment(self.env_id).options.items()
+                if value is not None and name != "--env"
+            }
+            or None,
             "steps": self.steps,
             "arms": [arm.name for arm in self.arms],
             "seeds": list(self.seeds),

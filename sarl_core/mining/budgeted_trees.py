@@ -90,8 +90,8 @@ def _by_labels(
     learner = DecisionTreeClassifier(criterion="gini", max_leaf_nodes=max_rules, random_state=seed)
     labels = dimension.labels_of(demonstrations.action_columns[:, index])
     structure = fitted(learner, demonstrations.observations, labels, weights)
-    said = learner.classes_[learner.tree_.value[:, 0, :].argmax(axis=1)]
-    return _saying(structure, said)
+    most_frequent = learner.classes_[learner.tree_.value[:, 0, :].argmax(axis=1)]
+    return _saying(structure, most_frequent)
 
 
 def _by_values(
@@ -140,8 +140,8 @@ def without_idle_queries(structure: TreeStructure) -> TreeStructure:
     Returns:
         A tree that says the same in every state, its nodes numbered anew from the root.
     """
-    said = structure.label
-    if said is None:
+    labels = structure.label
+    if labels is None:
         raise ValueError("a tree without labels says nothing yet")
     left, right = structure.children_left, structure.children_right
     above = [0]  # parents before their children
@@ -151,7 +151,7 @@ def without_idle_queries(structure: TreeStructure) -> TreeStructure:
     alike: dict[int, int] = {}  # nodes below which one label is said, and that label
     for node in reversed(above):
         if left[node] == LEAF:
-            alike[node] = int(said[node])
+            alike[node] = int(labels[node])
         elif alike.get(int(left[node]), -1) == alike.get(int(right[node]), -2):
             alike[node] = alike[int(left[node])]
     nodes = [0]
@@ -176,7 +176,7 @@ def without_idle_queries(structure: TreeStructure) -> TreeStructure:
         threshold=structure.threshold[old],
         children_left=child(left),
         children_right=child(right),
-        label=np.array([alike.get(node, int(said[node])) for node in nodes], dtype=np.int64),
+        label=np.array([alike.get(node, int(labels[node])) for node in nodes], dtype=np.int64),
     )
 
 

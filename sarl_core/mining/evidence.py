@@ -208,12 +208,12 @@ def _held_outs(
 
 @dataclass(frozen=True, eq=False)
 class EpisodeCounts:
-    """Things (rules, or nodes of a tree) in E episodes; K entries, where a thing applies at all.
+    """Subjects (rules, or nodes of a tree) in E episodes; K entries, where one applies at all.
 
     Attributes:
-        size: Number of things.
-        thing: Which one, (K,), ascending.
-        episode: In which episode, 0 to E - 1, (K,), ascending within a thing.
+        size: Number of subjects.
+        subject: Which one, (K,), ascending.
+        episode: In which episode, 0 to E - 1, (K,), ascending within a subject.
         samples: Pairs of the episode to which it applies, at least 1, (K,).
         correct: Those of them that it is right about, (K,).
         numbers: What the episodes are called, (E,).
@@ -221,7 +221,7 @@ class EpisodeCounts:
     """
 
     size: int
-    thing: Integers
+    subject: Integers
     episode: Integers
     samples: Integers
     correct: Integers
@@ -229,26 +229,26 @@ class EpisodeCounts:
     lengths: Integers
 
     def held_out(self) -> list[HeldOut]:
-        """What all episodes say of each thing.
+        """What all episodes say of each subject.
 
         Returns:
-            One entry a thing.
+            One entry a subject.
         """
         shares = self.correct / self.samples
         samples, correct = (
-            np.bincount(self.thing, weights, minlength=self.size).astype(np.int64)
+            np.bincount(self.subject, weights, minlength=self.size).astype(np.int64)
             for weights in (self.samples, self.correct)
         )
         sums = EpisodeSums(
-            np.bincount(self.thing, minlength=self.size),
+            np.bincount(self.subject, minlength=self.size),
             samples,
-            np.bincount(self.thing, shares, minlength=self.size).astype(np.float64),
-            np.bincount(self.thing, np.square(shares), minlength=self.size).astype(np.float64),
+            np.bincount(self.subject, shares, minlength=self.size).astype(np.float64),
+            np.bincount(self.subject, np.square(shares), minlength=self.size).astype(np.float64),
         )
         return held_outs(correct.tolist(), sums)
 
     def together(self, chosen: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-        """Some things that do not overlap, taken as one.
+        """Some subjects that do not overlap, taken as one.
 
         Args:
             chosen: Which, (size,).
@@ -256,23 +256,23 @@ class EpisodeCounts:
         Returns:
             Pairs of each episode to which they apply, and those they are right about, (E,) each.
         """
-        inside = chosen[self.thing]
+        inside = chosen[self.subject]
         samples, correct = (
             np.bincount(self.episode[inside], weights[inside], minlength=len(self.numbers))
             for weights in (self.samples, self.correct)
         )
         return samples.astype(np.int64), correct.astype(np.int64)
 
-    def of(self, thing: int) -> tuple[Integers, Integers]:
-        """One thing alone, as `together`.
+    def of(self, subject: int) -> tuple[Integers, Integers]:
+        """One subject alone, as `together`.
 
         Args:
-            thing: Which.
+            subject: Which.
 
         Returns:
             Pairs of each episode to which it applies, and those it is right about, (E,) each.
         """
-        first, last = np.searchsorted(self.thing, [thing, thing + 1]).tolist()
+        first, last = np.searchsorted(self.subject, [subject, subject + 1]).tolist()
         counts = np.zeros((2, len(self.numbers)), dtype=np.int64)
         counts[:, self.episode[first:last]] = self.samples[first:last], self.correct[first:last]
         return counts[0], counts[1]

@@ -358,5 +358,5 @@ def one_line(text: str) -> str:
     Returns:
         The text, with a space for every sign that cannot be seen.
     """
-    seen = "".join(sign if sign.isprintable() else " " for sign in text[: _LONGEST + 1])
-    return seen if len(seen) <= _LONGEST else f"{seen[:_LONGEST]}..."
+    printable = "".join(sign if sign.isprintable() else " " for sign in text[: _LONGEST + 1])
+    return printable if len(printable) <= _LONGEST else f"{printable[:_LONGEST]}..."

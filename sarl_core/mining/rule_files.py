@@ -385,12 +385,12 @@ class _Rule(_Part, Generic[_Held]):
             raise MisfitError(f"'length' does not match its {len(self.conditions)} conditions")
         if self.samples > steps:
             raise MisfitError(f"'samples' is {self.samples}, not a whole number from 0 to {steps}")
-        said = asdict(self)
-        del said["length"]
-        said["conditions"] = tuple(Condition(*astuple(one)) for one in self.conditions)
-        said["box"] = self.box and self.box.read(n_features)
-        said["held_out"] = self.held_out and self.held_out.read()
-        return Rule(**said)
+        entries = asdict(self)
+        del entries["length"]
+        entries["conditions"] = tuple(Condition(*astuple(one)) for one in self.conditions)
+        entries["box"] = self.box and self.box.read(n_features)
+        entries["held_out"] = self.held_out and self.held_out.read()
+        return Rule(**entries)
 
 
 def _each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T, ...]:

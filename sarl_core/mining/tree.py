@@ -148,9 +148,9 @@ class PolicyTree:
         """Fingerprint (blake2b, 32 hex digits) of the tree, and of what is known of its data."""
         digest = hashlib.blake2b(digest_size=16)
         splits = [feature.splits for feature in self.source.features]
-        for place, thing in enumerate([self, *splits]):
-            for column in fields(thing) if thing is not None else ():
-                value = getattr(thing, column.name)
+        for place, part in enumerate([self, *splits]):
+            for column in fields(part) if part is not None else ():
+                value = getattr(part, column.name)
                 if isinstance(value, np.ndarray):
                     digest.update(f"{place} {column.name} {value.dtype}{value.shape}".encode())
                     digest.update(np.ascontiguousarray(value).data)

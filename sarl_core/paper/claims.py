@@ -438,7 +438,7 @@ DIVIDER: Rows[division.Environments] = (
         where="text on Figure 7",
         measured=f"What the expert, its actions divided into {PAPER_DIVIDER} intervals, keeps of "
         "its typical return with the better of the two, the centre and its own typical value.",
-        metric=division.kept_by_two_intervals,
+        metric=division.return_with_two_intervals,
         criterion=MeanBounds("above", 0.5, 0.25),
     ),
 )

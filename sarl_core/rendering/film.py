@@ -167,7 +167,7 @@ class Film:
         self.palette = palette
         self._patches: list[_Patch | None] = []
         self._last: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None = None
-        self._shown: tuple[int, NDArray[np.uint8]] | None = None
+        self._latest: tuple[int, NDArray[np.uint8]] | None = None
 
     def __len__(self) -> int:
         """Number of pictures."""
@@ -223,7 +223,7 @@ class Film:
         Returns:
             Shape (height, width), indexes into the palette; read-only.
         """
-        latest = self._shown
+        latest = self._latest
         begin, picture = number // _WHOLE_EVERY * _WHOLE_EVERY, None
         if latest is not None and begin <= latest[0] <= number:
             if latest[0] == number:
@@ -233,7 +233,7 @@ class Film:
             picture = self._patched(picture, patch)
         assert picture is not None
         picture.flags.writeable = False
-        self._shown = number, picture
+        self._latest = number, picture
         return picture
 
     def _patched(

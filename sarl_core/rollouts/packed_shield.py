@@ -14,7 +14,7 @@ from typing import NamedTuple
 from sarl_core.rollouts.rule_use import without_rule
 from sarl_core.shielding.shield import Shield
 
-_MOST_KEPT = 4  # callers whose work alternates in a process, and rules that are out by turns
+_MOST_SHIELDS = 4  # callers whose work alternates in a process, and rules that are out by turns
 
 
 class PackedShield(NamedTuple):
@@ -59,12 +59,12 @@ def unpack(packed: PackedShield) -> Shield:
     return _without(packed.content, packed.without)
 
 
-@lru_cache(_MOST_KEPT)
+@lru_cache(_MOST_SHIELDS)
 def _whole(content: bytes) -> Shield:
     shield: Shield = pickle.loads(content)
     return shield
 
 
-@lru_cache(_MOST_KEPT)
+@lru_cache(_MOST_SHIELDS)
 def _without(content: bytes, rule: int) -> Shield:
     return without_rule(_whole(content), rule)

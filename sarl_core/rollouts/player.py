@@ -44,7 +44,7 @@ class EpisodeArrays(NamedTuple):
 
 
 class EpisodeFaultError(InputError):
-    """An agent of the caller's own failed in the middle of an episode.
+    """The environment, or an agent of the caller's own, failed in the middle of an episode.
 
     Attributes:
         played: The steps before it, those of that episode included; None where there are none.
@@ -126,7 +126,7 @@ def play(
 
     Raises:
         InputError: If the environment cannot be used, or the shield is not for it.
-        EpisodeFaultError: If an agent of the caller's own fails.
+        EpisodeFaultError: If the environment, or an agent of the caller's own, fails.
     """
     batch = 1 if isinstance(agent, EpisodicAgent) else batch
     run = _Lanes(env_id, agent, shield, seeds, max_steps, keep_steps, observer, render_mode)
@@ -266,9 +266,9 @@ class _Lanes:
         self.states = following
         return self._end(ended, episodes)
 
-    def _broken(self, lane: _Lane, where: str, error: Exception) -> InputError:
+    def _broken(self, lane: _Lane, where: str, error: Exception) -> EpisodeFaultError:
         """What to say of an environment that raises in the middle of its work."""
-        return InputError(
+        return self._fault(
             f"{self.env_id} failed in the episode with seed {self.seeds[lane.episode]}, {where} "
             f"({reason(error)}); mend the environment or its wrapper, or choose another"
         )
@@ -298,11 +298,16 @@ class _Lanes:
     def fault(self, error: AgentFaultError) -> EpisodeFaultError:
         """What is to be said where the agent failed; it plays one episode after the other."""
         episode = self.started - 1
-        fault = EpisodeFaultError(
+        return self._fault(
             f"in step {self.lengths[episode]} of the episode with seed {self.seeds[episode]}, "
             f"{error}"
         )
-        if played := episode + bool(self.lengths[episode]):
+
+    def _fault(self, sentence: str) -> EpisodeFaultError:
+        """What came before goes with it: the first episodes, up to one that has not ended."""
+        fault = EpisodeFaultError(sentence)
+        whole = int(np.argmin(self.terminated | self.truncated))
+        if played := whole + bool(self.lengths[whole]):
             fault.played = self.outcome(played)
         return fault
 
@@ -311,6 +316,8 @@ class _Lanes:
         steps = None
         if self.keep_steps and self.chunks:
             columns = [np.concatenate(column) for column in zip(*self.chunks, strict=True)]
+            if count is not None:
+                columns = [column[columns[0] < count] for column in columns]
             order = np.lexsort((columns[1], columns[0]))
             steps = StepTable(*(column[order] for column in columns))
         passes = self.shield is not None and self.shield.on_invalid == "pass"
@@ -440,7 +447,7 @@ def check_environment(env_id: EnvironmentOrId, shield: Shield | None) -> Ready:
     try:
         if shield is None:
             return Ready(adapter, None, ())
-        from sarl_core.shielding.observation_layers import observed
+        from sarl_core.environments.observation_layers import observed
         from sarl_core.shielding.wrappers import fitted
 
         spaces = adapter.observation_space, adapter.action_space

@@ -166,14 +166,14 @@ def regions(ground: Ground) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         Indices of rules, (pairs,), and of states, (pairs,).
     """
     rows, dimensions = np.nonzero(ground.mined >= 0)
-    rules_found = [ground.mined[rows, dimensions]]
-    states_found = [rows]
+    rules = [ground.mined[rows, dimensions]]
+    states = [rows]
     for index, rule in enumerate(ground.rule_set.rules):
         if _outside_trees(ground, rule):
             rows = np.flatnonzero(rule.applies(ground.states))
-            rules_found.append(np.full(len(rows), index))
-            states_found.append(rows)
-    return np.concatenate(rules_found), np.concatenate(states_found)
+            rules.append(np.full(len(rows), index))
+            states.append(rows)
+    return np.concatenate(rules), np.concatenate(states)
 
 
 def _outside_trees(ground: Ground, rule: Rule) -> bool:

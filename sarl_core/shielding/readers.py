@@ -231,11 +231,11 @@ class ActionReader:
             return given, values, (() if size == 1 else (size,)), faults
         return (given if faults else np.asarray(list(rows))), values, shapes.pop(), faults
 
-    def _check_size(self, got: int) -> None:
+    def _check_size(self, given: int) -> None:
         size = len(self._names)
-        if got != size:
+        if given != size:
             raise UnreadableError(
-                f"the action has {got} value{'' if got == 1 else 's'} and the rules are for "
+                f"the action has {given} value{'' if given == 1 else 's'} and the rules are for "
                 f"{size} action dimension{'' if size == 1 else 's'}"
             )
 
@@ -283,8 +283,8 @@ class ActionReader:
         if not self.form.labels:
             return f"{subject} is infinite"
         first, count = self.form.labels[dimension]
-        said, last = decimal_text(float(value)), first + count - 1
-        return f"{subject} is {said}, which is none of {first} to {last}"
+        number, last = decimal_text(float(value)), first + count - 1
+        return f"{subject} is {number}, which is none of {first} to {last}"
 
 
 def numbers_in(value: Any, name: str) -> NDArray[Any]:

@@ -9,8 +9,7 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
-from sarl_core.errors import require
-from sarl_core.shielding.observation_layers import (
+from sarl_core.environments.observation_layers import (
     Layer,
     Observed,
     behind,
@@ -18,6 +17,7 @@ from sarl_core.shielding.observation_layers import (
     normalised,
     read_layers,
 )
+from sarl_core.errors import require
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import BatchDecision, Shield
 from sarl_core.shielding.wrappers import StepRecord, check_penalty, fitted, is_flat

@@ -11,9 +11,9 @@ import numpy as np
 
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import NamedFeatures
+from sarl_core.environments.observation_layers import Observed, observed
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.rule_order import fitted_rules
-from sarl_core.shielding.observation_layers import Observed, observed
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import Shield
 
@@ -177,7 +177,7 @@ def fitted(
     shield: Shield,
     observation_space: gymnasium.Space[Any],
     action_space: gymnasium.Space[Any],
-    seen: Observed,
+    observed: Observed,
 ) -> FittedShield:
     """Put a shield's rules into the order of an environment's features, by their names.
 
@@ -185,7 +185,7 @@ def fitted(
         shield: The rules.
         observation_space: Of the environment.
         action_space: Of the environment.
-        seen: Whose observations it shows, which tells the names of its features.
+        observed: Whose observations it shows, which tells the names of its features.
 
     Returns:
         The same shield where the order is the same.
@@ -198,11 +198,11 @@ def fitted(
     rule_set = shield.rule_set
     discrete = not rule_set.actions[0].is_interval
     names = catalogued(
-        seen.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
+        observed.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
     )
     ordered = fitted_rules(
         rule_set,
-        NamedFeatures(seen.whose, tuple(name for name, _ in names.features), seen.env_id),
+        NamedFeatures(observed.owner, tuple(name for name, _ in names.features), observed.env_id),
         names.actions,
     )
     if ordered.rule_set is not rule_set:

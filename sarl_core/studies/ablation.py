@@ -114,8 +114,8 @@ class Ablation:
         cut = int((self.cut & self.use.matters[list(self.rules)]).sum())
         if not cut:
             return self.base.remarks
-        said = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
-        return (*self.base.remarks, said)
+        remark = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
+        return (*self.base.remarks, remark)
 
     @property
     def unused(self) -> tuple[int, ...]:

@@ -37,14 +37,14 @@ def sign_flip_test(differences: ArrayLike, *, seed: int = 0) -> NDArray[np.float
     rows, pairs = values.shape
     if not rows or not pairs:
         return np.ones(rows)
-    seen = np.abs(values.sum(axis=1)) * (1.0 - _EQUAL)
+    observed = np.abs(values.sum(axis=1)) * (1.0 - _EQUAL)
     rng = np.random.default_rng(seed)
     at_once = max(1, _NUMBERS_AT_ONCE // pairs)
     reached = np.ones(rows)  # the signs that were seen are one way to draw them
     for start in range(0, _FLIPS, at_once):
         count = min(at_once, _FLIPS - start)
         signs = rng.integers(0, 2, size=(count, pairs), dtype=np.int8) * 2.0 - 1.0
-        reached += (np.abs(signs @ values.T) >= seen).sum(axis=0)
+        reached += (np.abs(signs @ values.T) >= observed).sum(axis=0)
     return np.asarray(reached / (1 + _FLIPS))
 
 
@@ -72,8 +72,8 @@ def sign_flip_interval(differences: ArrayLike, *, seed: int = 0) -> MeanInterval
     total, count = values.sum(), len(values)
 
     def chance(difference: float) -> float:
-        seen = abs(total - difference * count) * (1.0 - _EQUAL)
-        reached = np.abs(flipped - difference * counts) >= seen
+        observed = abs(total - difference * count) * (1.0 - _EQUAL)
+        reached = np.abs(flipped - difference * counts) >= observed
         return float((1 + reached.sum()) / (1 + _FLIPS))
 
     mean, width = float(values.mean()), float(np.ptp(values))

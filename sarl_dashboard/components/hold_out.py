@@ -22,9 +22,9 @@ def parting_lines(demonstrations: Demonstrations) -> list[str]:
     parts = parted(demonstrations)
     lines = []
     held = parts.held_out.n_episodes if parts.held_out is not None else 0
-    gone = demonstrations.n_episodes - parts.mined.n_episodes - held
-    if gone:
-        lines.append(f"**{counted(gone, 'episode')}** left out")
+    left_out = demonstrations.n_episodes - parts.mined.n_episodes - held
+    if left_out:
+        lines.append(f"**{counted(left_out, 'episode')}** left out")
     if held:
         lines.append(f"**{counted(held, 'episode')}** held out")
     return lines
@@ -37,9 +37,9 @@ def leave_out_choice(demonstrations: Demonstrations) -> None:
         demonstrations: All there are.
     """
     episodes = demonstrations.episodes[demonstrations.episode_starts].tolist()
-    gone = set(chosen().left_out)
+    excluded = set(chosen().left_out)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
-    st.session_state["_left_out_choice"] = [episode for episode in episodes if episode in gone]
+    st.session_state["_left_out_choice"] = [episode for episode in episodes if episode in excluded]
     st.multiselect(
         "Episodes left out",
         episodes,

@@ -45,11 +45,11 @@ def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
                 st.query_params[name] = threshold_text(value)
 
 
-def sidebar(*, thresholds_shown: bool = True) -> None:
+def sidebar(*, with_thresholds: bool = True) -> None:
     """The choice of data, and which rules are in force.
 
     Args:
-        thresholds_shown: Whether to say which thresholds are in force; a page with their sliders
+        with_thresholds: Whether to say which thresholds are in force; a page with their sliders
             says so itself.
     """
     name = chosen_dataset()
@@ -57,7 +57,7 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
     # A page without sliders keeps what a link says, for the page that has them.
     choose_thresholds(thresholds)
     choose_divider(divider)
-    if thresholds_shown:
+    if with_thresholds:
         _keep_in_url(thresholds, divider)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
     st.session_state["_data_choice"] = name
@@ -81,9 +81,9 @@ def sidebar(*, thresholds_shown: bool = True) -> None:
         lines += parting_lines(whole) if whole is not None else []
         if compact_set.in_force():
             lines.append("**Compact rules** in force")
-            if thresholds_shown:
+            if with_thresholds:
                 lines.append("Thresholds, set aside:")
-        if not thresholds_shown:
+        if not with_thresholds:
             st.caption("  \n".join(lines))
             return
         lines += [

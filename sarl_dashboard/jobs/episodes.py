@@ -125,8 +125,8 @@ class Results:
             self._episodes[row.key] = fresh if before is None else join([before, fresh])
             self._episodes.move_to_end(row.key)
             while len(self._episodes) > MOST_RESULTS:
-                gone, _ = self._episodes.popitem(last=False)
-                self._cuts.pop(gone, None)
+                oldest, _ = self._episodes.popitem(last=False)
+                self._cuts.pop(oldest, None)
 
 
 @st.cache_resource

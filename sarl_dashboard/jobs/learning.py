@@ -182,8 +182,8 @@ class Training:
         if not self.process.returncode:
             return ""
         lines = self.log.read_text(errors="replace").strip().splitlines()
-        said = next((line for line in reversed(lines) if line.startswith("error: ")), "")
-        return said.removeprefix("error: ") or "learning ended unexpectedly; start it again"
+        complaint = next((line for line in reversed(lines) if line.startswith("error: ")), "")
+        return complaint.removeprefix("error: ") or "learning ended unexpectedly; start it again"
 
 
 class Trainings:

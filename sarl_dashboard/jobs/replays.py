@@ -109,15 +109,15 @@ class ReplayPair:
         return self.film.episodes[0] if len(self.film.episodes) > 1 else None
 
     @property
-    def shown(self) -> Episodes:
+    def main_episode(self) -> Episodes:
         """The episode that is gone through step by step."""
         return self.film.episodes[0]
 
     @property
     def steps(self) -> StepTable:
         """The steps of that episode."""
-        assert self.shown.steps is not None  # a replay records them
-        return self.shown.steps
+        assert self.main_episode.steps is not None  # a replay records them
+        return self.main_episode.steps
 
     @cached_property
     def png(self) -> Callable[[int], bytes]:

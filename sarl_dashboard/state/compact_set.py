@@ -23,7 +23,7 @@ from sarl_dashboard.text import refuse
 
 THRESHOLDS = "thresholds"
 # Which set the Rules page has to show, to show a rule of a set that was chosen elsewhere.
-SHOWN_AS = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
+SET_ON_RULES_PAGE = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,8 +96,8 @@ def say_left_out(names: Sequence[str], page: str) -> None:
 
 def show_left_out(page: str) -> None:
     """Say what was left out of the link that opened a page, as long as one stays on it."""
-    names, told = st.session_state.get("_left_out_of_link", ((), page))
-    if told != page:
+    names, linked_page = st.session_state.get("_left_out_of_link", ((), page))
+    if linked_page != page:
         del st.session_state["_left_out_of_link"]
     elif names:
         listed = ", ".join(escaped(name[:40]) for name in names[:5])

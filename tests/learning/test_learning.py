@@ -35,7 +35,7 @@ def cart_rules() -> RuleSet:
 @pytest.fixture
 def cart(cart_rules: RuleSet, monkeypatch: pytest.MonkeyPatch) -> Learn:
     """Learn CartPole for a moment, and look at it very often."""
-    monkeypatch.setattr("sarl_core.learning.recorder._TOLD_EVERY", 0.0)
+    monkeypatch.setattr("sarl_core.learning.recorder._REPORTED_EVERY", 0.0)
 
     def call(arm: str, **settings: object) -> LearningResult:
         given = {"steps": STEPS, "episodes": 2, "seed": 5} | settings

@@ -26,6 +26,7 @@ from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, w
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.tables import Table, recording_from_table
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require
 from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
@@ -74,7 +75,7 @@ _SIGNATURES = (
 
 
 def load_demonstrations(
-    path: str | Path, *, env_id: str | None = None, columns: ColumnMap | None = None
+    path: str | Path, *, env_id: EnvironmentOrId | None = None, columns: ColumnMap | None = None
 ) -> Demonstrations:
     """Load demonstrations from a file, or from the paper's pair of files.
 
@@ -121,7 +122,7 @@ def read_demonstrations(
     data: Content,
     name: str,
     *,
-    env_id: str | None = None,
+    env_id: EnvironmentOrId | None = None,
     columns: ColumnMap | None = None,
     companion: tuple[Content, str] | None = None,
 ) -> Demonstrations:

@@ -106,11 +106,11 @@ def comment(text: str) -> str:
     Returns:
         One line that cannot end the comment, begin another or be taken for a trigraph.
     """
-    seen = one_line(text)
+    line = one_line(text)
     # Twice for question marks: of three, the first pass leaves two side by side.
     for signs, harmless in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), *[("??", "? ?")] * 2):
-        seen = seen.replace(signs, harmless)
-    return seen
+        line = line.replace(signs, harmless)
+    return line
 
 
 def _kind(program: Program) -> str:

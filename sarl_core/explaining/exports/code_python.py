@@ -160,13 +160,13 @@ def rules_to_python(
         for index, order in enumerate(program.orders)
         for part in _finders(index, order, rule_set)
     ]
-    said, answer = _INVALID[on_invalid]
+    docstring, answer = _INVALID[on_invalid]
     body = _CONTINUOUS if program.continuous else _DISCRETE
     finders = ", ".join(_finder(index, 0) for index in range(len(program.orders)))
     return (
         "\n".join(
             [
-                _HEAD.format(invalid=said),
+                _HEAD.format(invalid=docstring),
                 *_names(program),
                 *_table(program),
                 *functions,

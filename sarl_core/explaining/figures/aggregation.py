@@ -103,14 +103,14 @@ def card_points(card: Mapping[str, Any]) -> tuple[RoundPoint, ...]:
         InputError: If it is no such card.
     """
     try:
-        return conformed(card, _Card).rounds
+        return conformed(card, _RoundsCard).rounds
     except MisfitError as error:
         raise InputError(
             f"the card does not tell of its rounds ({error}); make the rules again with aggregate"
         ) from error
 
 
-class _Card(Struct):
+class _RoundsCard(Struct):
     rounds: Annotated[tuple[RoundPoint, ...], Meta(min_length=1)]
 
 
@@ -182,7 +182,7 @@ def rounds_figure(
         col=1,
     )
     shares = [[getattr(point, name) for point in points] for name in ("coverage", "disagreement")]
-    for row, (values, said) in enumerate(
+    for row, (values, tips) in enumerate(
         (
             (means, [f"{value:,.1f}" for value in means.tolist()]),
             *((one, [share_text(share, decimals=1) for share in one]) for one in shares),
@@ -197,7 +197,7 @@ def rounds_figure(
             mode="lines+markers",
             name=_PANELS[row - 1],
             customdata=np.round(spreads, 3) if row == 1 else None,
-            hovertext=said,
+            hovertext=tips,
             line={"color": _BLUE, "width": 2.2 if row == 1 else 1.6},
             marker={"color": _BLUE, "size": 7 if row == 1 else 5},
             hovertemplate=(

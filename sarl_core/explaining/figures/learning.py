@@ -343,11 +343,11 @@ def _line(
             **common,
         )
     means = np.nanmean(values, axis=0)
-    said = [share_text(mean) if row == 3 else f"{mean:,.0f}" for mean in means.tolist()]
+    texts = [share_text(mean) if row == 3 else f"{mean:,.0f}" for mean in means.tolist()]
     figure.add_scatter(
         x=x,
         y=means,
-        hovertext=said,
+        hovertext=texts,
         mode="lines",
         name=arm.title,
         line={"color": colour, "width": 2.2, "dash": "dot" if arm.replay else "solid"},

@@ -118,7 +118,7 @@ def _add_line(
     """A mean over learners, (K, P + 1) values, and the band of its interval."""
     intervals = [mean_interval(column) for column in values.T]
     means = [interval.mean for interval in intervals]
-    said = _shares if share else _numbers
+    as_text = _shares if share else _numbers
     low = np.array([interval.low for interval in intervals])
     high = np.array([interval.high for interval in intervals])
     if share:
@@ -141,7 +141,7 @@ def _add_line(
         name=plain(name),
         legendgroup=name,
         line={"color": colour, "width": 2.2, "dash": dash},
-        customdata=np.stack([said(np.array(means)), said(low), said(high)], axis=1),
+        customdata=np.stack([as_text(np.array(means)), as_text(low), as_text(high)], axis=1),
         hovertemplate=(
             f"{plain(name)}, after %{{x:,}} steps: <b>%{{customdata[0]}}</b><br>95 % interval "
             "%{customdata[1]} to %{customdata[2]}<extra></extra>"

@@ -33,16 +33,18 @@ def confusion_html(
     action = disagreement.first.actions[dimension]
     counts = disagreement.confusion(dimension)
     size = len(counts)
-    said = [said_text(label, action) for label in range(size)]
+    labels = [said_text(label, action) for label in range(size)]
     most = int((counts - np.diag(np.diag(counts))).max())
     # The head of a row or column has a stripe in the action's colour; "no rule" has none.
-    heads = [(text, label_colour(label)) for label, text in enumerate(said[:-1])] + [(said[-1], "")]
+    heads = [(text, label_colour(label)) for label, text in enumerate(labels[:-1])] + [
+        (labels[-1], "")
+    ]
     rows = []
     for row, head in enumerate(heads):
         cells = []
         for column in range(size):
             count = int(counts[row, column])
-            tip = f"{names[0]}: {said[row]}; {names[1]}: {said[column]}; {counted(count, noun)}"
+            tip = f"{names[0]}: {labels[row]}; {names[1]}: {labels[column]}; {counted(count, noun)}"
             same = row == column
             look = ("", "") if same or not count else layer_colour(count / most)
             cells.append((f"{count:,}" if count else "", tip, same, *look))
@@ -50,7 +52,7 @@ def confusion_html(
     return render(
         "parts/confusion",
         names=names,
-        said=heads,
+        labels=heads,
         rows=rows,
         width=f"{_WIDTH / size:.2f}%",  # all as wide, whatever they are called
         title=f"What {names[0]} says against what {names[1]} says, in numbers of states",

@@ -117,8 +117,8 @@ def _in_words(one: FeatureEvidence, feature: Feature) -> str:
     unit = f" {feature.unit}" if feature.unit else ""
     first, last = float(one.edges[0]), float(one.edges[-1])
     low, high = number_text(first, apart_from=last), number_text(last, apart_from=first)
-    whose = "all states and those of the rule" if one.at_rule.any() else "all states"
+    groups = "all states and those of the rule" if one.at_rule.any() else "all states"
     return (
-        f"{feature.name} of {whose}, from {low} to {high}{unit}; the rule asks that "
+        f"{feature.name} of {groups}, from {low} to {high}{unit}; the rule asks that "
         f"{condition_text(one.bounds, feature)}"
     )

@@ -97,7 +97,7 @@ def decision_html(
     )
     proposed = executed_text(wanted, rule_set.actions, beside=done)
     executed = executed_text(done, rule_set.actions, beside=wanted)
-    said = (
+    outcome = (
         f"The agent wants {proposed}; executed is {executed}"
         if decision.intervened
         else f"{executed[:1].upper()}{executed[1:]} is executed, as the agent wants"
@@ -107,7 +107,9 @@ def decision_html(
         if len(rule_set.actions) > 1:
             which = "No rule for this action dimension applies to this state"
         note = f"{which}: the agent's action is passed on as it is."
-        return render("states/decision", badges=badges, said=said, rule="", outside="", note=note)
+        return render(
+            "states/decision", badges=badges, outcome=outcome, rule="", outside="", note=note
+        )
     values = tuple(state.astype(np.float64).tolist())
     rows = [(one.condition, one.value, one.room) for one in condition_views(rule, values, rule_set)]
     caption = "The rule's conditions and the state's values"
@@ -117,7 +119,7 @@ def decision_html(
     return render(
         "states/decision",
         badges=badges,
-        said=said,
+        outcome=outcome,
         rule=rule_set.name_of(rule),
         sentence=sentence(rule, rule_set, state=values),
         conditions=table_html(_CONDITIONS, rows, caption) if rows else "",

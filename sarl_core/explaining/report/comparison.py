@@ -137,7 +137,9 @@ def results_of(comparison: Comparison) -> tuple[Result, ...]:
     """
     of_all = {"environment": comparison.env_id, "seed": comparison.seed}
     return tuple(
-        conformed(comparison_row(arm, episodes, comparison.alone(place)) | of_all, _Row).read()
+        conformed(
+            comparison_row(arm, episodes, comparison.alone(place)) | of_all, _ResultRow
+        ).read()
         for place, (arm, episodes) in enumerate(
             zip(comparison.arms, comparison.episodes, strict=True)
         )
@@ -188,7 +190,7 @@ def results_from_text(text: str, name: str) -> tuple[Result, ...]:
             f"the comparison {name} has {len(rows)} rows; give one with 1 to {_MOST_ROWS}"
         )
     try:
-        return tuple(conformed(row, _Row, strict=False).read() for row in rows)
+        return tuple(conformed(row, _ResultRow, strict=False).read() for row in rows)
     except MisfitError as error:
         raise InputError(f"in the comparison {name}, {error}; download it again") from error
 
@@ -289,7 +291,7 @@ def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
     return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
 
 
-class _Row(Struct):
+class _ResultRow(Struct):
     arm: str
     episodes: Count
     mean: Number

@@ -177,11 +177,11 @@ def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionSha
 def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     who = f"The agent “{demonstrations.agent}”" if demonstrations.agent else "An expert"
     where = f" in {demonstrations.env_id}" if demonstrations.env_id else ""
-    seen = counted(demonstrations.observations.shape[1], "number")
+    numbers = counted(demonstrations.observations.shape[1], "number")
     sentences = [
         f"{who} acted{where} for {counted(len(demonstrations), 'step')} in "
         f"{counted(demonstrations.n_episodes, 'episode')}. At every step it saw the state of the "
-        f"task, {seen} listed below, and chose an action. An episode is one attempt from start "
+        f"task, {numbers} listed below, and chose an action. An episode is one attempt from start "
         "to end.",
     ]
     summary, finished = demonstrations.summary(), demonstrations.episode_finished

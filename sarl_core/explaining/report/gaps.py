@@ -216,30 +216,30 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
 def _beyond(
     played: PlayedEpisodes, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
 ) -> Beyond:
-    seen, rules = played.steps.observation, played.steps.rules
+    states, rules = played.steps.observation, played.steps.rules
     low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
-    outside = ((seen < low) | (seen > high)).any(axis=1)
+    outside = ((states < low) | (states > high)).any(axis=1)
     covered = (rules >= 0).any(axis=1)
     return Beyond(
         player=played.player.name,
-        steps=f"{len(seen):,}",
+        steps=f"{len(states):,}",
         covered=share_text(float(covered.mean())),
         outside=share_text(float(outside.mean())),
-        far=share_text(float(_far(seen, rules, rule_set).mean())) if boxed else "",
+        far=share_text(float(_far(states, rules, rule_set).mean())) if boxed else "",
     )
 
 
 def _far(
-    seen: NDArray[np.float32], rules: NDArray[np.int64], rule_set: RuleSet
+    states: NDArray[np.float32], rules: NDArray[np.int64], rule_set: RuleSet
 ) -> NDArray[np.bool_]:
     """Whether a rule in force lies beyond the states it was made from, (T,)."""
-    beyond = np.zeros(len(seen), dtype=np.bool_)
+    beyond = np.zeros(len(states), dtype=np.bool_)
     for index in np.unique(rules[rules >= 0]).tolist():
         rule = rule_set.rules[index]
         if rule.box is not None:
             rows = np.flatnonzero(rules[:, rule.dimension] == index)
-            inside = (seen[rows] >= np.float32(rule.box.least)) & (
-                seen[rows] <= np.float32(rule.box.most)
+            inside = (states[rows] >= np.float32(rule.box.least)) & (
+                states[rows] <= np.float32(rule.box.most)
             )
             beyond[rows] |= ~inside.all(axis=1)
     return beyond

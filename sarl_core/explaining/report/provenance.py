@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.environment import Environment
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.language import counted, threshold_text
@@ -101,7 +102,7 @@ def mining_command(
     demonstrations: str | Path,
     given: Demonstrations,
     *,
-    env: str | None = None,
+    env: Environment | None = None,
 ) -> str | None:
     """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
 
@@ -135,7 +136,7 @@ def mining_command(
             "--lift": threshold_text(limits.lift) if limits.lift else None,
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
-            "--env": env,
+            **({} if env is None else env.options),
             "--out": rules,
         },
     )

@@ -16,6 +16,7 @@ from typing import Any
 from sarl_core.agents.agent import Agent, has_expert
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.comparison import Result, compared
 from sarl_core.explaining.report.demonstrations import demonstrations_part
@@ -56,7 +57,7 @@ class Wishes:
 
     in_full: int = MOST_IN_FULL
     frames: int = 3
-    env_id: str = ""
+    env_id: EnvironmentOrId = ""
     agent: str | Path | Agent | None = None
     seed: int = FIRST_SEED
     episodes: int = EPISODES
@@ -123,7 +124,7 @@ def make_report(
     *,
     in_full: int = MOST_IN_FULL,
     frames: int = 3,
-    env_id: str = "",
+    env_id: EnvironmentOrId = "",
     agent: str | Path | Agent | None = None,
     seed: int = FIRST_SEED,
     episodes: int = EPISODES,
@@ -259,7 +260,7 @@ def _examples(
     env_id = wishes.env_id or demonstrations.env_id or rule_set.source.env_id
     if not env_id:
         return None, "the demonstrations do not say which environment they are from"
-    if ":" in env_id and not wishes.env_id:
+    if ":" in str(env_id) and not wishes.env_id:
         # Gymnasium imports the module of "module:Id", and this id is a stranger's.
         return None, f"the environment {env_id!r} names a module to import, which a file may not do"
     players = _players(env_id, wishes)
@@ -281,7 +282,7 @@ def _examples(
     return None, str(examples).split(";")[0]
 
 
-def _players(env_id: str, wishes: Wishes) -> tuple[Player, ...]:
+def _players(env_id: EnvironmentOrId, wishes: Wishes) -> tuple[Player, ...]:
     # Sampled, as the shipped demonstrations were: so an agent comes by more states.
     novice = Player("a novice held to the rules", "novice", shielded=True)
     agent = wishes.agent

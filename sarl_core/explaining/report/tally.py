@@ -136,9 +136,9 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     labels = np.stack(
         [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
     )
-    said = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
+    rule_labels = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
     inside = in_force >= 0
-    right = inside & (said[np.maximum(in_force, 0)] == labels)
+    right = inside & (rule_labels[np.maximum(in_force, 0)] == labels)
     count = len(rule_set.rules)
     row, _ = np.nonzero(inside)
     by_episode = count_applied(

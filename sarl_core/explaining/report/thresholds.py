@@ -98,7 +98,7 @@ class ThresholdsPart:
     card: tuple[tuple[str, str], ...]
 
 
-class _Card(Struct):
+class _RuleSetCard(Struct):
     """What a card may say."""
 
     budget: Count | None = None
@@ -161,12 +161,12 @@ def thresholds_part(
     Returns:
         The part of the report.
     """
-    said = fitting(card, _Card)
-    facts = tuple(_card_facts(said))
+    entries = fitting(card, _RuleSetCard)
+    facts = tuple(_card_facts(entries))
     edits = edits_sentence(rule_set)
     then = (edits,) if edits else ()
     if rule_set.cut == "leaves" or trees is None:
-        return ThresholdsPart((*_built(rule_set, said), *then), None, "", (), facts)
+        return ThresholdsPart((*_built(rule_set, entries), *then), None, "", (), facts)
     limits = rule_set.thresholds
     landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
     same = (
@@ -294,7 +294,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
 # --- a budget ----------------------------------------------------------------------------------
 
 
-def _built(rule_set: RuleSet, card: _Card) -> tuple[str, ...]:
+def _built(rule_set: RuleSet, card: _RuleSetCard) -> tuple[str, ...]:
     if rule_set.cut != "leaves":
         return _cut(rule_set)
     sentences = [
@@ -326,13 +326,13 @@ def _built(rule_set: RuleSet, card: _Card) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _card_facts(card: _Card) -> Iterator[tuple[str, str]]:
+def _card_facts(card: _RuleSetCard) -> Iterator[tuple[str, str]]:
     """What a card says."""
     if card.budget is not None:
         yield "Most rules for each action", number_text(card.budget)
     if card.rounds:
-        taken = _with(", of which the rules of round {} were taken", card.chosen_round)
-        yield "Rounds of asking the expert", f"{len(card.rounds)}{taken}"
+        choice = _with(", of which the rules of round {} were taken", card.chosen_round)
+        yield "Rounds of asking the expert", f"{len(card.rounds)}{choice}"
     if card.refined is not None:
         yield "Thresholds moved to achieve more", "yes" if card.refined else "no"
     if card.chosen_by is not None:

@@ -61,9 +61,9 @@ def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = Fa
         parts.append(f"was {was}" if beside else f"{now} instead of {was}")
     if "action" in what:
         dimension = difference.first.actions[before.dimension]
-        said = action_text(before.action, dimension)
+        earlier = action_text(before.action, dimension)
         says = action_text(after.action, difference.second.actions[after.dimension])
-        parts.append(f"said {said}" if beside else f"{says} instead of {said}")
+        parts.append(f"said {earlier}" if beside else f"{says} instead of {earlier}")
     if "switched" in what:
         parts.append(f"switched {'on' if after.enabled else 'off'}")
     if "place" in what:

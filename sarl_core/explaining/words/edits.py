@@ -113,9 +113,12 @@ def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:
     """
     rule, other = rule_set.rules[conflict.rule], rule_set.rules[conflict.other]
     dimension = rule_set.actions[rule.dimension]
-    says, said = label_text(rule.action, dimension), label_text(other.action, dimension)
+    labels = [label_text(one.action, dimension) for one in (rule, other)]
     name, other_name = rule_set.name_of(rule), rule_set.name_of(other)
-    text = f"{name} ({says}) takes {counted(conflict.states, states)} from {other_name} ({said})"
+    text = (
+        f"{name} ({labels[0]}) takes {counted(conflict.states, states)} from "
+        f"{other_name} ({labels[1]})"
+    )
     if conflict.right is None or conflict.other_right is None:
         return f"{text}."
     return (

@@ -288,9 +288,9 @@ def next_manual_id(rule_set: RuleSet, history: History = History()) -> str:
     Returns:
         As "manual.1".
     """
-    taken = {rule.id for rule in rule_set.rules}
-    taken |= {edit.rule_id for edit in (*history.edits, *history.undone)}
+    used = {rule.id for rule in rule_set.rules}
+    used |= {edit.rule_id for edit in (*history.edits, *history.undone)}
     number = 1
-    while f"manual.{number}" in taken:
+    while f"manual.{number}" in used:
         number += 1
     return f"manual.{number}"

@@ -27,7 +27,7 @@ SHORTEST = "no shorter number decides every state as it does"
 EMPTIED = "shorter, its rule would apply to no number at all"
 
 
-class KeptThreshold(NamedTuple):
+class UnroundedThreshold(NamedTuple):
     """A threshold that stayed as it was.
 
     Attributes:
@@ -58,7 +58,7 @@ class Rounding:
 
     rule_set: RuleSet
     rounded: int
-    unrounded: tuple[KeptThreshold, ...]
+    unrounded: tuple[UnroundedThreshold, ...]
 
 
 class _Query(NamedTuple):
@@ -109,7 +109,7 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
     """Round every threshold that none of the rules asks which are to stay whole."""
     paths = [list(rule.conditions) for rule in rule_set.rules]
     rounded = 0
-    unrounded: list[KeptThreshold] = []
+    unrounded: list[UnroundedThreshold] = []
     for dimension in range(len(rule_set.actions)):
         places = [i for i, rule in enumerate(rule_set.rules) if rule.dimension == dimension]
         waiting = [(0, places, np.arange(columns.shape[1]))]
@@ -124,7 +124,7 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
                 if why:
                     ids = tuple(rule_set.rules[place].id for place in query.places)
                     unrounded.append(
-                        KeptThreshold(dimension, query.feature, query.threshold, ids, why)
+                        UnroundedThreshold(dimension, query.feature, query.threshold, ids, why)
                     )
                 rounded += threshold != query.threshold
                 waiting += _sides(rule_set.rules, query, columns)

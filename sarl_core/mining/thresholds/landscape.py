@@ -318,7 +318,7 @@ def _tried(
     for tree, one, counts in zip(trees, places, held_out, strict=True):
         place = np.full(tree.n_nodes, -1)
         place[one.node] = np.arange(len(one.node))
-        cut_place = place[counts.thing]
+        cut_place = place[counts.subject]
         by_episode = np.flatnonzero(cut_place >= 0)
         by_episode = by_episode[np.argsort(counts.episode[by_episode], kind="stable")]
         entries.append((counts, by_episode, cut_place))

@@ -42,7 +42,7 @@ def count_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> EpisodeCou
 
 def count_applied(
     size: int,
-    thing: Integers,
+    subject: Integers,
     row: Integers,
     right: NDArray[np.bool_],
     demonstrations: Demonstrations,
@@ -50,8 +50,8 @@ def count_applied(
     """Count what is known to apply to which pair.
 
     Args:
-        size: Number of things.
-        thing: Which one applies, (K,).
+        size: Number of subjects.
+        subject: Which one applies, (K,).
         row: To which pair, (K,).
         right: Whether it is right about it, (K,).
         demonstrations: The pairs.
@@ -61,7 +61,7 @@ def count_applied(
     """
     each = np.ones(len(row), dtype=np.int64)
     episode = episode_of_each(demonstrations)[row]
-    return _counted(size, thing, episode, each, right.astype(np.int64), demonstrations)
+    return _counted(size, subject, episode, each, right.astype(np.int64), demonstrations)
 
 
 def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCounts:
@@ -94,24 +94,24 @@ def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCoun
 
 def _counted(
     size: int,
-    thing: Integers,
+    subject: Integers,
     episode: Integers,
     samples: Integers,
     correct: Integers,
     demonstrations: Demonstrations,
 ) -> EpisodeCounts:
-    """Add up what belongs to one thing and one episode."""
-    key = thing * demonstrations.n_episodes + episode
+    """Add up what belongs to one subject and one episode."""
+    key = subject * demonstrations.n_episodes + episode
     order = np.argsort(key, kind="stable")
     key = key[order]
     first = np.flatnonzero(np.diff(key, prepend=-1))
     if len(first):
         samples = np.add.reduceat(samples[order], first)
         correct = np.add.reduceat(correct[order], first)
-    thing, episode = np.divmod(key[first], demonstrations.n_episodes)
+    subject, episode = np.divmod(key[first], demonstrations.n_episodes)
     return EpisodeCounts(
         size,
-        thing,
+        subject,
         episode,
         samples,
         correct,

@@ -89,7 +89,7 @@ def finer(environments: Environments) -> Measurement:
     )
 
 
-def kept_by_two_intervals(environments: Environments) -> Measurement | None:
+def return_with_two_intervals(environments: Environments) -> Measurement | None:
     """How much of its typical return the walker's expert keeps with the better way to snap."""
     if _WALKER not in environments:
         return None

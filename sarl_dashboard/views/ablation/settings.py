@@ -23,7 +23,7 @@ from sarl_dashboard.components.settings import (
 from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.jobs.episodes import Row
 from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
-from sarl_dashboard.state.compact_set import SHOWN_AS
+from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
@@ -47,7 +47,7 @@ class AblationChoice:
     @property
     def linked(self) -> str | None:
         """The set under which its rules are found on the Rules page; None if they are not."""
-        return SHOWN_AS.get(self.rules)
+        return SET_ON_RULES_PAGE.get(self.rules)
 
     @property
     def on_demonstrated_seeds(self) -> bool:

@@ -14,7 +14,7 @@ from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.text import escaped
 
-CONFLICTS_SHOWN = 4
+MOST_CONFLICTS = 4
 
 
 def conflicts(of: Base, verdicts: Verdicts) -> None:
@@ -27,9 +27,9 @@ def conflicts(of: Base, verdicts: Verdicts) -> None:
         return
     rule_set, noun = verdicts.rule_set, of.basis.noun
     lines = [conflict_text(one, rule_set, states=noun) for one in verdicts.conflicts]
-    st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:CONFLICTS_SHOWN]))
-    if len(lines) > CONFLICTS_SHOWN:
-        st.caption(f"The largest {CONFLICTS_SHOWN} of {len(lines):,}; the table has them all.")
+    st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:MOST_CONFLICTS]))
+    if len(lines) > MOST_CONFLICTS:
+        st.caption(f"The largest {MOST_CONFLICTS} of {len(lines):,}; the table has them all.")
     st.dataframe(
         pd.DataFrame(_conflict_rows(of, verdicts)),
         hide_index=True,

@@ -26,7 +26,7 @@ from sarl_dashboard.text import escaped, in_full
 
 ABOVE, AT_MOST = "above", "at most"
 SIGNS: dict[str, Operator] = {ABOVE: ">", AT_MOST: "<="}
-CONFLICTS_SHOWN = 3
+MOST_CONFLICTS = 3
 
 
 @dataclass
@@ -302,7 +302,7 @@ def preview(filling: Filling, edit: Add | Change) -> None:
             "something else.\n"
             + "\n".join(
                 f"- {escaped(conflict_text(one, then.rule_set, states=noun))}"
-                for one in own[:CONFLICTS_SHOWN]
+                for one in own[:MOST_CONFLICTS]
             )
         )
 

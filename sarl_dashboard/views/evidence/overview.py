@@ -67,7 +67,7 @@ def show_overview(evidence: RuleSetEvidence) -> None:
         remedy = remedy_text(short, evidence.parts.remaining.n_episodes)
         if remedy:
             sentences.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
-    told_apart: tuple[Verdict, ...] = ("reached", "open", "below") if judged is not None else ()
+    verdicts_drawn: tuple[Verdict, ...] = ("reached", "open", "below") if judged is not None else ()
     if len(findings.rules) > MOST_DRAWN:
         sentences.append(
             f"Drawn: the {MOST_DRAWN} rules with the most support, of {len(findings.rules):,}."
@@ -78,7 +78,7 @@ def show_overview(evidence: RuleSetEvidence) -> None:
                 "rules/evidence_overview",
                 numbers=number_cards(numbers),
                 plot=_overview(evidence),
-                verdicts=[(VERDICT_COLOURS[name], VERDICTS[name]) for name in told_apart],
+                verdicts=[(VERDICT_COLOURS[name], VERDICTS[name]) for name in verdicts_drawn],
                 threshold=share_text(findings.threshold),
                 sentences=sentences,
             )

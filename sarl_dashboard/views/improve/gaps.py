@@ -17,7 +17,7 @@ from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.text import escaped
 
-FEATURES_SHOWN = 12
+MOST_FEATURES = 12
 GAP_ROWS = 200
 
 
@@ -72,7 +72,7 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
     histograms = gap_histograms(outcome.order.start, gaps)
     features = outcome.order.start.features
     with st.grid(3, min_column_width=280) as grid:
-        for one in histograms[:FEATURES_SHOWN]:
+        for one in histograms[:MOST_FEATURES]:
             feature = features[one.feature]
             with grid.cell():
                 st.markdown(f"**{escaped(feature.name)}**")
@@ -81,8 +81,8 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
                     f"gap_{one.feature}",
                     f"{feature.name}: demonstrated states and states without a rule",
                 )
-    if len(histograms) > FEATURES_SHOWN:
-        st.caption(f"{FEATURES_SHOWN} of {len(histograms)} features.")
+    if len(histograms) > MOST_FEATURES:
+        st.caption(f"{MOST_FEATURES} of {len(histograms)} features.")
 
 
 def show_states(outcome: Outcome, gaps: Gaps) -> None:

@@ -46,7 +46,7 @@ def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> 
 def settings(demonstrations: Demonstrations) -> ImproveChoices:
     """The widgets."""
     expert = st.session_state.get("expert") or st.query_params.get("expert")
-    is_asked = expert != NOBODY
+    has_expert = expert != NOBODY
     max_rules, cut, rounds, refinement, validation = MIN_RULES, EVERY_LEAF, 1, 0, 1
     divider, policy_file = MIN_DIVIDER, None
     with st.container(border=True):
@@ -61,7 +61,7 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                 "file: a policy of yours. Nobody: the page shows which states need a "
                 "demonstration.",
             )
-            if is_asked:
+            if has_expert:
                 max_rules = number(
                     "Most rules",
                     "max_rules",
@@ -88,14 +88,14 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     "How often the rules act and the expert answers. The best round is kept.",
                 )
             episodes = number(
-                "Episodes a round" if is_asked else "Episodes",
+                "Episodes a round" if has_expert else "Episodes",
                 "round_episodes",
                 1,
                 MOST,
                 20,
                 "In each of them the rules shield a novice, which acts at random.",
             )
-            if is_asked:
+            if has_expert:
                 validation = number(
                     "Episodes to choose by",
                     "validation",

@@ -56,7 +56,7 @@ class Reported(Struct):
     intervention_rate: Share = 0.0
 
 
-class Card(Struct):
+class ShippedCard(Struct):
     """What a card says, but for its rounds."""
 
     command: str
@@ -70,7 +70,7 @@ class Card(Struct):
 def show_card(document: dict[str, Any]) -> None:
     """How the shipped compact rules came about."""
     try:
-        card = conformed(document, Card)
+        card = conformed(document, ShippedCard)
     except MisfitError as error:
         raise InputError(
             f"the card of the compact rules lacks a part ({error}); make the rules again with "
@@ -89,7 +89,7 @@ def show_card(document: dict[str, Any]) -> None:
     )
 
 
-def card_sentence(card: Card) -> str:
+def card_sentence(card: ShippedCard) -> str:
     """What the rules of a card achieve, for Markdown."""
     size = size_text(card.rules_per_dimension)
     afterwards = f", refined in {counted(card.generations, 'step')} afterwards" * card.refined

@@ -126,7 +126,7 @@ def source(played: Played) -> Recorded:
         several = runs[0][1]
         if switch("Steps of", "recorded", [ONE, ALL]) == ALL:
             return Recorded(replay, several, replay.order.seed - comparison[0].seed)
-    return Recorded(replay, replay.shown, 0)
+    return Recorded(replay, replay.main_episode, 0)
 
 
 def filters(recorded: Recorded) -> tuple[StepFilter, str]:
@@ -154,7 +154,7 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
             }
             picked = st.selectbox(
                 "Rule",
-                state_kept([EVERY_RULE, *used], "by_rule"),
+                valid_options([EVERY_RULE, *used], "by_rule"),
                 key="by_rule",
                 bind="query-params",
                 width=180,
@@ -165,7 +165,7 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
             seeds = recorded.episodes.seeds.tolist()
             seed = st.selectbox(
                 "Episode of seed",
-                state_kept([EVERY_EPISODE, *map(str, seeds)], "by_episode"),
+                valid_options([EVERY_EPISODE, *map(str, seeds)], "by_episode"),
                 key="by_episode",
                 bind="query-params",
                 width=180,
@@ -174,7 +174,7 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
     return StepFilter(CHANGED in only, OUTSIDE in only, rule, episode), name
 
 
-def state_kept(options: list[str], key: str) -> list[str]:
+def valid_options(options: list[str], key: str) -> list[str]:
     """Options of a select box; a choice that is none of them is let go of."""
     if st.session_state.get(key, options[0]) not in options:
         st.session_state[key] = options[0]

@@ -28,7 +28,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.flips import pace_of
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
-from sarl_dashboard.state.compact_set import SHOWN_AS
+from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
 
@@ -132,7 +132,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     # Under which set the Rules page has these rules.
-    linked = SHOWN_AS.get(replay.order.rules)
+    linked = SET_ON_RULES_PAGE.get(replay.order.rules)
     last = len(steps) - 1
     if "_step" in st.session_state:
         st.session_state["step"] = st.session_state.pop("_step")
@@ -199,7 +199,7 @@ def changes(replay: ReplayPair, current: int, mark: str) -> None:
         )
         st.html(
             f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changed):,} of '
-            f"{len(replay.steps):,} steps were changed. {flips_text(replay.shown)}</span>"
+            f"{len(replay.steps):,} steps were changed. {flips_text(replay.main_episode)}</span>"
         )
 
 

@@ -43,12 +43,12 @@ class Observed(NamedTuple):
     """Whose observations they are.
 
     Attributes:
-        whose: In a sentence, as "CartPole-v1" or "CartPole-v1 behind FilterObservation".
+        owner: In a sentence, as "CartPole-v1" or "CartPole-v1 behind FilterObservation".
         env_id: Of the environment whose features they are; "" where a wrapper may have changed
             what they are, or nothing says.
     """
 
-    whose: str
+    owner: str
     env_id: str
 
 
@@ -92,13 +92,13 @@ def behind(layers: Iterable[Layer], env_id: str) -> Observed:
     Raises:
         InputError: If one of the wrappers normalises them.
     """
-    whose = env_id.rsplit(":", 1)[-1] or "the environment"
+    owner = env_id.rsplit(":", 1)[-1] or "the environment"
     for name, classes in layers:
         if any(issubclass(one, gymnasium.wrappers.NormalizeObservation) for one in classes):
             raise normalised(name)
         if not classes or not all(hands_on(one, "step", "reset") for one in classes):
-            return Observed(f"{whose} behind {name}", "")
-    return Observed(whose, env_id)
+            return Observed(f"{owner} behind {name}", "")
+    return Observed(owner, env_id)
 
 
 def normalised(name: str) -> InputError:
