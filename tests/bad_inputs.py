@@ -368,7 +368,8 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
     "npz named csv": ("demo.csv", npz_bytes(**good_arrays()), ("ZIP", ".npz")),
     "npz named parquet": ("demo.parquet", npz_bytes(**good_arrays()), ("ZIP", ".npz")),
     "parquet named npz": ("demo.npz", parquet_bytes(), ("Parquet", ".parquet")),
-    "unknown extension": ("demo.xlsx", csv_bytes(*ROWS), ("'.xlsx'", ".parquet")),
+    "unknown extension": ("demo.mat", csv_bytes(*ROWS), ("'.mat'", ".parquet")),
+    "csv named xlsx": ("demo.xlsx", csv_bytes(*ROWS), (".xlsx", "not Excel", ".csv")),
     "no extension": ("demo", csv_bytes(*ROWS), ("no extension",)),
     "latin-1 csv": (
         "demo.csv",

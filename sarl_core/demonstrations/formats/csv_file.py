@@ -16,7 +16,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.parquet_file import column_from_arrow
-from sarl_core.demonstrations.formats.tables import TableColumn, check_names, columns_of
+from sarl_core.demonstrations.formats.tables import TableColumn, as_float32, check_names, columns_of
 from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
@@ -119,7 +119,7 @@ class CsvTable:
         left = dict(zip(columns.used, table.columns, strict=True))
         del table
         return {
-            name: _as_float32(column_from_arrow(name, left.pop(name)))
+            name: as_float32(column_from_arrow(name, left.pop(name)))
             if name in columns.observations
             else column_from_arrow(name, left.pop(name))
             for name in columns.used
@@ -199,11 +199,6 @@ class CsvTable:
         if re.search(rb'"', self.body):
             return f"row {row}"
         return f"row {row} (line {self.first_line - 1 + _line_of(self.body, row)})"
-
-
-def _as_float32(column: TableColumn) -> TableColumn:
-    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
-        return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
 
 
 class _Lines(NamedTuple):

@@ -30,7 +30,7 @@ from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
 from sarl_core.errors import InputError
 from sarl_core.limits import require_memory, table_memory
 
-_KEYS = {
+ARRAY_KEYS = {
     "observations": ("observations", "obs", "observation", "states", "state"),
     "actions": ("actions", "acts", "action", "act"),
     "episodes": ("episodes", "episode", "episode_ids", "episode_id"),
@@ -74,6 +74,25 @@ def read_npz(data: memoryview) -> Recording:
         if stored.dtype.kind != "U" or stored.ndim != 0:
             raise InputError(f"its metadata {KEY!r} is not text; save the file again, or without")
         metadata = decode_metadata(str(stored))
+    return recording_of_arrays(arrays, keys, metadata)
+
+
+def recording_of_arrays(
+    arrays: Mapping[str, NDArray[Any]], keys: Mapping[str, str], metadata: Metadata
+) -> Recording:
+    """What arrays hold that have a row, or an entry, for each step.
+
+    Args:
+        arrays: By what they are, as "observations"; those and "actions" at least.
+        keys: The names they stand under, by what they are.
+        metadata: What the file says besides.
+
+    Returns:
+        The recording.
+
+    Raises:
+        InputError: If their shapes do not fit what they are.
+    """
     observations, actions = arrays["observations"], arrays["actions"]
     if observations.ndim == 1:
         observations = observations[:, None]
@@ -226,7 +245,7 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
         entries = arrays_in(archive)
         wanted = {
             what: key
-            for what, keys in _KEYS.items()
+            for what, keys in ARRAY_KEYS.items()
             if (key := next((key for key in keys if key in entries), None)) is not None
         }
         for what in ("observations", "actions"):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import PurePath, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -73,36 +74,32 @@ def holds_actions(name: str) -> bool:
     return _word(name, _OBSERVATIONS) is None and _word(name, _ACTIONS) is not None
 
 
-def pair_in_folder(folder: Path) -> tuple[Path, Path]:
-    """The pair of files in a folder.
+def pair_among(paths: Iterable[str]) -> tuple[str, str] | None:
+    """The pair of files among several.
 
     Args:
-        folder: To look into.
+        paths: Of all of them, with `/` between folders.
 
     Returns:
-        Paths of the observations and of the actions.
+        The observations and the actions; None if there is no pair.
 
     Raises:
-        InputError: If there is no pair, or more than one.
+        InputError: If there is more than one.
     """
-    names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    names = set(paths)
     pairs = [
-        (folder / name, folder / other)
-        for name in names
-        if not holds_actions(name)
-        for other in partner_names(name)
-        if other in names
+        (path, other)
+        for path in sorted(names)
+        if not holds_actions(PurePath(path).name)
+        for partner in partner_names(PurePath(path).name)
+        if (other := PurePosixPath(path).with_name(partner).as_posix()) in names
     ]
-    if not pairs:
-        raise InputError(
-            "it is a folder without obs.csv and actions.csv; give a file, or a folder with those"
-        )
     if len(pairs) > 1:
         raise InputError(
             f"it is a folder with {len(pairs)} pairs of observations and actions; "
             "give one of the files"
         )
-    return pairs[0]
+    return pairs[0] if pairs else None
 
 
 def is_complete(

@@ -1,30 +1,45 @@
-"""One way in and one way out: the file's extension chooses the format."""
+"""One way in and one way out: names and contents of files choose the format."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import ColumnMap
-from sarl_core.demonstrations.formats.csv_file import open_csv, write_csv
+from sarl_core.demonstrations.formats.hubs.hub import OpenedTable, open_hub
+from sarl_core.demonstrations.formats.hubs.minari import MAIN_FILE, METADATA
+from sarl_core.demonstrations.formats.kinds import (
+    FORMATS,
+    WRITTEN,
+    ZIP,
+    extension_of,
+    format_of,
+    unpacked,
+)
 from sarl_core.demonstrations.formats.naming import naming, naming_both
-from sarl_core.demonstrations.formats.npz_file import read_npz, write_npz
 from sarl_core.demonstrations.formats.pair import (
     alone_note,
     fits,
     holds_actions,
     is_complete,
-    pair_in_folder,
+    pair_among,
     pair_note,
     partner_names,
     read_pair,
 )
-from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, write_parquet
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
-from sarl_core.demonstrations.formats.tables import Table, recording_from_table
+from sarl_core.demonstrations.formats.sets.file_set import (
+    FileSet,
+    files_at,
+    files_given,
+    files_in_archive,
+    files_in_folder,
+)
+from sarl_core.demonstrations.formats.sets.table_set import open_tables
+from sarl_core.demonstrations.formats.tables import recording_from_table
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require
@@ -32,56 +47,23 @@ from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 
 Content = bytes | bytearray | memoryview | BinaryIO
-
-
-@dataclass(frozen=True)
-class FileFormat:
-    """How files of one extension are read and written.
-
-    Attributes:
-        kind: What such a file is, in words.
-        write: Writes demonstrations.
-        open_table: Opens a file with named columns; None where there are none.
-        read: Reads a file without; None where there is `open_table`.
-    """
-
-    kind: str
-    write: Callable[[Demonstrations, BinaryIO], None]
-    open_table: Callable[[memoryview], Table] | None = None
-    read: Callable[[memoryview], Recording] | None = None
-
-
-_FORMATS = {
-    ".parquet": FileFormat("Parquet", write_parquet, open_table=open_parquet),
-    ".csv": FileFormat("CSV", write_csv, open_table=open_csv),
-    ".npz": FileFormat("NPZ", write_npz, read=read_npz),
-}
-EXTENSIONS = tuple(_FORMATS)
-
-# How a file begins, what that makes it, and the extension it should have then.
-_SIGNATURES = (
-    (MAGIC, "Parquet", ".parquet"),
-    (b"PK\x03\x04", "a ZIP archive", ".npz"),
-    (b"PK\x05\x06", "a ZIP archive", ".npz"),
-    (b"\x93NUMPY", "a single NumPy array", None),
-    (b"\x89HDF", "HDF5", None),
-    (b"\x1f\x8b", "compressed with gzip", None),
-    (b"ARROW1", "Arrow", None),
-    (b"\x80\x02", "a pickle, which may run code and is never opened", None),
-    (b"\x80\x03", "a pickle, which may run code and is never opened", None),
-    (b"\x80\x04", "a pickle, which may run code and is never opened", None),
-    (b"\x80\x05", "a pickle, which may run code and is never opened", None),
-)
+_PATTERN = frozenset("*?[")
 
 
 def load_demonstrations(
-    path: str | Path, *, env_id: EnvironmentOrId | None = None, columns: ColumnMap | None = None
+    path: str | Path | Sequence[str | Path],
+    *,
+    env_id: EnvironmentOrId | None = None,
+    columns: ColumnMap | None = None,
 ) -> Demonstrations:
-    """Load demonstrations from a file, or from the paper's pair of files.
+    """Load demonstrations from a file, a folder, or several files.
 
     Args:
-        path: A .parquet, .csv or .npz file; `obs.csv` with `actions.csv` beside it; or a folder
-            with those two.
+        path: A file of one of `EXTENSIONS` (`.gz` after it where it is compressed); `obs.csv`
+            with `actions.csv` beside it; a folder, or the ZIP of one, as Minari, LeRobot and
+            Hugging Face's `datasets` write them, with such a pair, or with tables of the same
+            columns; several such tables; or a pattern as `runs/*.csv` that names them. Where no
+            column numbers the episodes, each of several files is one.
         env_id: Environment to take spaces, names and bounds from where the file has none.
         columns: Which columns of a table hold what; None to go by their names.
 
@@ -95,25 +77,35 @@ def load_demonstrations(
         must = "the map of columns must be a ColumnMap"
         require(columns, ColumnMap, must, "make one, of sarl_core.demonstrations.formats")
     description = describe_environment(env_id) if env_id else None
-    path = as_path(path)
+    if isinstance(path, Sequence) and not isinstance(path, str):
+        paths = [as_path(one) for one in path]
+        path = paths[0] if len(paths) == 1 else path
+    else:
+        paths = _named_by(as_path(path))
+        path = paths[0] if len(paths) == 1 else path
+    if len(paths) != 1:
+        name = str(path) if isinstance(path, str | Path) else f"{len(paths)} files"
+        with naming(name):
+            return _read_set(files_at(paths, name), description, columns)
+    (path,) = paths
     with naming(str(path)):
-        if path.is_dir():
-            pair = pair_in_folder(path)
-        elif not path.exists():
+        files = _files_of(path)
+        if files is not None:
+            return _read_set(files, description, columns)
+        if not path.exists():
             raise InputError("there is no such file; check its name")
-        else:
-            names = partner_names(path.name) if columns is None else ()
-            partner = next(
-                (path.with_name(name) for name in names if path.with_name(name).is_file()), None
-            )
-            if partner is None:
-                return _read(_content(path), path.name, description, columns)
-            content = _content(path)
-            _check_signature(content, path.name)
-            if is_complete(content, path.name, partner.name, description):
-                alone = _read(content, path.name, description, columns)
-                return _noted(alone, alone_note(path.name, partner.name))
-            pair = (partner, path) if holds_actions(path.name) else (path, partner)
+        names = partner_names(path.name) if columns is None else ()
+        partner = next(
+            (path.with_name(name) for name in names if path.with_name(name).is_file()), None
+        )
+        if partner is None:
+            return _read(_content(path), path.name, description, columns)
+        content = _content(path)
+        unpacked(content, path.name)
+        if is_complete(content, path.name, partner.name, description):
+            alone = _read(content, path.name, description, columns)
+            return _noted(alone, alone_note(path.name, partner.name))
+        pair = (partner, path) if holds_actions(path.name) else (path, partner)
         contents = _content(pair[0]), _content(pair[1])
     return _read_pair(contents, (str(pair[0]), str(pair[1])), description)
 
@@ -173,40 +165,166 @@ def save_demonstrations(demonstrations: Demonstrations, path: str | Path) -> Non
     require(demonstrations, Demonstrations, must, "call save_demonstrations(demonstrations, path)")
     path = as_path(path)
     with naming(str(path)):
-        form = _format(path.name)
+        form = format_of(path.name)
+        if form.write is None:
+            raise InputError(f"{form.kind} is read and not written; name it {' or '.join(WRITTEN)}")
         if path.is_dir():
             raise InputError("it is a folder; give a file in it")
         with whole_file(path) as unfinished, unfinished.open("xb") as out:
             form.write(demonstrations, out)
 
 
-def table_columns(source: str | Path | Content, name: str | None = None) -> tuple[str, ...]:
-    """Columns of a tabular file, for a person to map.
+def read_files(
+    files: Sequence[tuple[Content, str]],
+    *,
+    env_id: EnvironmentOrId | None = None,
+    columns: ColumnMap | None = None,
+) -> Demonstrations:
+    """Read demonstrations from files that were uploaded together.
 
     Args:
-        source: A path, or the content of a file.
+        files: Content and name of each: one file, the ZIP of a folder, the pair of observations
+            and actions, or several tables of the same columns.
+        env_id: As for `load_demonstrations`.
+        columns: As for `load_demonstrations`.
+
+    Returns:
+        The demonstrations.
+
+    Raises:
+        InputError: As `load_demonstrations`.
+    """
+    first, *others = files
+    if not others:
+        return read_demonstrations(*first, env_id=env_id, columns=columns)
+    if _are_pair([name for _, name in files]):
+        return read_demonstrations(*first, env_id=env_id, columns=columns, companion=others[0])
+    description = describe_environment(env_id) if env_id else None
+    return _read_set(_given(files), description, columns)
+
+
+def table_columns(
+    source: str | Path | Content | list[tuple[Content, str]], name: str | None = None
+) -> tuple[str, ...]:
+    """Columns of a tabular file, or of several, for a person to map.
+
+    Args:
+        source: A path, the content of a file, or content and name of several files.
         name: The file's name, needed with content.
 
     Returns:
-        Names of the columns, "column 1"... for CSV without a header; () for a file without
-        columns (.npz).
+        Names of the columns, "column 1"... for CSV without a header; () for what has no columns
+        (.npz).
 
     Raises:
         InputError: If the file cannot be opened.
     """
+    if isinstance(source, list):
+        if len(source) > 1:
+            return () if _are_pair([each for _, each in source]) else _columns(_given(source))
+        ((source, name),) = source
     if isinstance(source, (str, Path)):
         path = Path(source)
         name = name or str(path)
         with naming(name):
+            files = _files_of(path)
+            if files is not None:
+                return _columns(files)
             content = _content(path)
     else:
         name = name or "the file"
         with naming(name):
             content = _bytes(source)
     with naming(name):
-        form = _format(name)
-        _check_signature(content, name)
+        if extension_of(name) == ZIP:
+            return _columns(files_in_archive(unpacked(content, name), name))
+        form = format_of(name)
+        content = unpacked(content, name)
         return form.open_table(content).names if form.open_table is not None else ()
+
+
+def _named_by(path: Path) -> list[Path]:
+    """The files that a path, or a pattern in its place, names."""
+    if path.exists() or not _PATTERN.intersection(str(path)):
+        return [path]
+    root = Path(path.anchor)
+    names = list(root.glob(str(path.relative_to(root))))
+    if not names:
+        raise InputError(f"{path}: no file has a name of this pattern; check it")
+    return names
+
+
+def _files_of(path: Path) -> FileSet | None:
+    """The files that a path stands for, None if it is one file."""
+    if path.is_dir():
+        return files_in_folder(path)
+    if path.name == MAIN_FILE and path.with_name(METADATA).is_file():
+        return files_at([path, path.with_name(METADATA)], path.name)
+    if path.suffix.lower() == ZIP and path.is_file():
+        return files_in_archive(unpacked(_content(path), path.name), path.name)
+    return None
+
+
+def _given(files: Sequence[tuple[Content, str]]) -> FileSet:
+    contents = []
+    for data, name in files:
+        with naming(name):
+            contents.append((name, _bytes(data)))
+    return files_given(contents, f"{len(files)} files")
+
+
+def _are_pair(names: Sequence[str]) -> bool:
+    """Whether two files are the observations and the actions of one another."""
+    return len(names) == 2 and (
+        names[0] in partner_names(names[1])
+        or names[1] in partner_names(names[0])
+        or holds_actions(names[0]) != holds_actions(names[1])
+    )
+
+
+def _opened_set(files: FileSet) -> Recording | OpenedTable:
+    """What several files hold together."""
+    hub = open_hub(files)
+    if hub is not None:
+        return hub
+    arrays = [
+        path
+        for path in files.sizes
+        if (form := FORMATS.get(extension_of(path))) is not None and form.read is not None
+    ]
+    tables = [path for path in files.sizes if extension_of(path) in FORMATS and path not in arrays]
+    if len(arrays) == 1 and not tables:
+        with naming(arrays[0]):
+            read = format_of(arrays[0]).read
+            assert read is not None
+            return read(unpacked(files.content(arrays[0]), arrays[0]))
+    table, notes = open_tables(files)
+    return OpenedTable(table, notes=notes)
+
+
+def _columns(files: FileSet) -> tuple[str, ...]:
+    opened = _opened_set(files)
+    return opened.table.names if isinstance(opened, OpenedTable) else ()
+
+
+def _read_set(
+    files: FileSet, description: EnvironmentDescription | None, columns: ColumnMap | None
+) -> Demonstrations:
+    pair = pair_among(files.sizes)
+    if pair is not None and columns is None:
+        contents = files.contents(pair)
+        return _read_pair((contents[pair[0]], contents[pair[1]]), pair, description)
+    opened = _opened_set(files)
+    if isinstance(opened, Recording):
+        if columns is not None:
+            raise InputError(
+                "columns are mapped in a table, and this data set has none; leave the map out"
+            )
+        return to_demonstrations(opened, description)
+    chosen = columns if columns is not None else opened.columns
+    recording = recording_from_table(opened.table, chosen, description)
+    recording = replace(recording, notes=(*opened.notes, *recording.notes))
+    return to_demonstrations(recording, description)
 
 
 def _read_named(
@@ -225,8 +343,10 @@ def _read(
     description: EnvironmentDescription | None,
     columns: ColumnMap | None,
 ) -> Demonstrations:
-    form = _format(name)
-    _check_signature(content, name)
+    if extension_of(name) == ZIP:
+        return _read_set(files_in_archive(unpacked(content, name), name), description, columns)
+    form = format_of(name)
+    content = unpacked(content, name)
     if form.open_table is None:
         assert form.read is not None
         if columns is not None:
@@ -258,7 +378,7 @@ def _read_pair(
                     raise InputError(
                         "a pair of observations and actions is two .csv files; give those"
                     )
-                _check_signature(content, name)
+                unpacked(content, name)
         recording = read_pair(*contents, names)
         with naming(f"{names[0]} with {names[1]}"):
             return _noted(to_demonstrations(recording, description), pair_note(names))
@@ -266,33 +386,6 @@ def _read_pair(
 
 def _noted(demonstrations: Demonstrations, note: str) -> Demonstrations:
     return replace(demonstrations, notes=(*demonstrations.notes, note))
-
-
-def _format(name: str) -> FileFormat:
-    extension = PurePath(name).suffix.lower()
-    if extension not in _FORMATS:
-        says = f"ends in {extension!r}" if extension else "has no extension"
-        raise InputError(f"it {says}, which is none of {', '.join(EXTENSIONS)}; convert it")
-    return _FORMATS[extension]
-
-
-def _check_signature(content: memoryview, name: str) -> None:
-    """Refuse a file whose content is not what its extension says."""
-    extension = PurePath(name).suffix.lower()
-    kind = _FORMATS[extension].kind
-    if len(content) == 0:
-        raise InputError("it is empty (0 bytes); save or download it again")
-    signature = next(
-        (entry for entry in _SIGNATURES if bytes(content[:6]).startswith(entry[0])), None
-    )
-    if signature is not None and signature[2] != extension:
-        _, what, right = signature
-        cure = f"name it {right}" if right is not None else f"save it as {EXTENSIONS[0]} or {kind}"
-        raise InputError(f"it is named {extension}, but its content is {what}; {cure}")
-    if signature is None and extension != ".csv":
-        raise InputError(
-            f"it is named {extension}, but its content is not {kind}; if it is text, name it .csv"
-        )
 
 
 def _content(path: Path) -> memoryview:

@@ -67,6 +67,12 @@ class TableColumn:
     missing: NDArray[np.bool_] | None = None
 
 
+def as_float32(column: TableColumn) -> TableColumn:
+    """A column in the numbers that rules compare."""
+    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
+        return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
+
+
 def check_names(names: Sequence[str]) -> None:
     """Refuse a table with too many columns, a name nobody can read, or two of one name."""
     if len(names) > MAX_COLUMNS:

@@ -1,0 +1,1 @@
+"""HDF5: read with care, in the layouts in which demonstrations circulate."""

@@ -1,0 +1,246 @@
+"""Tables of the same columns in several files, one after the other as one table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.formats.columns import SINGLES, ColumnMap, guess_roles, listed
+from sarl_core.demonstrations.formats.kinds import FORMATS, extension_of, format_of, unpacked
+from sarl_core.demonstrations.formats.metadata import Metadata
+from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.sets.file_set import FileSet
+from sarl_core.demonstrations.formats.tables import Table, TableColumn
+from sarl_core.errors import InputError
+from sarl_core.limits import require_memory
+
+_EPISODE = "episode"  # the column that says which file a row is from
+_MARKS = ("step", "terminated", "truncated", "first", "last")
+
+
+@dataclass(frozen=True)
+class TableSet:
+    """Several tables of the same columns.
+
+    Attributes:
+        files: Their paths, in the order of the set.
+        tables: The opened tables.
+        marks: Where no column numbers the episodes and each file begins one: what else says in
+            a file that another one begins, by what it is. None where a column numbers them.
+        size: Bytes of all files.
+    """
+
+    files: tuple[str, ...]
+    tables: tuple[Table, ...]
+    marks: Mapping[str, str] | None
+    size: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns, which are the same in every file."""
+        own = self.tables[0].names
+        return own if self.marks is None else (*own, _EPISODE)
+
+    @property
+    def named(self) -> bool:
+        """Whether those names stand in the files."""
+        return self.tables[0].named
+
+    @property
+    def metadata(self) -> Metadata:
+        """What the first file says besides."""
+        return self.tables[0].metadata
+
+    def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
+        """Numbers of the columns that a map uses.
+
+        Args:
+            columns: The map.
+
+        Returns:
+            A column for each name.
+
+        Raises:
+            InputError: As of a single table, with the name of the file.
+        """
+        own = columns if self.marks is None else _without_episode(columns)
+        parts: list[dict[str, TableColumn]] = []
+        begins: list[NDArray[np.bool_]] = []
+        size = self.size
+        for file, table in zip(self.files, self.tables, strict=True):
+            with naming(file):
+                read = table.read(own if own.used else ColumnMap((), table.names[:1]))
+                parts.append(read)
+                size += sum(column.values.nbytes for column in read.values())
+                require_memory(size)
+                n = len(next(iter(read.values())).values)
+                marked = table.read(ColumnMap((), tuple((self.marks or {}).values())))
+                begins.append(_begins(n, self.marks or {}, marked))
+        joined = {name: _joined([part[name] for part in parts]) for name in own.used}
+        if self.marks is not None and _EPISODE in columns.used:
+            joined[_EPISODE] = TableColumn(np.cumsum(np.concatenate(begins)) - 1)
+        elif columns.episode is not None:
+            joined[columns.episode] = _renumbered(joined[columns.episode], list(map(len, begins)))
+        return {name: joined[name] for name in columns.used}
+
+
+def open_tables(files: FileSet) -> tuple[Table, tuple[str, ...]]:
+    """Open the tables among some files as one.
+
+    Args:
+        files: Of which others than tables are left alone.
+
+    Returns:
+        The table, and notes on how it was put together.
+
+    Raises:
+        InputError: If there are none, files of several formats, or files whose columns differ.
+    """
+    paths = _tables_among(files)
+    tables: list[Table] = []
+    contents = files.contents(paths)
+    for path in paths:
+        with naming(path):
+            open_table = format_of(path).open_table
+            assert open_table is not None
+            tables.append(open_table(unpacked(contents.pop(path), path)))
+        if len(paths) == 1 and not tables[0].named:
+            raise _without_tables(files)
+        with naming(path):
+            _require_same(tables[0], tables[-1], paths[0])
+    size = sum(files.sizes[path] for path in paths)
+    if len(tables) == 1:
+        return tables[0], ()
+    first = guess_roles(tables[0].names).columns
+    marks = None
+    if first.episode is None and _EPISODE not in tables[0].names:
+        marks = {role: name for role, name in first.singles.items() if role in _MARKS}
+    table = TableSet(tuple(paths), tuple(tables), marks, size)
+    how = f"{len(paths):,} files were read as one set, from {paths[0]!r} to {paths[-1]!r}"
+    each = "" if marks is None else "; each begins an episode, as no column numbers them"
+    return table, (f"{how}{each}",)
+
+
+def _tables_among(files: FileSet) -> list[str]:
+    """The files to read: those of the one format that tables are in."""
+    by_kind: dict[str, list[str]] = {}
+    for path in files.sizes:
+        form = FORMATS.get(extension_of(path))
+        if form is not None and form.open_table is not None:
+            by_kind.setdefault(form.kind, []).append(path)
+    if len(by_kind) > 1:  # JSON says something about what lies beside it
+        by_kind.pop("JSON", None)
+    if not by_kind:
+        raise _without_tables(files)
+    if len(by_kind) > 1:
+        first, second = (f"{kind} ({paths[0]!r})" for kind, paths in list(by_kind.items())[:2])
+        raise InputError(
+            f"it holds files of several formats, {first} and {second}; give those of one"
+        )
+    return next(iter(by_kind.values()))
+
+
+def _without_tables(files: FileSet) -> InputError:
+    return InputError(
+        f"it is {files.what} without obs.csv and actions.csv, and without any other file that "
+        "holds a table with names; give a file, or a folder with those"
+    )
+
+
+def _require_same(first: Table, table: Table, path: str) -> None:
+    """Refuse a file whose columns are not those of the first."""
+    if not table.named:
+        raise InputError(
+            "it has no header, and several files are put together by the names of their columns; "
+            "write one into each"
+        )
+    if table.names == first.names:
+        return
+    lacking = [name for name in first.names if name not in table.names]
+    surplus = [name for name in table.names if name not in first.names]
+    if lacking:
+        what = f"it has no column {listed(lacking[:1])}, and {path!r} has"
+    elif surplus:
+        what = f"it has a column {listed(surplus[:1])}, and {path!r} has none"
+    else:
+        return  # in another order, which the names mend
+    raise InputError(f"{what}; give files of the same columns")
+
+
+def _begins(n: int, marks: Mapping[str, str], read: Mapping[str, TableColumn]) -> NDArray[np.bool_]:
+    """Which of the n rows of a file begin an episode: the first, and those that marks say."""
+    begins = np.zeros(n, dtype=np.bool_)
+    begins[:1] = True
+    for role, name in marks.items():
+        values = read[name].values
+        if role == "step":
+            begins[1:] |= values[1:] <= values[:-1]
+        elif role == "first":
+            begins |= values != 0
+        else:
+            begins[1:] |= values[:-1] != 0
+    return begins
+
+
+def _without_episode(columns: ColumnMap) -> ColumnMap:
+    """The map without the column that no file has."""
+    return replace(
+        columns,
+        observations=tuple(name for name in columns.observations if name != _EPISODE),
+        actions=tuple(name for name in columns.actions if name != _EPISODE),
+        **{role: None for role in SINGLES if getattr(columns, role) == _EPISODE},
+    )
+
+
+def _joined(parts: Sequence[TableColumn]) -> TableColumn:
+    missing: NDArray[np.bool_] | None = None
+    if any(part.missing is not None for part in parts):
+        missing = np.concatenate(
+            [
+                np.zeros(len(part.values), np.bool_) if part.missing is None else part.missing
+                for part in parts
+            ]
+        )
+    return TableColumn(np.concatenate([part.values for part in parts]), missing)
+
+
+def _renumbered(column: TableColumn, lengths: Sequence[int]) -> TableColumn:
+    """The numbers of episodes, where those of each file begin again."""
+    values: NDArray[Any] = column.values
+    if values.dtype.kind not in "iu":
+        return column
+    ends = np.cumsum(lengths)
+    parts = np.split(values.astype(np.int64), ends[:-1])
+    seen: set[int] = set()
+    for part in parts:
+        numbers = set(np.unique(part).tolist())
+        if seen & numbers:
+            break
+        seen |= numbers
+    else:
+        return column  # each episode has a number of its own
+    if _continues(parts):
+        return column
+    after = 0
+    numbered = []
+    for part in parts:
+        numbered.append(part - part.min() + after)
+        after = int(numbered[-1].max()) + 1
+    return TableColumn(np.concatenate(numbered), column.missing)
+
+
+def _continues(parts: Sequence[NDArray[np.int64]]) -> bool:
+    """Whether files are pieces of one table, cut anywhere: the numbers go on from each to the next.
+
+    Files that hold one episode each, all of one number, do not.
+    """
+    rising = all(
+        bool(np.all(np.diff(np.concatenate([before[-1:], part])) >= 0))
+        for before, part in pairwise(parts)
+    )
+    return rising and any(part[0] != parts[0][0] or part[-1] != parts[0][0] for part in parts)
