@@ -31,7 +31,7 @@ _ROLES = {
 }
 
 
-class _Field(msgspec.Struct):
+class _LeRobotField(msgspec.Struct):
     """One entry of `features`."""
 
     dtype: str
@@ -39,11 +39,11 @@ class _Field(msgspec.Struct):
     names: Any = None
 
 
-class _Info(msgspec.Struct):
+class _LeRobotInfo(msgspec.Struct):
     """What stands in `meta/info.json`, which says more."""
 
     codebase_version: str
-    features: dict[str, _Field]
+    features: dict[str, _LeRobotField]
 
 
 def open_lerobot(files: FileSet) -> tuple[Table, ColumnMap, tuple[str, ...]]:
@@ -85,7 +85,7 @@ def open_lerobot(files: FileSet) -> tuple[Table, ColumnMap, tuple[str, ...]]:
     return table, chosen, notes
 
 
-def _info(content: memoryview) -> _Info:
+def _info(content: memoryview) -> _LeRobotInfo:
     try:
         document = parse_json(bytes(content), finite=False)
         version = document.get("codebase_version") if isinstance(document, dict) else None
@@ -94,7 +94,7 @@ def _info(content: memoryview) -> _Info:
                 f"the data set is of LeRobot's version {quoted(version)}, and this program reads "
                 f"{', '.join(_VERSIONS)}; convert it with LeRobot"
             )
-        return conformed(document, _Info)
+        return conformed(document, _LeRobotInfo)
     except InputError:
         raise
     except ValueError as error:
@@ -103,7 +103,7 @@ def _info(content: memoryview) -> _Info:
         raise InputError(f"it {what}; save the data set again with LeRobot") from error
 
 
-def _columns(fields: Mapping[str, _Field], word: str, table: Table) -> dict[str, str]:
+def _columns(fields: Mapping[str, _LeRobotField], word: str, table: Table) -> dict[str, str]:
     """What features or actions are called, by the columns that they stand in.
 
     Args:
@@ -125,7 +125,7 @@ def _columns(fields: Mapping[str, _Field], word: str, table: Table) -> dict[str,
     }
 
 
-def _named(name: str, field: _Field, word: str, table: Table) -> Iterator[tuple[str, str]]:
+def _named(name: str, field: _LeRobotField, word: str, table: Table) -> Iterator[tuple[str, str]]:
     """The columns of a vector, and what its numbers are called."""
     size = math.prod(field.shape)
     if size > MAX_FEATURES:

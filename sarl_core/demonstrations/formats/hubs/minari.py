@@ -41,7 +41,7 @@ _EPISODE_FILE = re.compile(r"(?:.*/)?(\d{1,18})/[^/]*\.(?:arrow|parquet)")
 _MARKS = ("rewards", "terminations", "truncations")
 
 
-class _Said(msgspec.Struct):
+class _MinariMetadata(msgspec.Struct):
     """What stands in the metadata, which may say more."""
 
     observation_space: str
@@ -140,9 +140,9 @@ def read_minari(files: FileSet) -> Recording:
     )
 
 
-def _metadata(content: memoryview) -> _Said:
+def _metadata(content: memoryview) -> _MinariMetadata:
     try:
-        said = conformed(parse_json(bytes(content)), _Said)
+        said = conformed(parse_json(bytes(content)), _MinariMetadata)
     except InputError:
         raise
     except ValueError as error:
@@ -158,7 +158,7 @@ def _metadata(content: memoryview) -> _Said:
 
 
 def _described(
-    said: _Said, observed: tuple[SpacePart, ...], acted: tuple[SpacePart, ...]
+    said: _MinariMetadata, observed: tuple[SpacePart, ...], acted: tuple[SpacePart, ...]
 ) -> Metadata:
     """What the file says besides: names by the keys of its spaces, else by its environment."""
     kinds = {bool(part.counts) for part in acted}
