@@ -1,4 +1,7 @@
-"""Which ends of episodes are failures: a crash, a fall, whatever the task must not let happen."""
+"""What is known of failures without asking: a crash, a fall, whatever a task must not let happen.
+
+Who knows more says so (`signals`).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import re
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 
 _EVERY_END, _NO_END = "every end", "no end"
 # What an end that is no time limit means, of Gymnasium's own environments by their full names: of
@@ -31,6 +36,10 @@ _FAILURES: dict[str, str | float] = {
 }
 
 
+# Packages whose every environment says so itself, and by which key of `info`.
+_INFO_KEYS = {"highway_env": "crashed"}
+
+
 def failed(
     env_id: str, terminated: NDArray[np.bool_], last_rewards: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
@@ -46,16 +55,16 @@ def failed(
         last_rewards: Reward of each episode's last step, (E,).
 
     Returns:
-        Shape (E,); of an environment in which it is not known, none.
+        Shape (E,); of an environment in which the ends do not tell, none.
     """
-    meaning = _failure(env_id)
+    meaning = _end_of_failure(env_id)
     if isinstance(meaning, float):
         return np.asarray(terminated & (last_rewards == meaning))
     return np.asarray(terminated & (meaning == _EVERY_END))
 
 
-def failure_known(env_id: str) -> bool:
-    """Whether it is known which ends of an environment's episodes are failures.
+def ends_tell(env_id: str) -> bool:
+    """Whether it is known which ends of an environment's episodes are failures, and some are.
 
     Args:
         env_id: Environment.
@@ -63,36 +72,74 @@ def failure_known(env_id: str) -> bool:
     Returns:
         False for an environment that this project knows nothing of, and for one that cannot fail.
     """
-    return not no_failures_text(env_id)
+    return _end_of_failure(env_id) not in (None, _NO_END)
 
 
-def cannot_fail(env_id: str) -> bool:
-    """Whether no end of an environment's episodes is a failure.
+def info_key(env_id: str) -> str:
+    """The key of ``info`` by which an environment says itself that it has failed.
 
     Args:
         env_id: Environment.
+
+    Returns:
+        "" where it is not known.
+    """
+    return _INFO_KEYS.get(_package(env_id), "")
+
+
+def failure_known(environment: EnvironmentOrId) -> bool:
+    """Whether it is known which of an environment's episodes are failures.
+
+    Args:
+        environment: Its id, or with what its caller calls a failure.
+
+    Returns:
+        False for an environment that neither this project nor its caller knows, and for one that
+        cannot fail.
+    """
+    return not no_failures_text(environment)
+
+
+def cannot_fail(environment: EnvironmentOrId) -> bool:
+    """Whether no end of an environment's episodes is a failure.
+
+    Args:
+        environment: Its id, or with what its caller calls a failure.
 
     Returns:
         False where it is not known.
     """
-    return _failure(env_id) == _NO_END
+    environment = as_environment(environment)
+    return not environment.failure and _end_of_failure(environment.id) == _NO_END
 
 
-def no_failures_text(env_id: str) -> str:
+def no_failures_text(environment: EnvironmentOrId) -> str:
     """Why nothing is said of failures in an environment.
 
     Args:
-        env_id: Environment.
+        environment: Its id, or with what its caller calls a failure.
 
     Returns:
-        A clause; "" where it is known which ends of its episodes are failures.
+        A clause; "" where it is known which of its episodes are failures.
     """
-    if _failure(env_id) is None:
-        return "nothing says which ends of this environment's episodes are failures"
-    if cannot_fail(env_id):
+    environment = as_environment(environment)
+    if environment.failure or ends_tell(environment.id) or info_key(environment.id):
+        return ""
+    if cannot_fail(environment):
         return "no end of this environment's episodes is a failure"
-    return ""
+    return "nothing says which ends of this environment's episodes are failures"
 
 
-def _failure(env_id: str) -> str | float | None:
+def _end_of_failure(env_id: str) -> str | float | None:
     return _FAILURES.get(re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1]))
+
+
+def _package(env_id: str) -> str:
+    """The package that an environment's class is from, as far as that can be told unmade."""
+    from gymnasium.envs.registration import registry
+
+    module, _, bare = env_id.rpartition(":")
+    spec = registry.get(bare)
+    if spec is not None and isinstance(spec.entry_point, str):
+        module = spec.entry_point
+    return module.partition(":")[0].partition(".")[0]
