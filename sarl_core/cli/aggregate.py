@@ -187,12 +187,10 @@ def aggregate(
 
 def _beside(reported: dict[str, Any], env_id: str) -> list[str]:
     """How often these episodes failed, and what the rules left to choose from."""
-    from sarl_core.cli.answers import failures_text, freedom_text
+    from sarl_core.rollouts.failures import safety_facts
 
-    return [
-        f"Failures: {failures_text(reported, reported['episodes'], env_id)}.",
-        f"Freedom: {freedom_text(reported)}.",
-    ]
+    facts = safety_facts(reported, reported["episodes"], env_id, shielded=True)
+    return [f"{what[0].upper()}{what[1:]}: {text}." for what, text in facts]
 
 
 def _agents(
@@ -252,6 +250,7 @@ def _gaps(
         )
     gaps: Gaps | None = None
     with terminal.working("Looking for gaps") as advance:
+        from sarl_core.environments.failures import failure_known
         from sarl_core.improving.gaps import gaps_so_far
         from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
@@ -280,7 +279,7 @@ def _gaps(
     _write_gaps(gaps, out)
     if gaps.cut:
         steps = plan.max_steps or MAX_STEPS
-        notes = (*notes, cut_text(str(env_id), gaps.cut, gaps.episodes, steps))
+        notes = (*notes, cut_text(gaps.cut, gaps.episodes, steps, may_fail=failure_known(env_id)))
     notes = tuple(dict.fromkeys((*notes, *gaps.notes)))
     document: dict[str, Any] = {
         "file": str(out),

@@ -348,6 +348,7 @@ def print_episodes(
         shield: In force, or None.
     """
     from sarl_core.mining.language import share_text
+    from sarl_core.rollouts.failures import safety_facts
 
     summary = document["summary"]
     terminal.print_lines([title])
@@ -358,8 +359,7 @@ def print_episodes(
         [
             ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
             ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
-            ("failures", failures_text(summary, len(document["episodes"]), env_id)),
-            *_cost(summary),
+            *safety_facts(summary, len(document["episodes"]), env_id, shielded=shield is not None),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
             *(
                 []
@@ -372,60 +372,9 @@ def print_episodes(
                 if "invalid_steps" not in summary
                 else [("not checked", _invalid(summary["invalid_steps"]))]
             ),
-            *([] if shield is None else [("freedom", freedom_text(summary))]),
         ]
     )
     print_notes(document["notes"])
-
-
-def failures_text(summary: dict[str, float], episodes: int, env_id: str) -> str:
-    """How many episodes failed, and how sure one can be of the share.
-
-    Args:
-        summary: What `Episodes.summary` gave.
-        episodes: How many there are.
-        env_id: Environment.
-
-    Returns:
-        In words, also where it is not known which ends are failures, or there are none.
-    """
-    from sarl_core.environments.failures import cannot_fail, no_failures_text
-    from sarl_core.mining.language import at_least_text, share_text
-
-    if "failures" not in summary:
-        return f"{'none' if cannot_fail(env_id) else 'not known'}: {no_failures_text(env_id)}"
-    low, high = (share_text(summary[name]) for name in ("failure_low", "failure_high"))
-    cut = int(summary.get("cut", 0))
-    if cut == episodes:
-        return "not known: no episode ran to its end"
-    ended = f" of the {episodes - cut:,} that ended" if cut else f" of {episodes:,} episodes"
-    return (
-        f"{summary['failures']:,}{ended}, {at_least_text(summary['failure_rate'], cut)}"
-        f"{' of all' if cut else ''} (95 % interval {low} to {high})"
-    )
-
-
-def freedom_text(summary: dict[str, float]) -> str:
-    """What a shield leaves the agent to choose from.
-
-    Args:
-        summary: What `Episodes.summary` gave.
-
-    Returns:
-        In words.
-    """
-    from sarl_core.mining.language import share_text
-
-    what = share_text(summary["freedom"])
-    if not summary["freedom"]:
-        return f"{what}: a rule decides every step, so this is a policy and no longer a shield"
-    return f"{what} of the choice is left to the agent"
-
-
-def _cost(summary: dict[str, float]) -> list[tuple[str, str]]:
-    if "cost" not in summary or summary["cost"] == summary.get("failure_rate"):
-        return []  # not known, or the failures themselves
-    return [("cost", f"{summary['cost']:.2f} an episode")]
 
 
 def print_notes(notes: Sequence[str]) -> None:

@@ -72,8 +72,6 @@ class Tally:
     """Failures and costs of E episodes, while they are played.
 
     Attributes:
-        knows_failures: Whether anything tells them.
-        by_end: Whether the ends of the episodes do (`failures.failed`).
         failures: 1 for an episode that has failed, 0 for one that has not, NaN where that cannot
             be said, (E,).
         costs: Of each so far, (E,); NaN where it is not known.
@@ -93,11 +91,15 @@ class Tally:
         environment = as_environment(environment)
         self._failure, self._cost = _failure_signal(environment), _cost_signal(environment)
         self._name = name
-        self.knows_failures = self._failure is not None
-        self.by_end = not environment.failure and ends_tell(environment.id)
+        self._by_end = not environment.failure and ends_tell(environment.id)
         self.failures, self.costs = np.zeros(count), np.full(count, np.nan)
         self._unpriced = np.zeros(count, dtype=np.bool_)
         self._missing: dict[tuple[int, str], dict[str, None]] = {}
+
+    @property
+    def signals(self) -> NDArray[np.float64] | None:
+        """The failures; None where the ends of the episodes tell them too, or nothing does."""
+        return None if self._failure is None or self._by_end else self.failures
 
     def add(
         self, episodes: NDArray[np.int64], steps: NDArray[np.int64], outcomes: StepOutcomes

@@ -34,6 +34,7 @@ from sarl_core.rollouts import seeds
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
 from sarl_core.rollouts.player import EpisodeFaultError
 from sarl_core.rollouts.seeds import RunSeeds
+from sarl_core.rollouts.statistics import Rate
 from sarl_core.shielding.shield import Shield
 
 _FIRST_VALIDATION = 16
@@ -54,6 +55,7 @@ class AggregationRound:
         needed: Share of the met states that no rule covers, or where the expert would do
             otherwise in some action dimension.
         cut: How many of its episodes were cut off before their end.
+        failures: How many of them failed; None where that is not known.
     """
 
     number: int
@@ -64,6 +66,7 @@ class AggregationRound:
     disagreement: float
     needed: float
     cut: int = 0
+    failures: Rate | None = None
 
     @property
     def mean_return(self) -> float:
@@ -110,7 +113,15 @@ class Aggregation:
         cut, of = sum(one.cut for one in self.rounds), sum(len(one.returns) for one in self.rounds)
         steps = self.plan.max_steps or MAX_STEPS
         clauses = (
-            (cut_text(self.env_id, cut, of, steps, episodes="episodes of the rounds"),)
+            (
+                cut_text(
+                    cut,
+                    of,
+                    steps,
+                    may_fail=any(one.failures is not None for one in self.rounds),
+                    episodes="episodes of the rounds",
+                ),
+            )
             if cut
             else ()
         )
@@ -351,6 +362,7 @@ class _Run:
                 disagreement=float(otherwise.sum() / max(int(covered.sum()), 1)),
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
                 cut=int(played.cut.sum()),
+                failures=played.failures,
             )
         )
         self.answers.add(table, wanted, seed=self.seed(number))

@@ -187,6 +187,7 @@ def _reported(aggregation: Aggregation) -> dict[str, Any] | None:
         **{
             name: value if isinstance(value, int) else round(value, 4)
             for name, value in episodes.summary().items()
-            if name.startswith("failure") or name in ("cut", "intervention_rate", "freedom")
+            if name.startswith(("failure", "cost"))
+            or name in ("cut", "undecided", "intervention_rate", "freedom", "worst_tenth")
         },
     }

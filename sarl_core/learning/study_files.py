@@ -15,6 +15,8 @@ from typing import Any
 from msgspec import Struct
 
 from sarl_core.documents import Count, MisfitError, NotNegative, conformed, read_object
+from sarl_core.environments.environment import Environment
+from sarl_core.environments.failures import failure_known
 from sarl_core.errors import InputError, WorkError, quoted
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import ARMS, LearningArm
@@ -90,6 +92,17 @@ class LearningStudy:
     def finished(self) -> tuple[LearningRun, ...]:
         """The runs that are finished."""
         return tuple(run for run in self.runs if run.finished)
+
+    @property
+    def failures_known(self) -> bool:
+        """Whether it is known which of the environment's episodes are failures."""
+        return failure_known(self.environment)
+
+    @property
+    def environment(self) -> Environment:
+        """The environment and what is called a failure in it: to be told of, and not to be made."""
+        failure = self.settings.get("failure")
+        return Environment(self.env_id, failure=failure if isinstance(failure, str) else "")
 
     @property
     def complete(self) -> bool:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.environments.failures import failure_known
 from sarl_core.learning.arms import ARMS, LearningArm
 from sarl_core.learning.curves import Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
@@ -131,7 +130,7 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
         One entry an arm that has a finished run, in the study's order.
     """
     by_arm = {arm.name: _summary(study, arm) for arm in study.arms if study.of(arm)}
-    if not failure_known(study.env_id):
+    if not study.failures_known:
         return tuple(replace(summary, failures_known=False) for summary in by_arm.values())
     return tuple(_judged(summary, by_arm.get(summary.arm.alone)) for summary in by_arm.values())
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sarl_core.environments.failures import failure_known
 from sarl_core.mining.quantisation import SNAPPINGS, STUDIED_DIVIDERS
 from sarl_core.paper.claims import DIVIDER, decided
 from sarl_core.paper.divider_table import episodes_of, failures_of, quantisations_of, typical_of
@@ -127,7 +126,7 @@ def _rows(study: DividerStudy) -> Iterator[dict[str, Any]]:
 
 
 def _returns(divider: int, snapping: str, episodes: Episodes) -> Iterator[dict[str, Any]]:
-    known = failure_known(episodes.env_id)
+    known = episodes.failures_known
     for seed, value, fell in zip(
         episodes.seeds.tolist(), episodes.returns.tolist(), episodes.failed.tolist(), strict=True
     ):

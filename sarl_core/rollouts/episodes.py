@@ -20,14 +20,23 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, EpisodicAgent, make_agent
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.environments.failures import failed, failure_known
+from sarl_core.environments.failures import ends_tell, failed
 from sarl_core.errors import SarlError, require_whole
 from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.failures import safety_facts
 from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
-from sarl_core.rollouts.statistics import Rate, ReturnStatistics, rate_of, summarise
+from sarl_core.rollouts.statistics import (
+    MeanInterval,
+    Rate,
+    ReturnStatistics,
+    cost_interval,
+    rate_of,
+    summarise,
+    worst_tenth,
+)
 from sarl_core.rollouts.steps import StepTable, concatenate
 
 if TYPE_CHECKING:
@@ -76,6 +85,8 @@ class Episodes:
             NaN where not given.
         costs: Sum of what the environment said that the steps cost, (E,); NaN where it does not.
         notes: What is to be said of how rules and environment were matched, as clauses.
+        signalled: 1 where some step was a failure, 0 where none was, NaN where that cannot be
+            said, (E,); None where the ends of the episodes tell, or nothing does.
     """
 
     env_id: str
@@ -97,6 +108,7 @@ class Episodes:
     costs: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     notes: tuple[str, ...] = ()
     invalid: NDArray[np.int64] | None = None
+    signalled: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -127,18 +139,16 @@ class Episodes:
         )
 
     def _repr_html_(self) -> str:
-        """Returns, failures and what the shield did, for a notebook."""
-        summary, returns, failures = self.summary(), self.statistics, self.failures
+        """Failures, returns and what the shield did, for a notebook."""
+        summary, returns = self.summary(), self.statistics
         rows = [
+            *safety_facts(summary, len(self), self.env_id, shielded=bool(self.covered.any())),
             ("return", f"mean {returns.mean:.1f} ± {returns.std:.1f}"),
             ("", f"IQM {returns.iqm:.1f} (95 %: {returns.low:.1f} to {returns.high:.1f})"),
             ("steps", f"{int(self.lengths.sum()):,}"),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
             ("coverage", f"{share_text(summary['coverage'])} of the steps"),
         ]
-        if failures is not None:
-            between = f"95 %: {share_text(failures.low)} to {share_text(failures.high)}"
-            rows.insert(0, ("failures", f"{failures.count:,} of {failures.of:,} ({between})"))
         rows += [("note", remark) for remark in self.remarks]
         return table_html(repr(self), ("what", "value"), rows)
 
@@ -160,6 +170,8 @@ class Episodes:
             changed["flips"] = self.flips[start:stop]
         if self.invalid is not None:
             changed["invalid"] = self.invalid[start:stop]
+        if self.signalled is not None:
+            changed["signalled"] = self.signalled[start:stop]
         return replace(self, **changed)
 
     @cached_property
@@ -169,29 +181,41 @@ class Episodes:
 
     @cached_property
     def failures(self) -> Rate | None:
-        """How many ended by failure; None where it is not known which ends are some.
+        """How many failed; None where it is not known which episodes are failures.
 
         Whether an episode that was cut off would have failed later is not known: then the rate is
         the least that it can be.
         """
-        if not failure_known(self.env_id):
-            return None
-        return rate_of(self.failed, self.cut)
+        return rate_of(self.failed, self.undecided) if self.failures_known else None
+
+    @property
+    def failures_known(self) -> bool:
+        """Whether it is known which episodes are failures, and some can be."""
+        return self.signalled is not None or ends_tell(self.env_id)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
-        """Which episodes ended by failure, (E,); none where it is not known."""
+        """Which episodes failed, (E,); none where it is not known."""
+        if self.signalled is not None:
+            return np.asarray(self.signalled == 1.0)
         return failed(self.env_id, self.terminated, self.last_rewards)
 
     @property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Of which episodes it is not known, (E,), as of one cut off before it could fail."""
+        if self.signalled is None:
+            return self.cut
+        return np.isnan(self.signalled) | (self.cut & ~self.failed)
+
+    @property
     def cost(self) -> NDArray[np.float64]:
-        """What each episode cost, (E,): what the environment said; else 1 for a failure.
+        """What each episode cost, (E,): what its steps did; else 1 for a failure.
 
         NaN where neither is known, as of an episode that was cut off before it could fail.
         """
-        if not np.isnan(self.costs).any() or self.failures is None:
+        if not np.isnan(self.costs).all() or self.failures is None:
             return self.costs
-        return np.where(self.cut, np.nan, self.failed)
+        return np.where(self.undecided, np.nan, self.failed)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -199,7 +223,10 @@ class Episodes:
         if not self.cut.any():
             return self.notes
         steps = int(self.lengths[self.cut].max())
-        return (*self.notes, cut_text(self.env_id, int(self.cut.sum()), len(self), steps))
+        return (
+            *self.notes,
+            cut_text(int(self.cut.sum()), len(self), steps, may_fail=self.failures_known),
+        )
 
     def summary(self) -> dict[str, float]:
         """What the episodes say together (``evaluate --json``).
@@ -209,10 +236,14 @@ class Episodes:
             steps `intervention_rate` and `coverage`; and `outside_rate`, the share of the
             interventions, those that were withheld with them, outside the rules' data. Where
             invalid steps pass, `invalid_steps`, how many there were; where there are some, `cut`,
-            the number of episodes that were cut off. Where they are known, `freedom` and `cost`,
-            means over the steps and over the episodes, and `failures`, `failure_rate`,
-            `failure_low` and `failure_high` (95 %, Clopper and Pearson's). With `cut`, the rate is
-            the least that it can be, and the interval leaves room for all that were cut off.
+            the number of episodes that were cut off. `worst_tenth` is the mean return of the worst
+            tenth of the episodes. Where they are known, `freedom` and `cost`, means over the steps
+            and over the episodes, `cost_low` and `cost_high` (95 %; none where all cost the same),
+            `cost_worst_tenth`, and `failures`, `failure_rate`, `failure_low` and `failure_high`
+            (95 %, Clopper and Pearson's). Of how many episodes it is not known whether they
+            failed, as of those that were cut off before, `undecided` says where there are some:
+            then the rate is the least that it can be, and the interval leaves room for all of
+            them.
         """
         returns = self.statistics
         steps = float(self.lengths.sum())
@@ -233,14 +264,19 @@ class Episodes:
 
     def _known(self) -> dict[str, float]:
         """What is not known of all episodes, where it is."""
-        known: dict[str, float] = {}
+        known: dict[str, float] = {"worst_tenth": worst_tenth(self.returns, worst="lowest")}
         if self.cut.any():
             known["cut"] = int(self.cut.sum())
         if not np.isnan(self.freedom).any():
             known["freedom"] = float((self.freedom * self.lengths).sum() / self.lengths.sum())
-        if not np.isnan(self.cost).any():
-            known["cost"] = float(self.cost.mean())
+        if (cost := self._mean_cost) is not None:
+            known["cost"] = cost.mean
+            if not np.isnan(cost.low):
+                known |= {"cost_low": cost.low, "cost_high": cost.high}
+            known["cost_worst_tenth"] = worst_tenth(self.cost, worst="highest")
         if self.failures is not None:
+            if self.failures.unknown:
+                known["undecided"] = self.failures.unknown
             known |= {
                 "failures": self.failures.count,
                 "failure_rate": self.failures.rate,
@@ -248,6 +284,14 @@ class Episodes:
                 "failure_high": self.failures.high,
             }
         return known
+
+    @property
+    def _mean_cost(self) -> MeanInterval | None:
+        """With its interval; that of the failures where they are all that costs something."""
+        failures = self.failures
+        if failures is not None and not failures.unknown and np.isnan(self.costs).all():
+            return MeanInterval(failures.rate, failures.low, failures.high)
+        return cost_interval(self.cost)
 
     def to_dict(self) -> dict[str, Any]:
         """The document that ``evaluate --json`` prints, ready for JSON."""
@@ -261,11 +305,16 @@ class Episodes:
         )
         names = ("seed", "return", "length", "interventions", "covered")
         episodes: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in rows]
-        for episode, fell, cost, cut in zip(
-            episodes, self.failed.tolist(), self.cost.tolist(), self.cut.tolist(), strict=True
+        for episode, fell, undecided, cost, cut in zip(
+            episodes,
+            self.failed.tolist(),
+            self.undecided.tolist(),
+            self.cost.tolist(),
+            self.cut.tolist(),
+            strict=True,
         ):
-            if self.failures is not None:
-                episode["failed"] = None if cut else fell
+            if self.failures_known:
+                episode["failed"] = None if undecided else fell
             if not np.isnan(cost):
                 episode["cost"] = cost
             if cut:
@@ -306,20 +355,25 @@ class Episodes:
 _COLUMNS = tuple(
     column.name
     for column in fields(Episodes)
-    if column.name not in ("env_id", "agent", "steps", "flips", "notes", "invalid")
+    if column.name not in ("env_id", "agent", "steps", "flips", "notes", "invalid", "signalled")
 )
 
 
 def cut_text(
-    env_id: str, count: int, of: int, steps: int | None = None, *, episodes: str = "episodes"
+    count: int,
+    of: int,
+    steps: int | None = None,
+    *,
+    may_fail: bool,
+    episodes: str = "episodes",
 ) -> str:
     """What is to be said of episodes that were cut off.
 
     Args:
-        env_id: Environment.
         count: How many were, at least 1.
         of: How many there are.
         steps: After how many steps; None if not known.
+        may_fail: Whether it is known what a failure is in them.
         episodes: What they are, in the plural.
 
     Returns:
@@ -339,7 +393,7 @@ def cut_text(
     later = f", and whether {it} would have failed later is not known"
     return (
         f"{who} {be} cut off{after} (max_steps), before {'its' if count == 1 else 'their'} end: "
-        f"{alone}{later if failure_known(env_id) else ''}"
+        f"{alone}{later if may_fail else ''}"
     )
 
 
@@ -368,7 +422,11 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
     flips = np.concatenate(counted) if len(counted) == len(pieces) else None
     passed = [piece.invalid for piece in pieces if piece.invalid is not None]
     invalid = np.concatenate(passed) if len(passed) == len(pieces) else None
-    return replace(pieces[0], steps=steps, flips=flips, invalid=invalid, **columns)
+    signals = [piece.signalled for piece in pieces if piece.signalled is not None]
+    signalled = np.concatenate(signals) if len(signals) == len(pieces) else None
+    return replace(
+        pieces[0], steps=steps, flips=flips, invalid=invalid, signalled=signalled, **columns
+    )
 
 
 def rollout(

@@ -15,6 +15,7 @@ from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.imports import reason
+from sarl_core.environments.signals import StepOutcomes, Tally
 from sarl_core.errors import InputError
 from sarl_core.rollouts.steps import StepTable
 
@@ -41,6 +42,7 @@ class EpisodeArrays(NamedTuple):
     costs: NDArray[np.float64]
     notes: tuple[str, ...]
     invalid: NDArray[np.int64] | None
+    signalled: NDArray[np.float64] | None
 
 
 class EpisodeFaultError(InputError):
@@ -171,7 +173,10 @@ class _Lanes:
         self.returns, self.last_rewards = np.zeros((2, count))
         self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
         self.terminated, self.truncated, self.cut = np.zeros((3, count), dtype=np.bool_)
-        self.free, self.costs = np.zeros(count), np.full(count, np.nan)
+        self.free = np.zeros(count)
+        self.tally = Tally(
+            env_id, count, lambda episode: f"of the episode with seed {seeds[episode]}"
+        )
         self.flips = np.zeros(count, dtype=np.int64)
         self.on = np.zeros(count, dtype=np.bool_)  # whether the shield changed the latest action
         self.outside, self.withheld, self.invalid = np.zeros((3, count), dtype=np.int64)
@@ -214,7 +219,8 @@ class _Lanes:
             else [adapter.native(action) for action in executed]
         )
         following = np.empty_like(states)
-        rewards = np.empty(len(states))
+        rewards, ends = np.empty(len(states)), np.zeros(len(states), dtype=np.bool_)
+        infos: list[dict[str, Any]] = []
         ended: list[tuple[int, bool, bool]] = []
         for index, lane in enumerate(self.lanes):
             try:
@@ -224,13 +230,16 @@ class _Lanes:
                 where = f"at step {self.lengths[lane.episode]}"
                 raise self._broken(lane, where, error) from error
             following[index] = adapter.flat(observation)
-            if "cost" in info:
-                self.costs[lane.episode] = _added(self.costs[lane.episode], info["cost"])
+            infos.append(info)
+            ends[index] = terminated
             if terminated or truncated:
                 ended.append((index, bool(terminated), bool(truncated)))
             if self.observer is not None:
                 step = int(self.lengths[lane.episode]) + 1
                 self.observer(View(lane.env, lane.episode, step, following[index]))
+        fails, costs = self.tally.add(
+            episodes, self.lengths[episodes], StepOutcomes(following, actions, rewards, ends, infos)
+        )
         if self.keep_steps:
             self.chunks.append(
                 (
@@ -245,6 +254,8 @@ class _Lanes:
                     rewards,
                     choice.outside,
                     choice.invalid,
+                    fails,
+                    costs,
                 )
             )
         self.returns[episodes] += rewards
@@ -286,6 +297,7 @@ class _Lanes:
             lane = self.lanes[index]
             self.terminated[lane.episode] = terminated
             self.truncated[lane.episode] = truncated
+            self.tally.end(lane.episode)
             lane.env.close()
         going = np.ones(len(self.lanes), dtype=np.bool_)
         going[[index for index, _, _ in ended]] = False
@@ -321,6 +333,7 @@ class _Lanes:
             order = np.lexsort((columns[1], columns[0]))
             steps = StepTable(*(column[order] for column in columns))
         passes = self.shield is not None and self.shield.on_invalid == "pass"
+        signals = self.tally.signals
         return EpisodeArrays(
             self.returns[:count],
             self.lengths[:count],
@@ -335,9 +348,10 @@ class _Lanes:
             self.withheld[:count],
             self.cut[:count],
             self.free[:count] / self.lengths[:count],
-            self.costs[:count],
+            self.tally.costs[:count],
             self.notes,
             self.invalid[:count] if passes else None,
+            signals[:count] if signals is not None else None,
         )
 
 
@@ -386,15 +400,6 @@ def choose(
         decision.outside,
         decision.invalid,
     )
-
-
-def _added(cost: float, more: Any) -> float:
-    """What an episode has cost, with one more step; what is no number counts as nothing."""
-    try:
-        value = float(more)
-    except (TypeError, ValueError):
-        return cost
-    return value if np.isnan(cost) else cost + value
 
 
 def shield_for(env_id: EnvironmentOrId, shield: Shield) -> Shield:

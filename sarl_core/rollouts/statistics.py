@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from sarl_core.errors import InputError
 
 _RESAMPLES = 9_999
 _NUMBERS_AT_ONCE = 2_000_000  # 16 MB; a bootstrap of many episodes is done in pieces
+_WORST = 0.1  # the share of the episodes that are the worst
 _CUT = 0.25  # the share of the values left out at either end
 
 
@@ -71,6 +72,14 @@ class Rate:
     high: float
     unknown: int = 0
 
+    @property
+    def at_most(self) -> float:
+        """What the rate is at most, with 95 % certainty (one-sided, by the same method)."""
+        from scipy.special import betaincinv
+
+        most = self.count + self.unknown
+        return 1.0 if most == self.of else float(betaincinv(most + 1, self.of - most, 0.95))
+
 
 def rate_of(happened: ArrayLike, unknown: ArrayLike = False) -> Rate:
     """A share of independent episodes with its exact interval.
@@ -118,6 +127,47 @@ def mean_interval(values: ArrayLike) -> MeanInterval:
         return MeanInterval(value, value, value)
     half = float(stdtrit(len(array) - 1, 0.975)) * float(array.std(ddof=1)) / len(array) ** 0.5
     return MeanInterval(mean, mean - half, mean + half)
+
+
+def cost_interval(costs: ArrayLike) -> MeanInterval | None:
+    """The mean cost of independent episodes with its 95 % interval.
+
+    Args:
+        costs: One number an episode, shape (E,).
+
+    Returns:
+        Student's interval, which does not reach below zero where no cost does; NaN for its ends
+        where all cost the same, because nothing is seen of how they vary; None where a cost is
+        not known.
+    """
+    array = np.asarray(costs, dtype=np.float64).reshape(-1)
+    if not len(array) or np.isnan(array).any():
+        return None
+    if (array == array[0]).all():
+        return MeanInterval(float(array[0]), float("nan"), float("nan"))
+    interval = mean_interval(array)
+    least = 0.0 if array.min() >= 0.0 else -np.inf
+    return replace(interval, low=max(interval.low, float(least)))
+
+
+def worst_tenth(values: ArrayLike, *, worst: Literal["lowest", "highest"]) -> float:
+    """The mean of the worst tenth of the episodes (the conditional value at risk).
+
+    Args:
+        values: One number an episode, shape (E,), E at least 1.
+        worst: Which are the worst: the lowest returns, the highest costs.
+
+    Returns:
+        Where a tenth is no whole number of episodes, the last one counts in part; of fewer than
+        ten, the worst.
+    """
+    array = np.sort(np.asarray(values, dtype=np.float64).reshape(-1))
+    if worst == "highest":
+        array = array[::-1]
+    tenth = max(_WORST * len(array), 1.0)
+    weights = np.clip(tenth - np.arange(len(array)), 0.0, 1.0)
+    counted = weights > 0.0
+    return float((array[counted] * weights[counted]).sum() / tenth)
 
 
 def interquartile_mean(values: ArrayLike, axis: int = -1) -> NDArray[np.float64]:

@@ -34,6 +34,8 @@ class StepTable:
             breaks, (T,) bool; nowhere where not given.
         invalid: Why no rule was asked, where the observation was no state or the proposed action
             none that there is and it passed; else None, (T,) objects; nowhere where not given.
+        failed: Whether the step is a failure, (T,) bool; nowhere where not given.
+        cost: What the step cost, (T,) float64; NaN where nothing says, or it is not given.
     """
 
     episode: NDArray[np.int64]
@@ -47,13 +49,20 @@ class StepTable:
     reward: NDArray[np.float64]
     outside: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     invalid: NDArray[np.object_] = field(default_factory=lambda: np.zeros(0, dtype=np.object_))
+    failed: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    cost: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        if not len(self.outside):
-            object.__setattr__(self, "outside", np.zeros(len(self.step), dtype=np.bool_))
-        if not len(self.invalid):
-            object.__setattr__(self, "invalid", np.full(len(self.step), None, dtype=np.object_))
+        nothing: tuple[tuple[str, Any, Any], ...] = (
+            ("outside", False, np.bool_),
+            ("invalid", None, np.object_),
+            ("failed", False, np.bool_),
+            ("cost", np.nan, np.float64),
+        )
+        for name, value, kind in nothing:
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(len(self.step), value, dtype=kind))
         for column in fields(self):
             getattr(self, column.name).flags.writeable = False
 
@@ -123,7 +132,8 @@ class StepTable:
         Returns:
             Columns `episode`, `step`, `obs_<name>`..., `proposed_<i>`..., `executed_<i>`...,
             `rule_<i>`..., `intervened`, `outside`, `margin`, `reward`; without `_<i>` where there
-            is one. Where some step was invalid, also `invalid`: why, or "".
+            is one. Where some step was invalid, also `invalid`: why, or ""; where some failed,
+            `failed`; where a cost is known, `cost`.
         """
         import pandas as pd
 
@@ -147,6 +157,10 @@ class StepTable:
         }
         if self.is_invalid.any():
             columns["invalid"] = [why or "" for why in self.invalid.tolist()]
+        if self.failed.any():
+            columns["failed"] = self.failed
+        if not np.isnan(self.cost).all():
+            columns["cost"] = self.cost
         return pd.DataFrame(columns)
 
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.environments.failures import failure_known
 from sarl_core.rollouts.episodes import Episodes, cut_text
 from sarl_core.rollouts.rule_use import RuleUse
 from sarl_core.rollouts.statistics import MeanInterval, mean_interval
@@ -75,8 +74,9 @@ class Ablation:
         left_out: Indices of rules that matter and were not taken out, because others were used
             more, or the work is not finished.
         played: Episodes that were run without some rule.
-        cut: Whether they were cut off before their end, (K, E) bool, and so it is not known
-            whether they would have failed; none where not given.
+        cut: Whether they were cut off before their end, (K, E) bool; none where not given.
+        undecided: Whether it is not known that they fail, or not, (K, E) bool; those that were cut
+            off and have not failed where not given.
     """
 
     shield: Shield
@@ -88,11 +88,14 @@ class Ablation:
     left_out: tuple[int, ...]
     played: int
     cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
+    undecided: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
         if not len(self.cut):
             object.__setattr__(self, "cut", np.zeros_like(self.failed))
+        if not len(self.undecided):
+            object.__setattr__(self, "undecided", self.cut & ~self.failed)
         for column in fields(self):
             value = getattr(self, column.name)
             if isinstance(value, np.ndarray):
@@ -105,8 +108,8 @@ class Ablation:
 
     @property
     def failures_known(self) -> bool:
-        """Whether it is known which ends of the environment's episodes are failures."""
-        return failure_known(self.base.env_id)
+        """Whether it is known which of the environment's episodes are failures."""
+        return self.base.failures_known
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -114,7 +117,9 @@ class Ablation:
         cut = int((self.cut & self.use.matters[list(self.rules)]).sum())
         if not cut:
             return self.base.remarks
-        remark = cut_text(self.base.env_id, cut, self.played, episodes="episodes without a rule")
+        remark = cut_text(
+            cut, self.played, may_fail=self.failures_known, episodes="episodes without a rule"
+        )
         return (*self.base.remarks, remark)
 
     @property
@@ -151,7 +156,7 @@ class Ablation:
     @property
     def _failure_differences(self) -> NDArray[np.float64]:
         fell = self.failed.astype(np.float64) - self.base.failed
-        return np.where(self.cut | self.base.cut, 0.0, fell)
+        return np.where(self.undecided | self.base.undecided, 0.0, fell)
 
     @cached_property
     def effects(self) -> tuple[RuleEffect, ...]:

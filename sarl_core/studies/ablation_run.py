@@ -8,9 +8,10 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.environments.environment import EnvironmentOrId
@@ -38,6 +39,7 @@ class _Outcome(NamedTuple):
     gained: float
     failed: bool
     cut: bool
+    undecided: bool
 
 
 class AblationProgress(NamedTuple):
@@ -214,6 +216,7 @@ class AblationRecord:
             episodes.returns.tolist(),
             episodes.failed.tolist(),
             episodes.cut.tolist(),
+            episodes.undecided.tolist(),
         )
         with self._lock:
             self._without.setdefault(rule, {}).update(zip(places, outcomes, strict=True))
@@ -237,7 +240,9 @@ class AblationRecord:
                 return self._latest[1]
             base, use = self._base.part(0, episodes), self._use.part(0, episodes)
             chosen, rest = rules_to_take_out(use, most)
-            finished, returns, failed, cut, played = [], [], [], [], 0
+            finished: list[int] = []
+            columns: list[list[NDArray[Any]]] = []
+            played = 0
             for rule in chosen:
                 known = self._without.get(rule, {})
                 places = np.flatnonzero(use.matters[rule]).tolist()
@@ -245,20 +250,25 @@ class AblationRecord:
                     continue
                 finished.append(rule)
                 played += len(places)
-                returns.append(base.returns.copy())
-                failed.append(base.failed.copy())
-                cut.append(base.cut.copy())
+                columns.append(
+                    [of.copy() for of in (base.returns, base.failed, base.cut, base.undecided)]
+                )
                 for place in places:
-                    returns[-1][place], failed[-1][place], cut[-1][place] = known[place]
-            shape = (len(finished), episodes)
+                    for column, value in zip(columns[-1], known[place], strict=True):
+                        column[place] = value
+            returns, failed, cut, undecided = (
+                np.array([row[of] for row in columns]).reshape(len(finished), episodes)
+                for of in range(4)
+            )
             ablation = Ablation(
                 shield=self.shield,
                 base=base,
                 use=use,
                 rules=tuple(finished),
-                returns=np.array(returns, dtype=np.float64).reshape(shape),
-                failed=np.array(failed, dtype=np.bool_).reshape(shape),
-                cut=np.array(cut, dtype=np.bool_).reshape(shape),
+                returns=returns,
+                failed=failed.astype(np.bool_),
+                cut=cut.astype(np.bool_),
+                undecided=undecided.astype(np.bool_),
                 left_out=(*(rule for rule in chosen if rule not in finished), *rest),
                 played=played,
             )

@@ -12,7 +12,6 @@ import numpy as np
 
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.environments.failures import failure_known
 from sarl_core.errors import InputError
 from sarl_core.progress import Progress, part_of
 from sarl_core.rollouts.episodes import Episodes, rollout
@@ -199,22 +198,6 @@ def compare_arm(
     )
 
 
-def crash_rate(episodes: Episodes, env_id: str) -> float:
-    """Share of the episodes that ended by failure, as `Episodes.failed` says.
-
-    Args:
-        episodes: E finished episodes.
-        env_id: Their environment.
-
-    Returns:
-        0 to 1; NaN where it is not known which ends are failures. Where episodes were cut off, the
-        least that it can be.
-    """
-    if not failure_known(env_id):
-        return float("nan")
-    return float(episodes.failed.mean())
-
-
 def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) -> dict[str, Any]:
     """What one arm's episodes say, for a table.
 
@@ -237,10 +220,8 @@ def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) 
         "rules": None if arm.rules is None else len(arm.rules),
         "episodes": len(episodes),
         **episodes.summary(),
-        "crash_rate": crash_rate(episodes, episodes.env_id),
+        "crash_rate": None if episodes.failures is None else episodes.failures.rate,
     }
-    if not failure_known(episodes.env_id):
-        row["crash_rate"] = None
     if arm.rules is None:
         row |= {"intervention_rate": None, "coverage": None, "outside_rate": None}
     known = effect is not None and effect.failures is not None

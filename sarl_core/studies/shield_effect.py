@@ -75,8 +75,8 @@ def shield_effect(alone: Episodes, shielded: Episodes) -> ShieldEffect:
             "the same --seed and --episodes"
         )
     # Whether an episode that was cut off would have failed later, nobody knows.
-    ended = ~(alone.cut | shielded.cut)
-    known = alone.failures is not None and bool(ended.any())
+    ended = ~(alone.undecided | shielded.undecided)
+    known = alone.failures_known and bool(ended.any())
     gained = shielded.returns - alone.returns
     worse = np.where(ended, shielded.failed.astype(np.float64) - alone.failed, 0.0)
     both = np.stack([gained, worse])

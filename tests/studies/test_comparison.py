@@ -21,7 +21,6 @@ from sarl_core.studies.comparison import (
     compare,
     compare_arm,
     comparison_row,
-    crash_rate,
 )
 
 CARTPOLE = "CartPole-v1"
@@ -101,7 +100,8 @@ def test_progress_counts_over_all_arms_and_stops() -> None:
 def test_in_an_environment_that_knows_only_failure_every_end_is_one() -> None:
     episodes = ended([True, False, True], [1.0, 1.0, -100.0])
     assert episodes.failed.tolist() == [True, False, True]
-    assert crash_rate(episodes, CARTPOLE) == pytest.approx(2 / 3)
+    assert episodes.failures is not None
+    assert episodes.failures.rate == pytest.approx(2 / 3)
 
 
 @pytest.mark.parametrize("env_id", ["MountainCar-v0", "MountainCarContinuous-v0", "Acrobot-v1"])
@@ -111,7 +111,7 @@ def test_who_reaches_the_goal_has_not_crashed_and_nothing_is_said_of_failures(en
         ended([True, False, True], [0.0, -1.0, 100.0]), env_id=env_id, lengths=lengths
     )
     assert not episodes.failed.any()
-    assert np.isnan(crash_rate(episodes, env_id))
+    assert episodes.failures is None
     assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
     assert not {"failures", "failure_rate", "cost"} & set(episodes.summary())
     assert "failed" not in episodes.to_dict()["episodes"][0]
@@ -124,7 +124,7 @@ def test_where_failures_are_not_known_none_is_claimed() -> None:
         ended([True, False, True], [1.0, 1.0, -100.0]), env_id="my:Unknown-v0", lengths=lengths
     )
     assert not failure_known(episodes.env_id)
-    assert np.isnan(crash_rate(episodes, episodes.env_id))
+    assert episodes.failures is None
     assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
     assert "crash" not in verdict("novice", "the rules", episodes, episodes)
 
@@ -154,13 +154,14 @@ def test_a_landing_and_an_arrival_are_no_crash(env_id: str) -> None:
     #                 landed, crashed, out of time, out of time
     episodes = ended([True, True, False, False], [100.0, -100.0, 0.3, -100.0], env_id)
     assert episodes.failed.tolist() == [False, True, False, False]
-    assert crash_rate(episodes, env_id) == 0.25
+    assert episodes.failures is not None
+    assert episodes.failures.rate == 0.25
 
 
 def test_the_lander_crashes_without_a_pilot_and_lands_with_one() -> None:
     arms = (Arm("alone", "novice"), Arm("expert", "expert"))
     found = compare("LunarLander-v3", arms, episodes=8, seed=1)
-    alone, expert = (crash_rate(episodes, found.env_id) for episodes in found.episodes)
+    alone, expert = (episodes.failed.mean() for episodes in found.episodes)
     assert alone == 1.0
     assert expert <= 0.25
     assert found.episodes[1].terminated.any()

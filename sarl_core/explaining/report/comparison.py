@@ -224,7 +224,7 @@ def compared(results: Sequence[Result]) -> Compared | None:
             "It leaves out the worst quarter of the episodes, so it hides crashes: read the mean "
             "and the failures beside it.",
             *(
-                f"{one.name}: {cut_text(one.env_id, one.cut, one.episodes)}."
+                f"{one.name}: {cut_text(one.cut, one.episodes, may_fail=one.crashes is not None)}."
                 for one in results
                 if one.cut
             ),

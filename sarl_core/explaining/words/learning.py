@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sarl_core.decimals import rounded_text
-from sarl_core.environments.failures import failure_known, no_failures_text
+from sarl_core.environments.failures import no_failures_text
 from sarl_core.files import whole_file
 from sarl_core.learning.study_files import LearningStudy
 from sarl_core.learning.summary import (
@@ -129,7 +129,7 @@ def save_finding(study: LearningStudy, summaries: Sequence[ArmSummary], folder: 
 def _answer(
     study: LearningStudy, judged: Sequence[ArmSummary], summaries: Sequence[ArmSummary]
 ) -> str:
-    if why := no_failures_text(study.env_id):
+    if why := no_failures_text(study.environment):
         return f"{why[0].upper()}{why[1:]}, so which way to learn is safe cannot be said."
     if not judged:
         return (
@@ -253,10 +253,10 @@ def _cut(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     if not count:
         return ""
     text = cut_text(
-        study.env_id,
         count,
         of,
         study.settings.get("trial_max_steps") or MAX_STEPS,
+        may_fail=study.failures_known,
         episodes="episodes after learning",
     )
     return f"{text[0].upper()}{text[1:]}."
@@ -275,7 +275,7 @@ def _conditions(study: LearningStudy) -> str:
         by = f"{counted(int(rules['count']), 'rule')} ({cut})"
     seeds = len(study.seeds)
     meant = ""
-    if failure_known(study.env_id):
+    if study.failures_known:
         meant = (
             f"Safe means at most {share_text(SAFE_SHARE)} of the crashes of the same learner "
             "without a shield; good means at least its mean return, both averaged over the "
