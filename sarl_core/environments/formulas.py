@@ -47,7 +47,7 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Feature:
+class FeatureValue:
     """A feature of the observation.
 
     Attributes:
@@ -75,12 +75,12 @@ class Operation:
         return self.name in _COMPARISONS or self.name in _WORDS
 
 
-Node: TypeAlias = Constant | Feature | Operation
+Node: TypeAlias = Constant | FeatureValue | Operation
 
 
 @dataclass(frozen=True)
 class _Parsed:
-    """What `Formula` and `Condition` share.
+    """What `Formula` and `StateCondition` share.
 
     Attributes:
         text: As it was written.
@@ -130,7 +130,7 @@ class _Parsed:
         nodes = [self.root]
         while nodes:
             node = nodes.pop()
-            if isinstance(node, Feature):
+            if isinstance(node, FeatureValue):
                 indices.add(node.index)
             elif isinstance(node, Operation):
                 nodes += node.operands
@@ -170,13 +170,13 @@ class Formula(_Parsed):
 
 
 @dataclass(frozen=True)
-class Condition(_Parsed):
+class StateCondition(_Parsed):
     """What is true or false of an observation, as a failure."""
 
     is_truth = True
 
 
-def parse(text: str, feature_names: Sequence[str]) -> Formula | Condition:
+def parse(text: str, feature_names: Sequence[str]) -> Formula | StateCondition:
     """Read a formula or a condition, whichever it is.
 
     Args:
@@ -197,7 +197,7 @@ def parse(text: str, feature_names: Sequence[str]) -> Formula | Condition:
         )
     names = tuple(feature_names)
     root = _Parser(text, names).whole()
-    kind = Condition if _is_truth(root) else Formula
+    kind = StateCondition if _is_truth(root) else Formula
     return kind(text.strip(), names, root)
 
 
@@ -374,9 +374,9 @@ class _Parser:
             parts.append(self._take())
         return _Token("word", " ".join(part.text for part in parts), first.place)
 
-    def _feature(self, token: _Token) -> Feature:
+    def _feature(self, token: _Token) -> FeatureValue:
         if token.text in self.names:
-            return Feature(self.names.index(token.text))
+            return FeatureValue(self.names.index(token.text))
         near = difflib.get_close_matches(token.text, self.names, n=1)
         raise self._error(
             "is no feature",
@@ -395,7 +395,7 @@ def _is_truth(node: Node) -> bool:
 def _value(node: Node, states: NDArray[np.float64]) -> Any:
     if isinstance(node, Constant):
         return np.float64(node.value)
-    if isinstance(node, Feature):
+    if isinstance(node, FeatureValue):
         return states[..., node.index]
     first, *others = (_value(operand, states) for operand in node.operands)
     if not others:

@@ -20,7 +20,7 @@ from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import Environment, EnvironmentOrId, as_environment
 from sarl_core.environments.failures import ends_tell, failed, info_key
 from sarl_core.environments.feature_order import shortened
-from sarl_core.environments.formulas import Condition, parse
+from sarl_core.environments.formulas import StateCondition, parse
 from sarl_core.environments.imports import named_object, reason
 from sarl_core.errors import InputError, quoted
 
@@ -68,7 +68,7 @@ class _Signal:
     named: bool = True
 
 
-class Tally:
+class SignalTally:
     """Failures and costs of E episodes, while they are played.
 
     Attributes:
@@ -90,7 +90,7 @@ class Tally:
         """
         environment = as_environment(environment)
         self._failure, self._cost = _failure_signal(environment), _cost_signal(environment)
-        self._name = name
+        self._name, self._features = name, describe_environment(environment).feature_names
         self._by_end = not environment.failure and ends_tell(environment.id)
         self.failures, self.costs = np.zeros(count), np.full(count, np.nan)
         self._unpriced = np.zeros(count, dtype=np.bool_)
@@ -159,10 +159,12 @@ class Tally:
             keys = self._missing.pop((episode, signal.key), None)
             if keys is not None and signal.named:
                 holds = f"holds {shortened(sorted(keys))}" if keys else "is empty"
+                advice = "name one of its keys, a condition as 'gap < 1', or module:name"
+                if signal.key in self._features:
+                    advice = f"if the feature is meant, write it in parentheses: ({signal.key})"
                 raise InputError(
                     f"no step {self._name(episode)} has {quoted(signal.key)} in its info, which "
-                    f"{holds}; name one of its keys, a condition on the observation as "
-                    "'gap < 1', or module:name"
+                    f"{holds}; {advice}"
                 )
             if keys is not None and signal is self._failure:
                 self.failures[episode] = np.nan
@@ -206,7 +208,7 @@ def _failure_signal(environment: Environment) -> _Signal | None:
     if _FUNCTION.fullmatch(text):
         return _function_signal(text, "failure")
     if _COMPARES.search(text):
-        condition = Condition.parse(text, describe_environment(environment).feature_names)
+        condition = StateCondition.parse(text, describe_environment(environment).feature_names)
         return _Signal(lambda steps, _: condition.values(steps.observations))
     return _key_signal(text, "failure")
 

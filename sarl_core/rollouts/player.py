@@ -15,7 +15,7 @@ from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.imports import reason
-from sarl_core.environments.signals import StepOutcomes, Tally
+from sarl_core.environments.signals import SignalTally, StepOutcomes
 from sarl_core.errors import InputError
 from sarl_core.rollouts.steps import StepTable
 
@@ -174,7 +174,7 @@ class _Lanes:
         self.lengths, self.interventions, self.covered = np.zeros((3, count), dtype=np.int64)
         self.terminated, self.truncated, self.cut = np.zeros((3, count), dtype=np.bool_)
         self.free = np.zeros(count)
-        self.tally = Tally(
+        self.tally = SignalTally(
             env_id, count, lambda episode: f"of the episode with seed {seeds[episode]}"
         )
         self.flips = np.zeros(count, dtype=np.int64)

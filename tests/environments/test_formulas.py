@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sarl_core.environments.formulas import MAX_DEPTH, MAX_LENGTH, Condition, Formula, parse
+from sarl_core.environments.formulas import MAX_DEPTH, MAX_LENGTH, Formula, StateCondition, parse
 from sarl_core.errors import InputError
 
 NAMES = ("gap", "own speed", "lead speed", "vehicle 2: x", "leg 1 contact", "min gap")
@@ -46,7 +46,7 @@ def test_a_formula_means_what_it_says(text: str, value: float) -> None:
     ],
 )
 def test_a_condition_means_what_it_says(text: str, truth: bool) -> None:
-    assert Condition.parse(text, NAMES).values(STATE) == float(truth)
+    assert StateCondition.parse(text, NAMES).values(STATE) == float(truth)
 
 
 def test_what_has_no_value_is_neither_true_nor_false() -> None:
@@ -57,12 +57,12 @@ def test_what_has_no_value_is_neither_true_nor_false() -> None:
     assert np.array_equal(
         Formula.parse(text, NAMES).values(states), [np.nan, np.inf, -np.inf], equal_nan=True
     )
-    unknown, far, behind = Condition.parse(f"{text} > 5", NAMES).values(states)
+    unknown, far, behind = StateCondition.parse(f"{text} > 5", NAMES).values(states)
     assert np.isnan(unknown)
     assert (far, behind) == (1.0, 0.0)
-    assert np.isnan(Condition.parse(f"not {text} > 5", NAMES).values(states[0]))
-    assert Condition.parse(f"{text} > 5 and gap > 1", NAMES).values(states[0]) == 0.0
-    assert Condition.parse(f"{text} > 5 or gap < 1", NAMES).values(states[0]) == 1.0
+    assert np.isnan(StateCondition.parse(f"not {text} > 5", NAMES).values(states[0]))
+    assert StateCondition.parse(f"{text} > 5 and gap > 1", NAMES).values(states[0]) == 0.0
+    assert StateCondition.parse(f"{text} > 5 or gap < 1", NAMES).values(states[0]) == 1.0
 
 
 @given(
@@ -105,7 +105,7 @@ def test_what_is_no_formula_is_refused_with_its_place(text: str, says: str) -> N
 
 def test_a_number_is_no_condition_and_a_condition_no_number() -> None:
     with pytest.raises(InputError, match="no condition"):
-        Condition.parse("gap", NAMES)
+        StateCondition.parse("gap", NAMES)
     with pytest.raises(InputError, match="no number"):
         Formula.parse("gap > 1", NAMES)
     with pytest.raises(InputError, match="6 features"):
