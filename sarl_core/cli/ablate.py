@@ -22,7 +22,7 @@ from sarl_core.cli.options import (
     Seed,
     Stochastic,
     out_option,
-    with_environment,
+    with_played_environment,
 )
 from sarl_core.files import whole_file
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from sarl_core.studies.ablation import Ablation
 
 
-@with_environment
+@with_played_environment
 def ablate(
     env: Env,
     agent: AgentName,

@@ -21,7 +21,7 @@ from sarl_core.cli.options import (
     ProjectionName,
     Seed,
     out_option,
-    with_environment,
+    with_played_environment,
 )
 from sarl_core.errors import InputError
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _NOBODY = "none"
 
 
-@with_environment
+@with_played_environment
 def aggregate(
     context: typer.Context,
     file: File,

@@ -20,6 +20,7 @@ from sarl_core.cli.options import (
     Stochastic,
     out_option,
     with_environment,
+    with_played_environment,
 )
 from sarl_core.errors import InputError
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from sarl_core.demonstrations.dataset import Demonstrations
 
 
-@with_environment
+@with_played_environment
 def record(
     env: Env,
     agent: AgentName,

@@ -22,12 +22,12 @@ from sarl_core.cli.options import (
     Seed,
     Stochastic,
     out_option,
-    with_environment,
+    with_played_environment,
 )
 from sarl_core.errors import InputError
 
 
-@with_environment
+@with_played_environment
 def evaluate(
     env: Env,
     agent: AgentName,
@@ -89,7 +89,7 @@ def evaluate(
         raise InputError(f"{fault}; the answer is of the {len(played)} before that one")
 
 
-@with_environment
+@with_played_environment
 def render(
     env: Env,
     agent: AgentName,

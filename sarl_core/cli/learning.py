@@ -21,7 +21,7 @@ from sarl_core.cli.options import (
     Rules,
     Seed,
     out_option,
-    with_environment,
+    with_played_environment,
 )
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from sarl_core.learning.summary import ArmSummary
 
 
-@with_environment
+@with_played_environment
 def learn(
     env: Env,
     steps: Annotated[
@@ -129,7 +129,7 @@ def learn(
     print_notes(notes)
 
 
-@with_environment
+@with_played_environment
 def train_expert(
     env: Env,
     out: Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -134,6 +134,27 @@ _Wrappers = Annotated[
         "the innermost first.",
     ),
 ]
+_Failure = Annotated[
+    str | None,
+    typer.Option(
+        "--failure",
+        metavar="WHAT",
+        show_default="what is known of the environment",
+        help="What a failure is: a key of info (crashed), a condition on the observation (gap < 1 "
+        "or abs(angle) > 0.2), or module:name, a function of (observation, action, reward, "
+        "terminated, info). An episode has failed if this is true at one of its steps.",
+    ),
+]
+_Cost = Annotated[
+    str | None,
+    typer.Option(
+        "--cost",
+        metavar="WHAT",
+        show_default="the key cost of info, where there is one",
+        help="What a step costs: a key of info, a condition (1 where it is true) or a formula on "
+        "the observation, or module:name, as --failure takes it.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
@@ -150,11 +171,12 @@ def out_option(text: str, *, metavar: str = "FILE") -> Any:
     return typer.Option("--out", metavar=metavar, show_default=False, help=text)
 
 
-def with_environment(command: Callable[..., None]) -> Callable[..., None]:
+def with_environment(command: Callable[..., None], *, played: bool = False) -> Callable[..., None]:
     """Let a command take what belongs to ``--env``, and hand it one environment.
 
     Args:
         command: With a parameter `env` that is `Env`, `EnvOfFile`, or annotated like them.
+        played: Whether it plays episodes, which may fail.
 
     Returns:
         The command as Typer reads it: with a text for `env`, and further options beside it.
@@ -168,20 +190,42 @@ def with_environment(command: Callable[..., None]) -> Callable[..., None]:
         environment, option = get_args(one.annotation)
         text: Any = str if environment is Environment else str | None
         parameters.append(one.replace(kind=keyword, annotation=Annotated[text, option]))
-        for name, annotation in (("env_args", _EnvArguments), ("wrapper", _Wrappers)):
+        beside: dict[str, Any] = {"env_args": _EnvArguments, "wrapper": _Wrappers}
+        beside |= {"failure": _Failure, "cost": _Cost} if played else {}
+        for name, annotation in beside.items():
             parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
 
     @wraps(command)
     def run(
-        *, env: str | None, env_args: str | None, wrapper: list[str] | None, **others: Any
+        *,
+        env: str | None,
+        env_args: str | None,
+        wrapper: list[str] | None,
+        failure: str | None = None,
+        cost: str | None = None,
+        **others: Any,
     ) -> None:
-        if env is None and (env_args is not None or wrapper):
-            option = "--wrapper" if env_args is None else "--env-args"
-            raise InputError(f"{option} belongs to an environment; name it with --env")
+        beside = {
+            "--env-args": env_args,
+            "--wrapper": wrapper or None,
+            "--failure": failure,
+            "--cost": cost,
+        }
+        for option, value in beside.items():
+            if env is None and value is not None:
+                raise InputError(f"{option} belongs to an environment; name it with --env")
+            if isinstance(value, str) and not value.strip():
+                raise InputError(f"{option} is empty; say what it is, or leave it out")
         environment = None
         if env is not None:
-            environment = Environment(env, env_args or "{}", tuple(wrapper or ()))
+            environment = Environment(
+                env, env_args or "{}", tuple(wrapper or ()), failure or "", cost or ""
+            )
         command(env=environment, **others)
 
     vars(run)["__signature__"] = inspect.Signature(parameters)
     return run
+
+
+with_played_environment = partial(with_environment, played=True)
+"""The same of a command that plays episodes: what a failure is in them, and what a step costs."""

@@ -10,7 +10,7 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
-from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option, with_environment
+from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option, with_played_environment
 from sarl_core.environments.environment import Environment, EnvironmentOrId
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
 
 
-@with_environment
+@with_played_environment
 def report(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
