@@ -55,10 +55,22 @@ def test_the_pair_of_files_is_read() -> None:
     assert "one episode" in texts(app)
 
 
-def test_three_files_are_refused() -> None:
-    file = csv_bytes(*ROWS)
-    app = upload(open_page("demonstrations"), ("a.csv", file), ("b.csv", file), ("c.csv", file))
-    assert errors(app) == ["3 files were given; give one, or the pair of observations and actions."]
+def test_several_files_are_one_set_in_their_natural_order() -> None:
+    names = ("run_10.csv", "run_2.csv", "run_1.csv")
+    files = [(name, f"obs_x,action\n{name[4:-4]},0\n0.5,1\n".encode()) for name in names]
+    app = upload(open_page("demonstrations"), *files)
+    assert not errors(app)
+    assert (metrics(app)["Steps"], metrics(app)["Episodes"]) == ("6", "3")
+    assert "from 'run_1.csv' to 'run_10.csv'" in texts(app)
+
+
+def test_files_of_other_columns_are_refused_by_name() -> None:
+    files = [("a.csv", csv_bytes(*ROWS)), ("b.csv", b"obs_x,action\n0.5,1\n")]
+    app = upload(open_page("demonstrations"), *files)
+    assert errors(app) == [
+        "2 files: b.csv: it has no column 'episode', and 'a.csv' has; give files of the same "
+        "columns."
+    ]
 
 
 @pytest.mark.parametrize("name", BAD_INPUTS)
@@ -224,7 +236,7 @@ def test_whatever_reading_raises_nothing_that_was_chosen_is_lost(
             raise error
 
         monkeypatch.setattr("sarl_core.demonstrations.formats.registry._read", fail)
-        monkeypatch.setattr("sarl_core.demonstrations.formats.registry._check_signature", fail)
+        monkeypatch.setattr("sarl_core.demonstrations.formats.registry.unpacked", fail)
         app = upload(app, ("other.csv", csv_bytes(*ROWS)))
         assert not app.exception
         (told,) = errors(app)

@@ -200,7 +200,8 @@ def read_files(
     if _are_pair([name for _, name in files]):
         return read_demonstrations(*first, env_id=env_id, columns=columns, companion=others[0])
     description = describe_environment(env_id) if env_id else None
-    return _read_set(_given(files), description, columns)
+    with naming(f"{len(files)} files"):
+        return _read_set(_given(files), description, columns)
 
 
 def table_columns(

@@ -10,7 +10,7 @@ import streamlit as st
 from sarl_core.demonstrations.formats import (
     ColumnMap,
     guess_columns,
-    read_demonstrations,
+    read_files,
     table_columns,
 )
 from sarl_core.errors import InputError, SarlError
@@ -39,19 +39,8 @@ def read_upload(columns: ColumnMap | None = None) -> None:
     if not files:
         return
     try:
-        if len(files) > 2:
-            raise InputError(
-                f"{len(files)} files were given; give one, or the pair of observations and actions"
-            )
-        (content, name), *others = files
         with st.spinner("Reading and checking …"):
-            demonstrations = read_demonstrations(
-                content,
-                name,
-                env_id=environment() or None,
-                columns=columns,
-                companion=others[0] if others else None,
-            )
+            demonstrations = read_files(files, env_id=environment() or None, columns=columns)
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
@@ -135,12 +124,15 @@ def upload_section(*, expanded: bool) -> None:
     ):
         left, right = st.columns([3, 2], gap="medium")
         left.file_uploader(
-            "Parquet, CSV or NPZ, or the pair obs.csv and actions.csv",
+            "A file, several of one kind, or the ZIP of a folder",
             accept_multiple_files=True,
             key="upload_files",
             on_change=read_upload,
-            help="One row a step: episode, step, obs_<name> …, action or action_<name> …, and "
-            "if there are any reward, terminated, truncated.",
+            help="Parquet, CSV, TSV, JSON lines, Arrow, Excel, HDF5 (D4RL) or NPZ, text also as "
+            ".gz; the pair obs.csv and actions.csv; one file an episode; the ZIP of a folder as "
+            "Minari, LeRobot or Hugging Face's datasets write it. A table has one row a step: "
+            "episode, step, obs_<name> …, action or action_<name> …, and if there are any reward, "
+            "terminated, truncated.",
         )
         right.selectbox(
             "Environment (optional)",
@@ -160,17 +152,17 @@ def upload_section(*, expanded: bool) -> None:
             if chosen_demonstrations() is not None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()
-        if len(files) == 1:
-            names = columns_of(*files[0])
+        if files:
+            names = columns_of(files)
             # An error about a row is not mended by another map; one about columns is.
             mendable = error is not None and "column" in error and not re.search(r"\brow \d", error)
             if names and (mendable or st.toggle("Map the columns myself", key="map_columns")):
                 mapping_form(names)
 
 
-def columns_of(content: memoryview, name: str) -> tuple[str, ...]:
+def columns_of(files: list[tuple[memoryview, str]]) -> tuple[str, ...]:
     """Columns of an uploaded table, () where it has none that can be read."""
     try:
-        return table_columns(content, name)
+        return table_columns(list(files))
     except Exception:  # `read_upload` has said why
         return ()
