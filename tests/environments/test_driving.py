@@ -102,3 +102,10 @@ def test_a_picture_of_the_road_is_drawn_without_a_screen():
         env.reset(seed=0)
         assert len(np.unique(picture_of(env, "Driving-v0"))) > 3
         env.close()
+
+
+def test_an_end_on_the_motorway_is_a_crash():
+    played = rollout("Driving-v0", "novice", episodes=3, seed=0)
+    shortened = played.lengths < 30
+    assert shortened.any()
+    assert played.failed.tolist() == shortened.tolist()
