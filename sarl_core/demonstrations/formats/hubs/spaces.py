@@ -214,7 +214,7 @@ def parts_of(space: Space, what: str) -> tuple[SpacePart, ...]:
 
     Args:
         space: Any.
-        what: Whose it is, for messages.
+        what: "observations", whose labels take a number each, or "actions".
 
     Returns:
         At least one.
@@ -223,17 +223,17 @@ def parts_of(space: Space, what: str) -> tuple[SpacePart, ...]:
         InputError: If one is of images or texts, or they have far too many numbers.
     """
     parts = []
-    features = 0
+    numbers = 0
     for path, one in _simple(space, ()):
         part = SpacePart(path, one, _width(one, what, path))
         parts.append(part)
-        features += part.flat_width
-        if features > MAX_FEATURES:
+        numbers += part.flat_width if what == "observations" else part.width
+        if numbers > MAX_FEATURES:
             raise InputError(
                 f"its {what} have more than {MAX_FEATURES:,} numbers, more than rules a person "
                 "reads could use; choose a data set with fewer"
             )
-    if not features:
+    if not numbers:
         raise InputError(f"its space of {what} has nothing in it; save the data set again")
     return tuple(parts)
 
