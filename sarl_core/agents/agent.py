@@ -18,7 +18,7 @@ from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
-from sarl_core.environments.feature_order import NamedFeatures, line_up
+from sarl_core.environments.feature_order import NamedFeatures, line_up, only_counts
 from sarl_core.errors import InputError, require
 from sarl_core.shipped import DATA
 
@@ -389,13 +389,17 @@ def order_notes(agent: Agent, env_id: EnvironmentOrId) -> tuple[str, ...]:
         len(here.action_names),
         discrete=here.is_discrete,
     )
+    own = tuple(name for name, _ in names.features)
+    there, where = (one.rsplit(":", 1)[-1] for one in (agent.policy.env_id, str(env_id)))
+    if only_counts(own) and there == where:
+        return ()  # trained there, and there the environment names its features itself
     order = line_up(
         NamedFeatures(
             f"the policy {agent.name}",
-            tuple(name for name, _ in names.features),
+            own,
             agent.policy.env_id,
         ),
-        NamedFeatures(str(env_id).rsplit(":", 1)[-1], here.feature_names, str(env_id)),
+        NamedFeatures(where, here.feature_names, str(env_id)),
     )
     if order.how == "permuted":  # two environments of one catalogue: none is the other's
         raise InputError(

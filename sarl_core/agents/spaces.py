@@ -37,6 +37,26 @@ class SpaceAdapter:
     is_discrete: bool
     is_vector: bool
 
+    def misfit(self, observation: Any) -> str:
+        """How many numbers an observation has, where it is of another space.
+
+        Args:
+            observation: As the environment gives it.
+
+        Returns:
+            As "8 numbers and not 4"; "" where the number is right, or what came is none at all,
+            as of a sensor that fails.
+        """
+        from sarl_core.shielding.readers import state_vector
+
+        vector = state_vector(observation, None if self.is_vector else self.observation_space)
+        if isinstance(vector, np.ndarray) and vector.dtype.kind in "biuf":
+            size = vector.size
+            return "" if size == self.n_features else f"{size} numbers and not {self.n_features}"
+        if isinstance(vector, (dict, tuple)):
+            return f"parts that are not those of {type(self.observation_space).__name__}"
+        return ""
+
     def flat(self, observation: Any) -> NDArray[np.float32]:
         """Make one observation a vector.
 

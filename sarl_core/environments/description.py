@@ -18,6 +18,7 @@ import numpy as np
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import numbered
 from sarl_core.environments.imports import named_object, reason
+from sarl_core.environments.naming import own_names, picture_in
 from sarl_core.errors import InputError
 from sarl_core.limits import MAX_FEATURES
 
@@ -268,7 +269,7 @@ def describe_environment(environment: EnvironmentOrId) -> EnvironmentDescription
     try:
         d = _feature_count(env_id, env.observation_space)
         limit = env.spec.max_episode_steps if env.spec is not None else None
-        return replace(_describe(env_id, env.action_space, d), max_steps=limit)
+        return replace(_describe(env_id, env, d), max_steps=limit)
     finally:
         env.close()
 
@@ -276,10 +277,10 @@ def describe_environment(environment: EnvironmentOrId) -> EnvironmentDescription
 def _feature_count(env_id: str, space: Any) -> int:
     from gymnasium import spaces
 
-    if isinstance(space, spaces.Box) and len(space.shape) > 1:
+    if place := picture_in(space):
         raise InputError(
-            f"{env_id} gives observations of shape {space.shape}, as images do, which rules "
-            "cannot read; choose an environment with a vector of features"
+            f"{env_id} gives observations {place}, as images do, which rules cannot read; choose "
+            "an environment with features, or put a wrapper around it that gives them"
         )
     try:
         d = int(spaces.utils.flatdim(space))
@@ -296,9 +297,13 @@ def _feature_count(env_id: str, space: Any) -> int:
     return d
 
 
-def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
+def _describe(env_id: str, env: Any, d: int) -> EnvironmentDescription:
+    import gymnasium
     from gymnasium import spaces
 
+    from sarl_core.environments.observation_layers import innermost, same_observations
+
+    space = env.action_space
     low = high = None
     first: tuple[int, ...] = ()
     shape: tuple[int, ...] = ()
@@ -323,15 +328,25 @@ def _describe(env_id: str, space: Any, d: int) -> EnvironmentDescription:
             "be mined; choose an environment with discrete or continuous actions"
         )
     m = len(counts) if low is None else len(low)
-    names = catalogued(env_id, d, m, discrete=low is None)
+    layers = same_observations(env)
+    own = own_names(layers, d, counts, m)
+    plain = not isinstance(layers[-1], gymnasium.Wrapper)
+    try:
+        there = int(spaces.utils.flatdim(innermost(env).observation_space))
+    except (NotImplementedError, ValueError):
+        there = d
+    names = catalogued(env_id, there, m, discrete=low is None)
+    features = names.features if plain else [(name, "") for name in numbered(d)]
+    units = [""] * d if own.features else [unit for _, unit in features]
+    labels = own.labels or names.labels
     return EnvironmentDescription(
         env_id=env_id,
-        feature_names=tuple(name for name, _ in names.features),
-        feature_units=tuple(unit for _, unit in names.features),
-        action_names=names.actions,
+        feature_names=own.features or tuple(name for name, _ in features),
+        feature_units=own.units or tuple(units),
+        action_names=own.actions or names.actions,
         label_names=tuple(
-            names.labels[i]
-            if i < len(names.labels) and len(names.labels[i]) == counts[i]
+            labels[i]
+            if i < len(labels) and len(labels[i]) == counts[i]
             else tuple(str(first[i] + label) for label in range(counts[i]))
             for i in range(m)
         )

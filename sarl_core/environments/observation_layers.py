@@ -11,7 +11,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import gymnasium
+import numpy as np
 
+from sarl_core.environments.naming import OwnNames, own_names
 from sarl_core.errors import InputError
 
 # Wrappers that hand observations on as they are, or lay them flat, by package and class.
@@ -46,10 +48,12 @@ class Observed(NamedTuple):
         owner: In a sentence, as "CartPole-v1" or "CartPole-v1 behind FilterObservation".
         env_id: Of the environment whose features they are; "" where a wrapper may have changed
             what they are, or nothing says.
+        names: What the environment, or a wrapper, calls them itself.
     """
 
     owner: str
     env_id: str
+    names: OwnNames = OwnNames()
 
 
 class Layer(NamedTuple):
@@ -76,7 +80,34 @@ def observed(env: gymnasium.Env[Any, Any]) -> Observed:
     Raises:
         InputError: If they are normalised.
     """
-    return behind(_layers(env), str(getattr(env.spec, "id", None) or ""))
+    outer = behind(_layers(env), str(getattr(env.spec, "id", None) or ""))
+    d = int(gymnasium.spaces.utils.flatdim(env.observation_space))
+    m = int(np.prod(env.action_space.shape or ()))
+    return outer._replace(names=own_names(same_observations(env), d, (), m))
+
+
+def same_observations(env: gymnasium.Env[Any, Any]) -> list[gymnasium.Env[Any, Any]]:
+    """The layers of an environment whose observations are those that it shows.
+
+    Args:
+        env: Wrapped or not.
+
+    Returns:
+        The outermost first; the last one is where the observations come from.
+    """
+    layers = [env]
+    while isinstance(layer := layers[-1], gymnasium.Wrapper) and hands_on(
+        type(layer), "step", "reset"
+    ):
+        layers.append(layer.env)
+    return layers
+
+
+def innermost(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """The environment within all wrappers, whose names a catalogue may know."""
+    while isinstance(env, gymnasium.Wrapper):
+        env = env.env
+    return env
 
 
 def behind(layers: Iterable[Layer], env_id: str) -> Observed:

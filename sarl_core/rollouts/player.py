@@ -200,6 +200,11 @@ class _Lanes:
             observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
         except Exception as error:  # other people's code, which may raise anything
             raise self._broken(lane, "at its reset", error) from error
+        if misfit := self.adapter.misfit(observation):
+            raise InputError(
+                f"{self.env_id} gives observations that are not of its space ({misfit}); let it, "
+                "or the wrapper around it, say in observation_space what it gives"
+            )
         state = self.adapter.flat(observation)
         self.states = np.concatenate([self.states, state[None]])
         if self.observer is not None:

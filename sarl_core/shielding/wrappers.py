@@ -11,6 +11,7 @@ import numpy as np
 
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import NamedFeatures
+from sarl_core.environments.naming import key_names
 from sarl_core.environments.observation_layers import Observed, observed
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.rule_order import fitted_rules
@@ -200,10 +201,15 @@ def fitted(
     names = catalogued(
         observed.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
     )
+    features = observed.names.features or key_names(observation_space)
     ordered = fitted_rules(
         rule_set,
-        NamedFeatures(observed.owner, tuple(name for name, _ in names.features), observed.env_id),
-        names.actions,
+        NamedFeatures(
+            observed.owner,
+            features or tuple(name for name, _ in names.features),
+            observed.env_id,
+        ),
+        observed.names.actions or names.actions,
     )
     if ordered.rule_set is not rule_set:
         shield = shield.with_rules(ordered.rule_set)

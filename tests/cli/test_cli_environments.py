@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, load_demonstrations, save_demonstrations
@@ -112,5 +113,10 @@ def test_what_was_recorded_before_an_environment_failed_is_written(
     assert code == 2
     assert "in the episode with seed 3, at step 6" in capsys.readouterr().err
     part = load_demonstrations(out)
-    assert part.n_episodes == 4
-    assert (part.episodes == 3).sum() == 6
+    as_long = ("--agent", "novice", "--seed", "0", "--steps", str(len(part)))
+    plain = here / "whole.parquet"
+    assert not main(["record", "--env", "CartPole-v1", *as_long, "--out", str(plain)])
+    whole = load_demonstrations(plain)
+    first = part.episodes == 0
+    np.testing.assert_array_equal(part.observations[first], whole.observations[: first.sum()])
+    assert part.n_episodes == 2
