@@ -18,7 +18,7 @@ import numpy as np
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import numbered
 from sarl_core.environments.imports import named_object, reason
-from sarl_core.environments.naming import own_names, picture_in
+from sarl_core.environments.naming import own_names, package_labels, picture_in
 from sarl_core.errors import InputError
 from sarl_core.limits import MAX_FEATURES
 
@@ -298,10 +298,9 @@ def _feature_count(env_id: str, space: Any) -> int:
 
 
 def _describe(env_id: str, env: Any, d: int) -> EnvironmentDescription:
-    import gymnasium
     from gymnasium import spaces
 
-    from sarl_core.environments.observation_layers import innermost, same_observations
+    from sarl_core.environments.observation_layers import as_registered, same_observations
 
     space = env.action_space
     low = high = None
@@ -330,15 +329,16 @@ def _describe(env_id: str, env: Any, d: int) -> EnvironmentDescription:
     m = len(counts) if low is None else len(low)
     layers = same_observations(env)
     own = own_names(layers, d, counts, m)
-    plain = not isinstance(layers[-1], gymnasium.Wrapper)
+    made = as_registered(env)
+    plain = layers[-1] is made
     try:
-        there = int(spaces.utils.flatdim(innermost(env).observation_space))
+        there = int(spaces.utils.flatdim(made.observation_space))
     except (NotImplementedError, ValueError):
         there = d
     names = catalogued(env_id, there, m, discrete=low is None)
     features = names.features if plain else [(name, "") for name in numbered(d)]
     units = [""] * d if own.features else [unit for _, unit in features]
-    labels = own.labels or names.labels
+    labels = own.labels or names.labels or package_labels(env, counts)
     return EnvironmentDescription(
         env_id=env_id,
         feature_names=own.features or tuple(name for name, _ in features),

@@ -81,11 +81,24 @@ def _texts(names: Any, *, empty: bool = False) -> tuple[str, ...]:
 
 
 def _labels(env: Any, counts: Sequence[int]) -> tuple[tuple[str, ...], ...]:
-    """Names of the labels of all dimensions, or none."""
+    """Names of the labels of all dimensions in an attribute, or none."""
     names = _attempt(lambda: env.get_wrapper_attr("label_names"))
     each = [names] if _texts(names) else names if isinstance(names, (list, tuple)) else []
     if each and [len(_texts(one)) for one in each] == list(counts):
         return tuple(_texts(one) for one in each)
+    return ()
+
+
+def package_labels(env: Any, counts: Sequence[int]) -> tuple[tuple[str, ...], ...]:
+    """Names of actions as highway-env and the Arcade Learning Environment keep them.
+
+    Args:
+        env: Wrapped or not.
+        counts: Number of labels of each discrete action dimension; () if continuous.
+
+    Returns:
+        Of the one dimension; () where there are none, or several dimensions.
+    """
     sources: tuple[Callable[[], Any], ...] = (
         lambda: env.get_wrapper_attr("action_type").actions,
         lambda: env.get_wrapper_attr("get_action_meanings")(),

@@ -96,17 +96,32 @@ def same_observations(env: gymnasium.Env[Any, Any]) -> list[gymnasium.Env[Any, A
         The outermost first; the last one is where the observations come from.
     """
     layers = [env]
-    while isinstance(layer := layers[-1], gymnasium.Wrapper) and hands_on(
-        type(layer), "step", "reset"
+    within = as_registered(env)
+    while (
+        (layer := layers[-1]) is not within
+        and isinstance(layer, gymnasium.Wrapper)
+        and hands_on(type(layer), "step", "reset")
     ):
         layers.append(layer.env)
     return layers
 
 
-def innermost(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
-    """The environment within all wrappers, whose names a catalogue may know."""
+def as_registered(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    """The environment that an id stands for, within whatever was put around it.
+
+    It may have wrappers of its own; Gymnasium puts `OrderEnforcing` around it.
+
+    Args:
+        env: Wrapped or not.
+
+    Returns:
+        One of its layers.
+    """
     while isinstance(env, gymnasium.Wrapper):
+        enforcing = type(env) is gymnasium.wrappers.OrderEnforcing
         env = env.env
+        if enforcing:
+            break
     return env
 
 
@@ -129,6 +144,8 @@ def behind(layers: Iterable[Layer], env_id: str) -> Observed:
             raise normalised(name)
         if not classes or not all(hands_on(one, "step", "reset") for one in classes):
             return Observed(f"{owner} behind {name}", "")
+        if gymnasium.wrappers.OrderEnforcing in classes:
+            break  # what comes within belongs to the environment of that id
     return Observed(owner, env_id)
 
 
