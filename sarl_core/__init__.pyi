@@ -1,5 +1,7 @@
 # The public names, each with its home: what is loaded when, and what type checkers see.
 from .agents.agent import make_agent as make_agent
+from .auditing.audit import Audit as Audit
+from .auditing.audit import audit as audit
 from .demonstrations.dataset import Demonstrations as Demonstrations
 from .demonstrations.formats import load_demonstrations as load_demonstrations
 from .demonstrations.formats import save_demonstrations as save_demonstrations

@@ -235,3 +235,21 @@ def _within(kind: inspect.Type, step: str | int) -> list[Any]:
     else:
         types = [kind.item_type] if isinstance(kind, inspect.CollectionType) else []
     return [one for inner in types for one in _either(inner)]
+
+
+def plain(value: Any) -> Any:
+    """A document with null in place of NaN and infinity, which JSON does not have.
+
+    Args:
+        value: Mappings, sequences, text, numbers.
+
+    Returns:
+        The same, in dicts and lists.
+    """
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    return value

@@ -14,6 +14,7 @@ from sarl_core import __version__
 from sarl_core.cli import terminal
 from sarl_core.cli.ablate import ablate
 from sarl_core.cli.aggregate import aggregate
+from sarl_core.cli.audit import audit
 from sarl_core.cli.dashboard import app as dashboard
 from sarl_core.cli.demonstrations import check, record
 from sarl_core.cli.diff import diff
@@ -39,6 +40,7 @@ for command in (
     mine,
     landscape,
     diff,
+    audit,
     evaluate,
     render,
     ablate,

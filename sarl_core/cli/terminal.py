@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import sys
 import traceback
@@ -11,11 +10,12 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from sarl_core.cli.streams import interruptible, lasting_streams
+from sarl_core.documents import plain
 from sarl_core.errors import InputError, SarlError
 from sarl_core.files import temporary_folder
 
@@ -157,24 +157,6 @@ def print_json(document: object) -> None:
     """
     only_ascii = not (sys.stdout.encoding or "").lower().startswith("utf")
     print(json.dumps(plain(document), ensure_ascii=only_ascii, allow_nan=False))  # noqa: T201
-
-
-def plain(value: Any) -> Any:
-    """A document with null in place of NaN and infinity, which JSON does not have.
-
-    Args:
-        value: Mappings, sequences, text, numbers.
-
-    Returns:
-        The same, in dicts and lists.
-    """
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    return value
 
 
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:

@@ -86,7 +86,7 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
             "environment"
         )
     as_they_are = tuple(range(len(first.names)))
-    one, other = _plain(first.names), _plain(second.names)
+    one, other = plain_names(first.names), plain_names(second.names)
     known = first.env_id != "" and _bare(first.env_id) == _bare(second.env_id)
     nameless = [only_counts(side.names) for side in (first, second)]
     if one == other and (known or not all(nameless)):
@@ -194,5 +194,13 @@ def _bare(env_id: str) -> str:
     return env_id.rsplit(":", 1)[-1]
 
 
-def _plain(names: Sequence[str]) -> list[str]:
+def plain_names(names: Sequence[str]) -> list[str]:
+    """Names as they are compared: whatever their capitals, and however words are parted.
+
+    Args:
+        names: Any number.
+
+    Returns:
+        One each.
+    """
     return [" ".join(re.split(r"[\s_\-]+", name.casefold().strip())) for name in names]

@@ -1,0 +1,187 @@
+"""A log brought into the order, and to the labels, of the rules that are held against it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+from sarl_core.environments.feature_order import (
+    NamedFeatures,
+    line_up,
+    only_counts,
+    plain_names,
+    shortened,
+)
+from sarl_core.errors import InputError
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rule_set import RuleSet
+
+_CURE = "give a log of what the rules were mined for"
+
+
+class MatchedLog(NamedTuple):
+    """N steps as rules take them.
+
+    Attributes:
+        observations: In the rules' order, (N, d) float32.
+        labels: Of what was done, (N, m).
+        actions: What was done, as the rules' own actions, (N,) or (N, m).
+        notes: What is to be said of how the two were matched, as clauses.
+    """
+
+    observations: NDArray[np.float32]
+    labels: NDArray[np.int64]
+    actions: NDArray[Any]
+    notes: tuple[str, ...]
+
+
+def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the log") -> MatchedLog:
+    """Bring a log into the order of rules, by the names of features, actions and labels.
+
+    Args:
+        rule_set: The rules, over d features and m action dimensions.
+        log: N steps of somebody.
+        called: What it is called in a message.
+
+    Returns:
+        The same steps.
+
+    Raises:
+        InputError: If the log lacks a feature or an action that the rules speak of, has it in
+            another unit, or holds a label that the rules do not know.
+    """
+    places, notes = _feature_places(rule_set, log, called)
+    observations = log.observations
+    if places != list(range(observations.shape[1])):
+        observations = np.ascontiguousarray(observations[:, places])
+    _check_units(rule_set, log, places, called)
+    names = tuple(dimension.name for dimension in log.action_dimensions)
+    order = tuple(range(len(names)))
+    if len(names) > 1 or len(rule_set.actions) > 1:
+        lined = line_up(
+            NamedFeatures(called, names, log.env_id),
+            NamedFeatures(
+                "the rules",
+                tuple(dimension.name for dimension in rule_set.actions),
+                rule_set.source.env_id,
+            ),
+            what="action dimensions",
+        )
+        order, notes = lined.places, (*notes, *filter(None, [lined.note]))
+    labels = np.empty((len(log), len(rule_set.actions)), dtype=np.int64)
+    actions: NDArray[Any] = np.empty(
+        labels.shape, dtype=np.float32 if rule_set.actions[0].is_interval else np.int64
+    )
+    for column, (dimension, place) in enumerate(zip(rule_set.actions, order, strict=True)):
+        values = log.action_columns[:, place]
+        demonstrated = log.action_dimensions[place]
+        if dimension.is_interval:
+            actions[:, column] = _amounts(dimension, demonstrated, values, called)
+            labels[:, column] = dimension.labels_of(actions[:, column])
+        else:
+            labels[:, column] = _labels(dimension, demonstrated, values, called)
+            actions[:, column] = labels[:, column] + dimension.first
+    single = len(rule_set.actions) == 1 and not rule_set.actions[0].is_interval
+    return MatchedLog(observations, labels, actions[:, 0] if single else actions, notes)
+
+
+def _feature_places(
+    rule_set: RuleSet, log: Demonstrations, called: str
+) -> tuple[list[int], tuple[str, ...]]:
+    """For each feature of the rules its place in the log."""
+    theirs = tuple(feature.name for feature in rule_set.source.features)
+    ours = tuple(feature.name for feature in log.features)
+    wanted, have = plain_names(theirs), plain_names(ours)
+    missing = [name for name, plain in zip(theirs, wanted, strict=True) if plain not in have]
+    further = [name for name, plain in zip(ours, have, strict=True) if plain not in wanted]
+    if len(ours) == len(theirs):
+        lined = line_up(
+            NamedFeatures(called, ours, log.env_id),
+            NamedFeatures("the rules", theirs, rule_set.source.env_id),
+        )
+        return list(lined.places), tuple(filter(None, [lined.note]))
+    if missing or only_counts(ours) or only_counts(theirs) or len(set(have)) < len(have):
+        lacks = f" has no {shortened(missing)}" if missing else f" has {len(ours)}"
+        raise InputError(
+            f"the rules ask about {len(theirs)} features and {called}{lacks} "
+            f"(the rules: {shortened(theirs)}; {called}: {shortened(ours)}); {_CURE}"
+        )
+    note = f"{shortened(further)} of {called} is no feature of the rules and was left out"
+    return [have.index(name) for name in wanted], (note,)
+
+
+def _check_units(rule_set: RuleSet, log: Demonstrations, places: list[int], called: str) -> None:
+    for feature, place in zip(rule_set.source.features, places, strict=True):
+        unit = log.features[place].unit.strip()
+        if unit and feature.unit.strip() and unit != feature.unit.strip():
+            raise InputError(
+                f"{called} gives {feature.name!r} in {unit} and the rules ask about it in "
+                f"{feature.unit}; convert the column"
+            )
+
+
+def _amounts(
+    dimension: LabelledDimension,
+    demonstrated: ActionDimension,
+    values: NDArray[Any],
+    called: str,
+) -> NDArray[np.float32]:
+    """Amounts of a continuous dimension; whole numbers that were read as labels are some, too."""
+    if demonstrated.kind != "interval" and not _is_number(demonstrated):
+        raise InputError(
+            f"the action {dimension.name!r} is an amount in the rules and a label in {called} "
+            f"({shortened(demonstrated.labels)}); {_CURE}"
+        )
+    return values.astype(np.float32)
+
+
+def _labels(
+    dimension: LabelledDimension,
+    demonstrated: ActionDimension,
+    values: NDArray[Any],
+    called: str,
+) -> NDArray[np.int64]:
+    """Labels of the rules, by their names; by their numbers where one side has no names."""
+    if demonstrated.kind == "interval":
+        raise InputError(
+            f"the action {dimension.name!r} is a label in the rules "
+            f"({shortened(dimension.label_names)}) and an amount in {called}; {_CURE}"
+        )
+    own = (values - demonstrated.first).astype(np.int64)
+    wanted, have = plain_names(dimension.label_names), plain_names(demonstrated.labels)
+    if _is_number(demonstrated) and set(have) - set(wanted):
+        # Numbers without names: the action is the same number.
+        translated = np.arange(len(have)) + demonstrated.first - dimension.first
+        translated[(translated < 0) | (translated >= len(wanted))] = -1
+    elif set(have).isdisjoint(wanted) and len(have) == len(wanted) and _numbered(dimension):
+        translated = np.arange(len(have))
+    else:
+        translated = np.array([wanted.index(name) if name in wanted else -1 for name in have])
+    labels = translated[own]
+    unknown = labels < 0
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise InputError(
+            f"{called} holds the {dimension.name!r} {demonstrated.labels[own[row]]!r} in row "
+            f"{row + 1} ({int(unknown.sum()):,} rows in all), which the rules do not know: they "
+            f"were mined from {shortened(dimension.label_names)}; leave those rows out, or mine "
+            "from demonstrations with it"
+        )
+    return np.asarray(labels, dtype=np.int64)
+
+
+def _is_number(demonstrated: ActionDimension) -> bool:
+    """Whether its labels are called by their numbers."""
+    first = demonstrated.first
+    return demonstrated.labels == tuple(
+        str(number) for number in range(first, first + len(demonstrated.labels))
+    )
+
+
+def _numbered(dimension: LabelledDimension) -> bool:
+    return dimension.label_names == tuple(
+        str(dimension.first + label) for label in range(dimension.n_labels)
+    )

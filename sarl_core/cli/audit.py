@@ -1,0 +1,189 @@
+"""The command that holds rules against a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.options import Json, ProjectionName, out_option
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.auditing.audit import Audit
+    from sarl_core.auditing.comparison import LogComparison
+    from sarl_core.auditing.guards import Guard
+
+_FAILED = 3  # a condition of --fail-on holds
+_LISTED = 12
+
+
+def audit(
+    rules: Annotated[
+        Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
+    ],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="What somebody did: demonstrations in any format that is read.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        out_option(
+            "Write audit.json, audit.html, steps.csv, rules.csv and episodes.csv into this "
+            "folder; made if it is not there.",
+            metavar="DIR",
+        ),
+    ] = None,
+    fail_on: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fail-on",
+            metavar="CONDITION",
+            show_default=False,
+            help="Exit with 3 if this holds, as breaks>0.02 or coverage<50%; may be given several "
+            "times. Measures: agreement, breaks, breaks_per_thousand, coverage, drift, freedom, "
+            "gaps, left_out, longest_run, near, outside, steps.",
+        ),
+    ] = None,
+    compare: Annotated[
+        Path | None,
+        typer.Option(
+            "--compare",
+            metavar="LOG",
+            show_default=False,
+            help="Another log, as after a change: what differs from the first, with intervals.",
+        ),
+    ] = None,
+    demonstrations: Annotated[
+        Path | None,
+        typer.Option(
+            "--demonstrations",
+            metavar="FILE",
+            show_default="what the rules say of them",
+            help="What the rules were mined from, to compare the log's distributions with.",
+        ),
+    ] = None,
+    projection: ProjectionName = "centre",
+    as_json: Json = False,
+) -> None:
+    """Hold rules against a log: where they were broken, how often, and whether it drifts.
+
+    The log needs no environment. Features, actions and labels are matched by their names.
+
+    Example: `python -m sarl_core audit data/rules/cartpole_compact.json
+    data/demonstrations/cartpole.parquet --fail-on "breaks>0.02" --out audited`
+    """
+    with terminal.working("Auditing"):
+        from sarl_core.auditing.audit import audit as against
+        from sarl_core.auditing.comparison import LogComparison
+        from sarl_core.auditing.guards import guard
+        from sarl_core.mining.rule_set import RuleSet
+
+        guards = [guard(text) for text in fail_on or ()]
+        rule_set = RuleSet.load(rules)
+        mined_from = None if demonstrations is None else read_demonstrations(demonstrations, None)
+
+        def hold(path: Path) -> Audit:
+            try:
+                return against(
+                    rule_set,
+                    read_demonstrations(path, None),
+                    projection=projection,
+                    demonstrations=mined_from,
+                )
+            except InputError as error:
+                raise InputError(_with_path(error, path)) from error
+
+        held = hold(log)
+        comparison = None if compare is None else LogComparison(held, hold(compare))
+        if out is not None:
+            from sarl_core.explaining.exports.audit import save_audit
+
+            save_audit(held, out, title=f"{log.name} against {rules.name}", comparison=comparison)
+    document = _document(held, comparison, guards)
+    if as_json:
+        terminal.print_json(document)
+    else:
+        _print(held, comparison, f"{log} against {rules}")
+        if out is not None:
+            terminal.print_lines([f"Wrote {out}."])
+    _guard(held, guards)
+
+
+def _with_path(error: InputError, path: Path) -> str:
+    return str(error) if str(path) in str(error) else f"{path}: {error}"
+
+
+def _document(held: Audit, comparison: LogComparison | None, guards: list[Guard]) -> dict[str, Any]:
+    document = held.to_dict()
+    if comparison is not None:
+        document["comparison"] = comparison.to_dict()
+    if guards:
+        document["failed_on"] = [one.text for one in guards if one.holds(held)]
+    return document
+
+
+def _guard(held: Audit, guards: list[Guard]) -> None:
+    """End with a code of its own where a condition holds."""
+    failed = [one for one in guards if one.holds(held)]
+    terminal.print_notes(
+        f"{one.text} holds: {one.measure} is {one.value(held):.6g}" for one in failed
+    )
+    if failed:
+        raise typer.Exit(_FAILED)
+
+
+def _print(held: Audit, comparison: LogComparison | None, title: str) -> None:
+    from sarl_core.cli.answers import print_notes
+    from sarl_core.explaining.words.audit import (
+        audit_facts,
+        comparison_text,
+        drift_text,
+        interval_text,
+        stretch_text,
+    )
+    from sarl_core.mining.language import share_text
+
+    terminal.print_lines([title, ""])
+    terminal.print_facts(audit_facts(held))
+    table = held.rule_table()
+    broken = table[table["broken"] > 0].sort_values("broken", ascending=False)
+    if len(broken):
+        terminal.print_table(
+            ("rule", "applies", "broken", "obeyed, by episodes", "95 % interval", "outside"),
+            [
+                (
+                    row["name"],
+                    f"{row['applies']:,}",
+                    f"{row['broken']:,}",
+                    share_text(row["obeyed"]),
+                    "too few episodes"
+                    if row["obeyed_low"] != row["obeyed_low"]
+                    else f"{share_text(row['obeyed_low'])} to {share_text(row['obeyed_high'])}",
+                    f"{row['outside']:,}",
+                )
+                for row in broken.head(_LISTED).to_dict("records")
+            ],
+        )
+        if len(broken) > _LISTED:
+            terminal.print_lines([f"and {len(broken) - _LISTED} more rules that were broken"])
+    terminal.print_lines(stretch_text(held, one) for one in held.worst[:3])
+    terminal.print_lines(["", drift_text(held.drift)])
+    if comparison is not None:
+        terminal.print_lines(["", comparison_text(comparison)])
+        differing = [one for one in comparison.differences if one.drifted]
+        terminal.print_table(
+            ("share", "of", "before", "after", "difference in points"),
+            [
+                (one.name, one.what, *map(share_text, (one.before, one.now)), interval_text(one))
+                for one in (*comparison.differences[:4], *differing[:_LISTED])
+            ],
+        )
+    print_notes(held.notes)

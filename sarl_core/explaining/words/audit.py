@@ -1,0 +1,167 @@
+"""What an audit says, in sentences."""
+
+from __future__ import annotations
+
+from sarl_core.auditing.audit import Audit, Stretch
+from sarl_core.auditing.comparison import LogComparison
+from sarl_core.auditing.drift import Drift, Moved
+from sarl_core.auditing.near import NEAR
+from sarl_core.mining.evidence import FEWEST_EPISODES
+from sarl_core.mining.language import counted, share_text
+
+_LISTED = 5
+
+
+def audit_facts(audit: Audit) -> list[tuple[str, str]]:
+    """The numbers of an audit, with what each counts.
+
+    Args:
+        audit: Rules against a log.
+
+    Returns:
+        Names and values, in the order in which they are read.
+    """
+    steps, held = audit.steps, audit.agreement_by_episode
+    interval = held.interval
+    between = (
+        f"; by episodes {share_text(held.share or 0.0)} "
+        f"(95 % interval {share_text(interval.low)} to {share_text(interval.high)})"
+        if interval is not None
+        else "; too few episodes for an interval"
+    )
+    every = "" if audit.looked_at == 1 else f", of every {audit.looked_at}th step"
+    facts = [
+        ("steps", f"{steps:,} in {counted(audit.log.n_episodes, 'episode')}"),
+        ("coverage", f"{share_text(audit.coverage)}: {counted(audit.covered, 'step')} with a rule"),
+        (
+            "agreement",
+            f"{share_text(audit.agreement)} of those{between}"
+            if audit.covered
+            else "no step has a rule",
+        ),
+        (
+            "breaks",
+            f"{counted(audit.broken, 'step')}, {audit.breaks_per_thousand:.1f} in a thousand; a "
+            "shield would have changed these actions",
+        ),
+        ("longest run", counted(audit.longest_run, "step")),
+        ("outside", f"{counted(int(audit.outside.sum()), 'break')} where the rule has no data"),
+        (
+            "near misses",
+            f"{counted(audit.near_count, 'step')} ({share_text(audit.near_share)}{every}): one "
+            f"feature less than {NEAR:g} of its spread away from breaking a rule",
+        ),
+        ("freedom", f"{share_text(audit.freedom)} under a shield with these rules"),
+    ]
+    if audit.left_out or audit.gaps:
+        facts.append(
+            (
+                "gaps",
+                f"{counted(audit.left_out, 'step')} left out, in which a number is missing; "
+                f"{counted(audit.gaps, 'jump')} in the numbers of the steps",
+            )
+        )
+    return facts
+
+
+def stretch_text(audit: Audit, stretch: Stretch) -> str:
+    """A stretch of breaks in a sentence.
+
+    Args:
+        audit: Where it is.
+        stretch: One of its worst.
+
+    Returns:
+        As "episode 3, from step 17: 12 steps that break R4".
+    """
+    rules = " and ".join(audit.rule_set.name_of(audit.rule_set[at]) for at in stretch.rules)
+    return (
+        f"episode {stretch.episode}, from step {stretch.step}: "
+        f"{counted(stretch.length, 'step')} that break{'s' if stretch.length == 1 else ''} {rules}"
+    )
+
+
+def drift_text(drift: Drift) -> str:
+    """Whether a log still looks like the demonstrations, in a sentence or two.
+
+    Args:
+        drift: What moved.
+
+    Returns:
+        With the number of comparisons that it rests on.
+    """
+    if not drift.is_known:
+        return (
+            f"Whether the log looks like the demonstrations cannot be said of so few episodes "
+            f"({drift.episodes[0]} in the log, {drift.episodes[1]} in the demonstrations; it takes "
+            f"{FEWEST_EPISODES} of each)."
+        )
+    compared = counted(len(drift.all), "share")
+    sure = (
+        f"{compared} compared with {drift.against}, over episodes, with intervals that hold "
+        "together with 95 % certainty"
+    )
+    moved = drift.drifted
+    if not moved:
+        return f"Nothing shows that the log looks different from the demonstrations ({sure})."
+    which = "; ".join(moved_text(one) for one in moved[:_LISTED])
+    more = f"; and {len(moved) - _LISTED} more" if len(moved) > _LISTED else ""
+    return f"The log no longer looks like the demonstrations: {which}{more} ({sure})."
+
+
+def moved_text(moved: Moved) -> str:
+    """One share, before and now.
+
+    Args:
+        moved: Of a drift or a comparison.
+
+    Returns:
+        As "R3, steps in which it applies: 12 % now, 4 % before".
+    """
+    return (
+        f"{moved.name}, {moved.what}: {share_text(moved.now)} now, "
+        f"{share_text(moved.before)} before"
+    )
+
+
+def interval_text(moved: Moved) -> str:
+    """The interval of a difference, in points of per cent.
+
+    Args:
+        moved: Of a drift or a comparison.
+
+    Returns:
+        As "+2.1 to +9.8", or that there are too few episodes.
+    """
+    if moved.low is None or moved.high is None:
+        return "too few episodes"
+    return f"{100 * moved.low:+.1f} to {100 * moved.high:+.1f}"
+
+
+def comparison_text(comparison: LogComparison) -> str:
+    """What differs between two logs, in a sentence.
+
+    Args:
+        comparison: Of the two.
+
+    Returns:
+        With the number of comparisons that it rests on.
+    """
+    if not comparison.is_known:
+        return (
+            "Whether the two logs differ cannot be said of so few episodes: it takes "
+            f"{FEWEST_EPISODES} in each."
+        )
+    compared = comparison.differences
+    differing = sorted(
+        (one for one in compared if one.drifted), key=lambda one: -abs(one.now - one.before)
+    )
+    sure = (
+        f"{counted(len(compared), 'share')} compared, over episodes, with intervals that hold "
+        "together with 95 % certainty"
+    )
+    if not differing:
+        return f"Nothing shows that the two logs differ ({sure})."
+    which = "; ".join(moved_text(one) for one in differing[:_LISTED])
+    more = f"; and {len(differing) - _LISTED} more" if len(differing) > _LISTED else ""
+    return f"The logs differ: {which}{more} ({sure})."

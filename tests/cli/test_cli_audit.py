@@ -1,0 +1,71 @@
+"""The command `audit`, as a nightly job and as a person call it."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from sarl_core.cli.app import main
+
+RULES = "data/rules/cartpole_compact.json"
+LOG = "data/demonstrations/cartpole.parquet"
+
+
+def test_it_answers_in_one_document(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", RULES, LOG, "--json", "--fail-on", "breaks>0.9"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["steps"] == 15_000
+    assert document["failed_on"] == []
+    assert sum(rule["broken"] for rule in document["rules"]) == document["broken"]
+    assert sum(one["broken"] for one in document["episodes"]) == document["broken"]
+    assert document["drift"]["compared"] == len(document["drift"]["features"]) + len(
+        document["drift"]["rules"]
+    )
+
+
+def test_it_fails_a_job_with_a_code_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", RULES, LOG, "--json", "--fail-on", "coverage>50%"]) == 3
+    out, error = capsys.readouterr()
+    assert json.loads(out)["failed_on"] == ["coverage>50%"]
+    assert "coverage>50% holds: coverage is 1" in error
+
+
+def test_it_writes_a_page_and_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "audited"
+    assert main(["audit", RULES, LOG, "--out", str(out), "--compare", LOG]) == 0
+    said = capsys.readouterr().out
+    assert "Nothing shows that the two logs differ" in said
+    with (out / "steps.csv").open() as file:
+        steps = list(csv.DictReader(file))
+    document = json.loads((out / "audit.json").read_text())
+    assert len(steps) == document["steps"]
+    assert sum(step["broken"] == "true" for step in steps) == document["broken"]
+    assert {path.name for path in out.iterdir()} == {
+        "audit.json",
+        "audit.html",
+        "steps.csv",
+        "rules.csv",
+        "episodes.csv",
+    }
+    page = (out / "audit.html").read_text()
+    assert "<script" not in page
+    assert "Does it still look like the demonstrations?" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--fail-on", "brakes>1"], "which is no measure"),
+        (["--compare", "data/demonstrations/pendulum.parquet"], "pendulum.parquet: the rules ask"),
+        (["--out", "no/such/folder"], "cannot be made"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["audit", RULES, LOG, *arguments]) == 2
+    out, error = capsys.readouterr()
+    assert out == ""
+    assert error.count("\n") == 1
+    assert said in error
