@@ -490,10 +490,10 @@ def _drift_from_rules(
         ]
     names = [_rule_names(rule_set)[place] for place in known]
     rules = against_expected(Shares(counts[:, known], lengths), np.array(expected), episodes)
-    beyond, asked, usual = _beyond(rule_set, matched.observations, in_force, starts)
+    beyond, ruled, usual = _beyond(rule_set, matched.observations, in_force, starts)
     features: tuple[Moved, ...] = ()
-    if asked.sum():
-        before, now, low, high = against_expected(Shares(beyond, asked), usual, episodes)
+    if ruled.sum():
+        before, now, low, high = against_expected(Shares(beyond, ruled), usual, episodes)
         said = "states outside the middle 98 % of the data of the rule that applies"
         features = moved(
             [(one.name, said) for one in rule_set.source.features],
@@ -521,7 +521,7 @@ def _beyond(
         (d,): of n states, about 2 / n of others like them lie outside all of them.
     """
     d = observations.shape[1]
-    counts, asked = np.zeros((len(starts), d)), np.zeros(len(starts))
+    counts, ruled = np.zeros((len(starts), d)), np.zeros(len(starts))
     usual = 0.0
     boxes = [rule.box for rule in rule_set]
     has_box = np.array([box is not None for box in boxes] + [False])
@@ -532,14 +532,14 @@ def _beyond(
     chance = np.array([min(_BEYOND + 2.0 / (rule.samples + 1), 1.0) for rule in rule_set])
     for column in in_force.T:
         known = has_box[column]
-        asked += by_episode(known, starts)
+        ruled += by_episode(known, starts)
         rules = np.where(known, column, 0)
         usual += float(chance[rules][known].sum()) if len(boxes) else 0.0
         for feature in range(d if len(boxes) else 0):
             values = observations[:, feature]
             out = (values < low[rules, feature]) | (values > high[rules, feature])
             counts[:, feature] += by_episode(out & known, starts)
-    return counts, asked, np.full(d, usual / max(asked.sum(), 1.0))
+    return counts, ruled, np.full(d, usual / max(ruled.sum(), 1.0))
 
 
 def _drift_from_demonstrations(

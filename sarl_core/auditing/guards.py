@@ -31,7 +31,7 @@ MEASURES: dict[str, Callable[[Audit], float]] = {
 """What a condition may ask about; shares are of the steps, `agreement` of the covered ones."""
 
 
-class Guard(NamedTuple):
+class GuardCondition(NamedTuple):
     """A measure compared with a number.
 
     Attributes:
@@ -56,7 +56,7 @@ class Guard(NamedTuple):
         return math.isnan(value) or bool(_COMPARED[self.sign](value, self.number))
 
 
-def guard(text: str) -> Guard:
+def guard(text: str) -> GuardCondition:
     """Read a condition.
 
     Args:
@@ -80,4 +80,4 @@ def guard(text: str) -> Guard:
             f"the condition {quoted(text)} asks about {quoted(measure)}, which is no measure; "
             f"choose one of {', '.join(sorted(MEASURES))}"
         )
-    return Guard(text.strip(), measure, sign, float(number) / (100.0 if per_cent else 1.0))
+    return GuardCondition(text.strip(), measure, sign, float(number) / (100.0 if per_cent else 1.0))

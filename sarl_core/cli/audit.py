@@ -15,7 +15,7 @@ from sarl_core.errors import InputError
 if TYPE_CHECKING:
     from sarl_core.auditing.audit import Audit
     from sarl_core.auditing.comparison import LogComparison
-    from sarl_core.auditing.guards import Guard
+    from sarl_core.auditing.guards import GuardCondition
 
 _FAILED = 3  # a condition of --fail-on holds
 _LISTED = 12
@@ -121,7 +121,9 @@ def _with_path(error: InputError, path: Path) -> str:
     return str(error) if str(path) in str(error) else f"{path}: {error}"
 
 
-def _document(held: Audit, comparison: LogComparison | None, guards: list[Guard]) -> dict[str, Any]:
+def _document(
+    held: Audit, comparison: LogComparison | None, guards: list[GuardCondition]
+) -> dict[str, Any]:
     document = held.to_dict()
     if comparison is not None:
         document["comparison"] = comparison.to_dict()
@@ -130,7 +132,7 @@ def _document(held: Audit, comparison: LogComparison | None, guards: list[Guard]
     return document
 
 
-def _guard(held: Audit, guards: list[Guard]) -> None:
+def _guard(held: Audit, guards: list[GuardCondition]) -> None:
     """End with a code of its own where a condition holds."""
     failed = [one for one in guards if one.holds(held)]
     terminal.print_notes(
