@@ -99,15 +99,16 @@ def print_oddities(document: dict[str, Any]) -> None:
 
 def _describe_action(dimension: ActionDimension, values: NDArray[Any]) -> dict[str, Any]:
     if dimension.kind == "discrete":
-        labels = values.astype(np.int64) - dimension.first
-        shares = np.bincount(labels, minlength=len(dimension.labels)) / len(values)
+        shares = np.bincount(dimension.labels_of(values), minlength=len(dimension.labels)) / len(
+            values
+        )
         return {
             "name": dimension.name,
             "kind": "discrete",
             "labels": [
-                {"action": dimension.first + label, "name": name, "share": share}
-                for label, (name, share) in enumerate(
-                    zip(dimension.labels, shares.tolist(), strict=True)
+                {"action": action, "name": name, "share": share}
+                for action, name, share in zip(
+                    dimension.actions, dimension.labels, shares.tolist(), strict=True
                 )
             ],
         }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
-from sarl_core.demonstrations.fields import DemonstrationFields
+from sarl_core.demonstrations.fields import DemonstrationFields, Indicator, labels_of
 from sarl_core.demonstrations.requirements import (
     LARGEST,
     as_numbers,
@@ -25,11 +25,13 @@ from sarl_core.demonstrations.requirements import (
     require_within,
     whole_numbers,
 )
+from sarl_core.demonstrations.words import by_name, coded
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES
 
 MAX_LABELS = 10_000  # of one action dimension whose space is not known
 MAX_ALL_LABELS = 100_000  # of all action dimensions together
+LARGEST_CODE = 2**31  # a label that is larger is a slip
 
 
 def normalise(raw: DemonstrationFields) -> dict[str, Any]:
@@ -52,7 +54,8 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
     require_finite(observations, [f"observation {name!r}" for name in feature_names])
     columns = [f"feature {name!r}" for name in feature_names]
     notes = (*raw.notes, *coarse_columns(raw.observations, observations, columns))
-    actions = _actions(raw, n)
+    given, named = _words_as_labels(raw)
+    actions = _actions(raw, given, named, n)
     m = 1 if actions.ndim == 1 else actions.shape[1]
     action_names = _names(raw.action_names, m, "action")
     episodes = whole_numbers(raw.episodes, n, "column 'episode'")
@@ -74,11 +77,12 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
         else flags(raw.truncated, n, "column 'truncated'"),
         "feature_names": feature_names,
         "feature_units": units,
+        "indicators": _indicators(raw.indicators, observations, feature_names),
         "action_names": action_names,
         "notes": notes,
     }
     if actions.dtype.kind == "i":
-        return fields | _labels(raw, actions.reshape(n, m), action_names)
+        return fields | _labels(raw, named, actions.reshape(n, m), action_names)
     return fields | _bounds(raw, actions, action_names)
 
 
@@ -112,11 +116,71 @@ def _observations(given: Any) -> NDArray[np.float32]:
     return frozen(observations, np.float32)
 
 
-def _actions(raw: DemonstrationFields, n: int) -> NDArray[Any]:
+def _indicators(
+    given: Iterable[Indicator | None] | None,
+    observations: NDArray[np.float32],
+    feature_names: tuple[str, ...],
+) -> tuple[Indicator | None, ...]:
+    """What features say of words; each such feature is 1 or 0."""
+    d = len(feature_names)
+    indicators = (None,) * d if given is None else tuple(given)
+    require_length(len(indicators), d, "indicators", "features")
+    for index, indicator in enumerate(indicators):
+        if indicator is None:
+            continue
+        other = ~np.isin(observations[:, index], (0, 1))
+        if other.any():
+            row = int(np.argmax(other))
+            raise InputError(
+                f"feature {feature_names[index]!r} is {observations[row, index]} in row {row + 1}; "
+                "a feature that says which word a column holds is 1 or 0"
+            )
+    return indicators
+
+
+def _words_as_labels(raw: DemonstrationFields) -> tuple[Any, tuple[tuple[str, ...], ...] | None]:
+    """Actions as numbers, and the names of their labels as far as they are known."""
+    named = (
+        None
+        if raw.label_names is None
+        else tuple(tuple(map(str, labels)) for labels in raw.label_names)
+    )
+    single = coded(raw.actions)
+    columns: list[Any]
+    if single is not None:
+        columns = [single]
+    else:
+        try:
+            array = np.asarray(raw.actions)
+        except ValueError:
+            return raw.actions, named  # refused as what has no one length
+        if array.ndim != 2 or array.dtype.kind not in "bUO":
+            return raw.actions, named
+        columns = [coded(column) or np.array(column.tolist()) for column in array.T]
+    known = named or ((),) * len(columns)
+    require_length(len(known), len(columns), "lists of label names", "action dimensions")
+    names: list[tuple[str, ...]] = []
+    for index, (column, labels) in enumerate(zip(columns, known, strict=True)):
+        if isinstance(column, np.ndarray):
+            names.append(labels)
+            continue
+        codes, words = column
+        if (codes < 0).any():
+            raise InputError(
+                f"{np.count_nonzero(codes < 0):,} of {len(codes):,} actions have no value, the "
+                f"first in row {int(np.argmax(codes < 0)) + 1}; leave those steps out"
+            )
+        first = 0 if raw.label_first is None else raw.label_first[index]
+        columns[index] = by_name(words, labels, "actions")[codes] + first if labels else codes
+        names.append(labels or words)
+    return (columns[0] if single is not None else np.stack(columns, axis=1)), tuple(names)
+
+
+def _actions(
+    raw: DemonstrationFields, given: Any, named: tuple[tuple[str, ...], ...] | None, n: int
+) -> NDArray[Any]:
     """Discrete: (n,) or (n, m) int64. Continuous: (n, m) float32."""
-    actions = as_numbers(raw.actions, "actions")
-    if actions.dtype.kind == "b":
-        raise InputError("actions are true or false; write them as whole numbers 0 and 1")
+    actions = as_numbers(given, "actions")
     if actions.ndim not in (1, 2):
         raise InputError(
             f"actions must be one number or one vector a step, not of shape {actions.shape[1:]}"
@@ -124,7 +188,7 @@ def _actions(raw: DemonstrationFields, n: int) -> NDArray[Any]:
     require_length(len(actions), n, "actions", "observations")
     if actions.size == 0:
         raise InputError("there are no action columns; give at least one")
-    labelled = any(len(names) for names in raw.label_names or ())
+    labelled = any(named or ())
     if actions.dtype.kind in "iu" and (labelled or raw.action_low is None):
         if actions.dtype.kind == "u" and int(actions.max()) > np.iinfo(np.int64).max:
             raise InputError(f"an action is {int(actions.max())}, too large for a label")
@@ -163,35 +227,86 @@ def _counted(episodes: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _labels(
-    raw: DemonstrationFields, columns: NDArray[np.int64], action_names: tuple[str, ...]
+    raw: DemonstrationFields,
+    named: tuple[tuple[str, ...], ...] | None,
+    columns: NDArray[np.int64],
+    action_names: tuple[str, ...],
 ) -> dict[str, Any]:
     m = columns.shape[1]
+    names = named or ((),) * m
     first = (0,) * m if raw.label_first is None else tuple(map(int, raw.label_first))
+    codes = (
+        ((),) * m
+        if raw.label_codes is None
+        else tuple(tuple(map(int, one)) for one in raw.label_codes)
+    )
+    require_length(len(names), m, "lists of label names", "action dimensions")
     require_length(len(first), m, "first labels", "action dimensions")
-    displays = [f"action {name!r}" for name in action_names]
-    if raw.label_names is None:
-        require_labels(columns, first, (MAX_LABELS,) * m, displays)
-        least, most = columns.min(axis=0).tolist(), columns.max(axis=0).tolist()
-        if raw.label_first is None:
-            # What is always done is one action, and not one of as many as its number is high.
-            first = tuple(low if low == high else 0 for low, high in zip(least, most, strict=True))
-        _require_few_labels(m, sum(high - low + 1 for low, high in zip(first, most, strict=True)))
-        names = tuple(
-            tuple(str(label) for label in range(low, high + 1))
-            for low, high in zip(first, most, strict=True)
-        )
-    else:
-        _require_few_labels(m, sum(map(len, raw.label_names)))
-        names = tuple(tuple(map(str, labels)) for labels in raw.label_names)
-        require_length(len(names), m, "lists of label names", "action dimensions")
-        require_labels(columns, first, [len(labels) for labels in names], displays)
+    require_length(len(codes), m, "lists of label codes", "action dimensions")
+    _require_few_labels(m, sum(map(len, names)))
+    labels = [
+        _named_labels(*known) if known[0] else _occurring_labels(*known[3:])
+        for known in zip(names, first, codes, columns.T, action_names, strict=True)
+    ]
+    _require_few_labels(m, sum(len(one[0]) for one in labels))
     return {
-        "label_names": names,
-        "label_first": first,
+        "label_names": tuple(one[0] for one in labels),
+        "label_first": tuple(one[1] for one in labels),
+        "label_codes": tuple(one[2] for one in labels),
         "action_low": None,
         "action_high": None,
         "bounds_from": None,
     }
+
+
+_Labels = tuple[tuple[str, ...], int, tuple[int, ...]]  # names, first, codes
+
+
+def _named_labels(
+    names: tuple[str, ...],
+    first: int,
+    codes: tuple[int, ...],
+    column: NDArray[np.int64],
+    action: str,
+) -> _Labels:
+    """Labels of which all are known, demonstrated or not."""
+    if not codes:
+        require_labels(column[:, None], (first,), (len(names),), (f"action {action!r}",))
+        return names, first, codes
+    require_length(len(codes), len(names), "label codes", "labels")
+    if not (np.diff(codes) > 0).all():
+        raise InputError(f"the label codes of action {action!r} must ascend, each once; sort them")
+    missing = labels_of(column, 0, codes) < 0
+    if missing.any():
+        row = int(np.argmax(missing))
+        raise InputError(
+            f"action {action!r} is {column[row]} in row {row + 1}, which is none of its "
+            f"{len(codes)} labels; mend that row"
+        )
+    return names, 0, codes
+
+
+def _occurring_labels(column: NDArray[np.int64], action: str) -> _Labels:
+    """Labels of which nothing is known but what was demonstrated: each is one by its number."""
+    large = np.abs(column) > LARGEST_CODE
+    if large.any():
+        row = int(np.argmax(large))
+        raise InputError(
+            f"action {action!r} is {column[row]} in row {row + 1}, too large for a label; number "
+            "the labels from 0, or write amounts with a decimal point"
+        )
+    codes: tuple[int, ...] = tuple(np.unique(column).tolist())
+    if len(codes) > MAX_LABELS:
+        raise InputError(
+            f"action {action!r} holds {len(codes):,} different whole numbers, more than the "
+            f"{MAX_LABELS:,} labels that rules a person reads could use; write amounts with a "
+            "decimal point"
+        )
+    # A number between others was merely never shown, where most of them are there.
+    reach = codes[-1] - codes[0] + 1
+    if reach == len(codes) or (codes[0] >= 0 and reach < 2 * len(codes)):
+        return tuple(map(str, range(codes[0], codes[-1] + 1))), codes[0], ()
+    return tuple(map(str, codes)), 0, codes
 
 
 def _require_few_labels(m: int, labels: int) -> None:
@@ -239,4 +354,5 @@ def _bounds(
         "bounds_from": source,
         "label_names": ((),) * m,
         "label_first": (0,) * m,
+        "label_codes": ((),) * m,
     }

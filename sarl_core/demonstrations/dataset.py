@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, cast
 
@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations import checks
-from sarl_core.demonstrations.fields import Actions, DemonstrationFields
+from sarl_core.demonstrations.fields import (
+    TRUTH,
+    Actions,
+    DemonstrationFields,
+    Indicator,
+    labels_of,
+)
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError
 
@@ -25,6 +31,7 @@ class Feature:
     Attributes:
         name: In words, as "pole angle".
         unit: As "rad", or "" where there is none.
+        indicator: What it says of a column of words, where it is 1 or 0 for that; else None.
         splits: The thresholds that trees or rules ask of it, with the demonstrated values around
             them, so that whoever writes one knows how many digits it takes; None where nothing is
             known of them. It is no part of what the feature is.
@@ -32,7 +39,29 @@ class Feature:
 
     name: str
     unit: str = ""
+    indicator: Indicator | None = None
     splits: Splits | None = field(default=None, compare=False, repr=False)
+
+    def statement(self, holds: bool) -> str:
+        """What an indicator says of the column of words.
+
+        Args:
+            holds: Whether it is 1.
+
+        Returns:
+            As "mode is heavy" or "mode is not heavy"; of two words as "mode is light"; of true and
+            false as "brake is true" or "brake is false". A feature that was renamed says its name.
+        """
+        assert self.indicator is not None
+        column, value, otherwise = astuple(self.indicator)
+        if self.name == self.indicator.name:
+            if holds:
+                return f"{column} is {value}"
+            return f"{column} is {otherwise or f'not {value}'}"
+        before, is_, after = self.name.partition(" is ")
+        if not is_:
+            return f"{self.name} is {TRUTH[holds]}"
+        return self.name if holds else f"{before} is not {after}"
 
 
 @dataclass(frozen=True)
@@ -43,7 +72,8 @@ class ActionDimension:
         name: In words, as "main engine".
         kind: Whether its values are labels or come from an interval.
         labels: Names of the labels of a discrete dimension, label 0 first.
-        first: The action that label 0 stands for.
+        first: The action that label 0 stands for, where labels count from it.
+        codes: The action of each label, ascending, where they do not count.
         low: Lower bound of an interval dimension.
         high: Upper bound of an interval dimension.
         bounds_from: Where the bounds come from.
@@ -53,9 +83,19 @@ class ActionDimension:
     kind: Literal["discrete", "interval"]
     labels: tuple[str, ...] = ()
     first: int = 0
+    codes: tuple[int, ...] = ()
     low: float = 0.0
     high: float = 0.0
     bounds_from: Literal["action space", "demonstrated values"] = "action space"
+
+    def labels_of(self, actions: NDArray[Any]) -> NDArray[np.int64]:
+        """The labels of discrete actions, as `fields.labels_of`."""
+        return labels_of(actions, self.first, self.codes)
+
+    @property
+    def actions(self) -> tuple[int, ...]:
+        """The action of each label."""
+        return self.codes or tuple(range(self.first, self.first + len(self.labels)))
 
 
 @dataclass(frozen=True)
@@ -93,7 +133,9 @@ class Demonstrations(DemonstrationFields):
 
     Attributes:
         observations: Shape (N, d), float32.
-        actions: Discrete: (N,) or (N, m) int64. Continuous: (N, m) float32.
+        actions: Discrete: (N,) or (N, m) int64. Continuous: (N, m) float32. Words, true and false,
+            and categories are given as they are and become labels: in the order of an ordered
+            category, else sorted.
         episodes: Index of the episode of each step, shape (N,) int64; equal ones stand together.
         rewards: Shape (N,) float64, or None.
         terminated: Whether the environment ended the episode at this step, (N,) bool, or None.
@@ -101,9 +143,13 @@ class Demonstrations(DemonstrationFields):
         steps: Index of each step within its episode, (N,) int64; counted where not given.
         feature_names: d names; "feature 0"... where not given.
         feature_units: d units, "" where there is none.
+        indicators: For each feature what it says of a column of words, or None.
         action_names: m names, one an action dimension.
         label_names: For each action dimension the names of its labels, () if continuous.
         label_first: For each dimension the action that label 0 stands for (`Discrete.start`).
+        label_codes: For each dimension the action of each label, ascending, where they do not
+            count up from the first; else (). Where no labels are named, they are the whole numbers
+            that were demonstrated.
         action_low: Lower bounds of continuous dimensions, m numbers; the least demonstrated
             value where not given.
         action_high: Upper bounds, likewise.
@@ -196,9 +242,10 @@ class Demonstrations(DemonstrationFields):
         """Names and units of the observation vector's d entries."""
         assert self.feature_names is not None
         assert self.feature_units is not None
+        assert self.indicators is not None
         return tuple(
-            Feature(name, unit)
-            for name, unit in zip(self.feature_names, self.feature_units, strict=True)
+            Feature(*known)
+            for known in zip(self.feature_names, self.feature_units, self.indicators, strict=True)
         )
 
     @cached_property
@@ -208,10 +255,15 @@ class Demonstrations(DemonstrationFields):
         if self.is_discrete:
             assert self.label_names is not None
             assert self.label_first is not None
+            assert self.label_codes is not None
             return tuple(
-                ActionDimension(name, "discrete", labels=labels, first=first)
-                for name, labels, first in zip(
-                    self.action_names, self.label_names, self.label_first, strict=True
+                ActionDimension(name, "discrete", labels=labels, first=first, codes=codes)
+                for name, labels, first, codes in zip(
+                    self.action_names,
+                    self.label_names,
+                    self.label_first,
+                    self.label_codes,
+                    strict=True,
                 )
             )
         assert self.action_low is not None
@@ -235,10 +287,15 @@ class Demonstrations(DemonstrationFields):
             "env_id": self.env_id,
             "agent": self.agent,
             "seed": self.seed,
-            "features": [{"name": f.name, "unit": f.unit} for f in self.features],
+            "features": [
+                {"name": one.name, "unit": one.unit}
+                | ({} if one.indicator is None else {"indicator": asdict(one.indicator)})
+                for one in self.features
+            ],
             "action_names": list(self.action_names or ()),
             "label_names": [list(names) for names in self.label_names or ()],
             "label_first": list(self.label_first or ()),
+            **({"label_codes": self.label_codes} if any(self.label_codes or ()) else {}),
             "action_low": list(self.action_low or ()),
             "action_high": list(self.action_high or ()),
             "bounds_from": self.bounds_from,
@@ -319,7 +376,7 @@ class Demonstrations(DemonstrationFields):
         shares: list[tuple[float, ...]] = []
         for column, dimension in enumerate(self.action_dimensions):
             if dimension.kind == "discrete":
-                labels = self.action_columns[:, column].astype(np.int64) - dimension.first
+                labels = dimension.labels_of(self.action_columns[:, column])
                 counts = np.bincount(labels, minlength=len(dimension.labels))
                 shares.append(tuple(float(count) / len(self) for count in counts))
             else:

@@ -160,6 +160,7 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
             observations=demonstrations.observations[:, features.places],
             feature_names=features.put(own.features),
             feature_units=features.put(own.units),
+            indicators=features.put(demonstrations.indicators or ()),
         )
     if len(own.actions) > 1 or len(description.action_names) > 1:
         actions = line_up(
@@ -175,6 +176,7 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
                 action_names=actions.put(own.actions),
                 label_names=actions.put(demonstrations.label_names or ()) or None,
                 label_first=actions.put(demonstrations.label_first or ()) or None,
+                label_codes=actions.put(demonstrations.label_codes or ()) or None,
                 action_low=actions.put(demonstrations.action_low or ()) or None,
                 action_high=actions.put(demonstrations.action_high or ()) or None,
             )

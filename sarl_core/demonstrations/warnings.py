@@ -65,7 +65,7 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
                 "only rule is to do that always"
             )
         elif dimension.kind == "discrete":
-            counts = np.bincount(column - dimension.first, minlength=len(dimension.labels))
+            counts = np.bincount(dimension.labels_of(column), minlength=len(dimension.labels))
             warnings += _shortened(
                 [
                     f"label {label!r} of action {dimension.name!r} never occurs"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text, float32_decimal, short_decimal
 from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+from sarl_core.demonstrations.fields import labels_of
 from sarl_core.errors import InputError
 
 MAX_DIVIDER = 100
@@ -33,6 +34,7 @@ class LabelledDimension:
             it is discrete. A single value that was always shown is one label between two equal
             edges.
         first: Of a discrete dimension, the action that label 0 stands for.
+        codes: Of one whose labels do not count up from the first, the action of each, ascending.
         bounds_from: Of a continuous dimension, where the outer edges come from.
     """
 
@@ -41,6 +43,7 @@ class LabelledDimension:
     edges: tuple[float, ...] = ()
     first: int = 0
     bounds_from: str = "action space"
+    codes: tuple[int, ...] = ()
 
     @classmethod
     def of_edges(
@@ -70,6 +73,16 @@ class LabelledDimension:
     def n_labels(self) -> int:
         """Number of labels."""
         return len(self.label_names)
+
+    @cached_property
+    def actions(self) -> tuple[int, ...]:
+        """Of a discrete dimension, the action of each label, ascending."""
+        return self.codes or tuple(range(self.first, self.first + self.n_labels))
+
+    @cached_property
+    def reach(self) -> tuple[int, int]:
+        """Of a discrete dimension, the first action and how many there are up to the last."""
+        return self.actions[0], self.actions[-1] - self.actions[0] + 1
 
     @cached_property
     def inner_edges(self) -> tuple[float, ...]:
@@ -102,11 +115,19 @@ class LabelledDimension:
             value: An action of this dimension.
 
         Returns:
-            Its label. On an inner edge: the upper interval; outside the edges: the nearest.
+            Its label. On an inner edge: the upper interval; outside the edges: the nearest. A
+            number that is no label for a discrete action that has none.
         """
         if self.edges:
             return bisect_right(self.inner_edges, value)
+        if self.codes:
+            return self._labels.get(int(value), -1)
         return int(value) - self.first
+
+    @cached_property
+    def _labels(self) -> dict[int, int]:
+        """The label of each action."""
+        return {action: label for label, action in enumerate(self.actions)}
 
     def written_interval(self, value: float) -> tuple[float, float]:
         """The interval of one action as it is written.
@@ -135,7 +156,7 @@ class LabelledDimension:
         if self.edges:
             intervals = np.searchsorted(self.inner_edges, values.astype(np.float64), side="right")
             return intervals.astype(np.int64)
-        return values.astype(np.int64) - self.first
+        return labels_of(values, self.first, self.codes)
 
 
 def _edge_texts(edges: Sequence[float]) -> list[str]:
@@ -184,7 +205,9 @@ def label_dimensions(
 
 def _labelled(dimension: ActionDimension, divider: int) -> LabelledDimension:
     if dimension.kind == "discrete":
-        return LabelledDimension(dimension.name, dimension.labels, first=dimension.first)
+        return LabelledDimension(
+            dimension.name, dimension.labels, first=dimension.first, codes=dimension.codes
+        )
     low, high = dimension.low, dimension.high
     # One value that was always shown is one label, however finely others are divided.
     edges = np.linspace(low, high, divider + 1).tolist() if low < high else [low, high]

@@ -19,6 +19,8 @@ _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
 _LONGEST = 120
 _FLAG_WORDS = ("contact",)
+# Labels that say nothing without the action that they are of.
+_NO_ACTIONS = {"true", "false", "yes", "no", "on", "off", "none", "t", "f", "y", "n"}
 
 
 def number_text(value: float, *, apart_from: float | None = None) -> str:
@@ -120,14 +122,33 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
         bounds: What is asked of it.
 
     Returns:
-        True for one bound between 0 and 1 on a feature such as "left leg contact".
+        True for one bound between 0 and 1 on a feature such as "left leg contact", or on one that
+        says which word a column holds.
     """
     one = math.isinf(bounds.low) != math.isinf(bounds.high)
     threshold = bounds.high if math.isinf(bounds.low) else bounds.low
+    if feature.indicator is not None:
+        return one and 0.0 <= threshold < 1.0
     named = any(word in feature.name.lower().split() for word in _FLAG_WORDS)
     # A force of contact has values in between, and is asked for more than yes or no.
     binary = feature.splits is None or feature.splits.binary
     return named and binary and one and not feature.unit and 0.0 <= threshold < 1.0
+
+
+def flag_text(feature: Feature, bounds: Bounds) -> str:
+    """What a flag is asked for, in a few words.
+
+    Args:
+        feature: Of which `is_flag` is true.
+        bounds: What is asked of it.
+
+    Returns:
+        As "mode is heavy", or "no left leg contact".
+    """
+    holds = math.isinf(bounds.high)
+    if feature.indicator is not None:
+        return feature.statement(holds)
+    return f"{'' if holds else 'no '}{feature.name}"
 
 
 def condition_text(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> str:
@@ -142,7 +163,7 @@ def condition_text(bounds: Bounds, feature: Feature, *, beside: Sequence[float] 
         As "the pole angle is above 0.02 rad".
     """
     if is_flag(feature, bounds):
-        return f"there is {'no ' if math.isinf(bounds.low) else ''}{feature.name}"
+        return f"{'there is' if feature.indicator is None else 'the'} {flag_text(feature, bounds)}"
     unit = f" {feature.unit}" if feature.unit else ""
     limits = limit_texts(bounds, feature, beside=beside)
     if math.isinf(bounds.low):
@@ -164,7 +185,7 @@ def short_condition(bounds: Bounds, feature: Feature, *, beside: Sequence[float]
         As "pole angle > 0.02 rad".
     """
     if is_flag(feature, bounds):
-        return f"{'no ' if math.isinf(bounds.low) else ''}{feature.name}"
+        return flag_text(feature, bounds)
     unit = f" {feature.unit}" if feature.unit else ""
     limits = limit_texts(bounds, feature, beside=beside)
     if math.isinf(bounds.low):
@@ -212,8 +233,11 @@ def exact_condition(condition: Condition, features: tuple[Feature, ...]) -> str:
         features: All features.
 
     Returns:
-        As "pole angle > 0.020938472".
+        As "pole angle > 0.020938472", or "mode is heavy".
     """
+    feature, bounds = features[condition.feature], bounds_of(condition)
+    if feature.indicator is not None and is_flag(feature, bounds):
+        return flag_text(feature, bounds)
     return f"{features[condition.feature].name} {condition.op} {condition.threshold!r}"
 
 
@@ -225,13 +249,13 @@ def action_text(label: int, dimension: LabelledDimension) -> str:
         dimension: Whose label it is.
 
     Returns:
-        As "push right", "action 2", or "torque from -2 to 0".
+        As "push right", "action 2", "brake true", or "torque from -2 to 0".
     """
     if dimension.is_interval:
         from_ = "" if dimension.edges[label] == dimension.edges[label + 1] else "from "
         return f"{dimension.name} {from_}{dimension.label_names[label]}"
     name = dimension.label_names[label]
-    bare = name.lstrip("+-").replace(".", "", 1).isdigit()
+    bare = name.lstrip("+-").replace(".", "", 1).isdigit() or name.lower() in _NO_ACTIONS
     return f"{dimension.name} {name}" if bare else name
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
@@ -15,6 +17,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import asdict, astuple
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.fields import Indicator
 from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.documents import (
@@ -36,8 +39,9 @@ from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
-"""Version 2 tells in how many episodes held-out pairs lie. A file without such pairs is written as
-version 1, which is what it was before there was another."""
+"""Version 2 tells in how many episodes held-out pairs lie, what features say of words, and which
+actions labels stand for that do not count. A file without all that is written as version 1, which
+is what it was before there was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
@@ -135,7 +139,7 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
             by_feature[feature].add(threshold)
     return {
         "format": FORMAT,
-        "version": 2 if any(rule.held_out is not None for rule in rule_set.rules) else 1,
+        "version": 2 if _needs_version_2(rule_set) else 1,
         "env_id": source.env_id,
         "features": map(_feature, source.features, by_feature),
         "actions": map(_action, rule_set.actions),
@@ -157,6 +161,15 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
     }
 
 
+def _needs_version_2(rule_set: RuleContents) -> bool:
+    """Whether there is something that version 1 did not know."""
+    return (
+        any(rule.held_out is not None for rule in rule_set.rules)
+        or any(feature.indicator is not None for feature in rule_set.source.features)
+        or any(action.codes for action in rule_set.actions)
+    )
+
+
 def _number(value: float) -> float:
     """Equal numbers are written alike, as 1 and 1.0, or zero with a sign and without."""
     return float(value) + 0.0
@@ -164,6 +177,10 @@ def _number(value: float) -> float:
 
 def _feature(feature: Feature, thresholds: set[float]) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": feature.name, "unit": feature.unit}
+    if feature.indicator is not None:
+        entry["indicator"] = {
+            key: text for key, text in dataclasses.asdict(feature.indicator).items() if text
+        }
     if feature.splits is not None:
         splits = feature.splits.only(thresholds)
         columns = (splits.thresholds, splits.below, splits.above)
@@ -188,7 +205,7 @@ def _action(action: LabelledDimension) -> dict[str, Any]:
         "name": action.name,
         "kind": "discrete",
         "labels": list(action.label_names),
-        "first": action.first,
+        **({"codes": list(action.codes)} if action.codes else {"first": action.first}),
     }
 
 
@@ -222,6 +239,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
 
 # What a file may say. Nothing else: whatever stands there beside is refused by its name.
 _FromOne = Annotated[int, Meta(ge=1, le=LARGEST_WHOLE)]
+_Whole = Annotated[int, Meta(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 _Action = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 
 
@@ -229,15 +247,24 @@ class _Part(Struct, forbid_unknown_fields=True):
     pass
 
 
+class _Indicator(_Part):
+    column: str
+    value: str
+    otherwise: str = ""
+
+
 class _Feature(_Part):
     name: str
     unit: str = ""
+    indicator: _Indicator | None = None
     splits: list[Any] | None = None
     binary: bool = False
 
     def read(self) -> Feature:
+        said = self.indicator
+        indicator = None if said is None else Indicator(*astuple(said))
         if self.splits is None:
-            return Feature(self.name, self.unit)
+            return Feature(self.name, self.unit, indicator)
         if not all(isinstance(row, list) and len(row) == 3 for row in self.splits):
             raise MisfitError("'splits' must be a threshold and the two values around it each")
         try:
@@ -252,18 +279,24 @@ class _Feature(_Part):
         apart = np.isfinite(thresholds) & (below <= thresholds) & (thresholds < above)
         if not apart.all() or not (np.diff(thresholds) > 0).all():
             raise MisfitError("'splits' are not in ascending order, each between its two values")
-        return Feature(self.name, self.unit, Splits(thresholds, below, above, self.binary))
+        splits_of = Splits(thresholds, below, above, self.binary)
+        return Feature(self.name, self.unit, indicator, splits_of)
 
 
 class _Discrete(_Part, tag_field="kind", tag="discrete"):
     name: str
     labels: tuple[str, ...]
-    first: Annotated[int, Meta(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)] = 0
+    first: _Whole = 0
+    codes: tuple[_Whole, ...] = ()
 
     def read(self) -> LabelledDimension:
         if not self.labels:
             raise MisfitError("'labels' is empty")
-        return LabelledDimension(self.name, self.labels, first=self.first)
+        if self.codes and len(self.codes) != len(self.labels):
+            raise MisfitError(f"'codes' must be {len(self.labels)} numbers, one a label")
+        if any(after <= before for before, after in pairwise(self.codes)):
+            raise MisfitError("'codes' must ascend")
+        return LabelledDimension(self.name, self.labels, first=self.first, codes=self.codes)
 
 
 class _Interval(_Part, tag_field="kind", tag="interval"):

@@ -105,7 +105,7 @@ def _of_rule(
     rule: Rule, dimension: LabelledDimension, projection: Projection, dtype: np.dtype[Any]
 ) -> tuple[float, float, float]:
     if not dimension.is_interval:
-        value = float(rule.action + dimension.first)
+        value = float(dimension.actions[rule.action])
         return value, value, value
     lower, upper = dimension.edges[rule.action], dimension.edges[rule.action + 1]
     last = rule.action == dimension.n_labels - 1

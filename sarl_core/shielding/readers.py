@@ -62,7 +62,7 @@ class ActionForm:
         actions = rule_set.actions
         if actions[0].is_interval:
             return cls(_FLOAT32)
-        return cls(np.dtype(np.int64), None, tuple((a.first, a.n_labels) for a in actions))
+        return cls(np.dtype(np.int64), None, tuple(a.reach for a in actions))
 
     @classmethod
     def of_space(cls, space: Any) -> ActionForm:

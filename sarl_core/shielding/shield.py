@@ -178,7 +178,8 @@ class Shield:
         self._wanted: list[int] = []
         self._wanted_scalars: list[Any] = []
         if self._single:
-            wanted = (self._labels + self._actions[0].first).astype(form.dtype)
+            actions = np.array(self._actions[0].actions, dtype=np.int64)
+            wanted = actions[self._labels].astype(form.dtype)
             self._wanted, self._wanted_scalars = wanted.tolist(), list(wanted)
         self._first, count = form.labels[0] if form.labels else (0, 0)
         self._beyond = self._first + count
@@ -329,7 +330,7 @@ class Shield:
                         continue
                 executed = values.copy() if executed is None else executed
                 executed[dimension] = (
-                    label + self._actions[dimension].first
+                    self._actions[dimension].actions[label]
                     if self._discrete
                     else self._replace.one(rule, value)
                 )
@@ -428,7 +429,7 @@ class Shield:
                 executed = flat.copy() if executed is flat else executed
                 breaks = rules[broken, dimension]
                 executed[broken, dimension] = (
-                    self._labels[breaks] + action.first
+                    np.array(action.actions)[self._labels[breaks]]
                     if self._discrete
                     else self._replace.many(breaks, column[broken])
                 )

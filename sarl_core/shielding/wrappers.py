@@ -240,7 +240,7 @@ def check_fit(
             f"observations have {features}; use rules of this environment"
         )
     labels = _labels_of(action_space)
-    wanted = None if actions[0].is_interval else [(a.first, a.n_labels) for a in actions]
+    wanted = None if actions[0].is_interval else [a.reach for a in actions]
     dimensions = spaces.utils.flatdim(action_space) if labels is None else len(labels)
     fits = dimensions == len(actions) and (labels is None) == (wanted is None)
     if fits and labels is not None and wanted is not None:

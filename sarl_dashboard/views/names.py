@@ -34,11 +34,7 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
         return {"Name": list(names.actions), "Came as": list(own.actions)}
     dimensions = raw.action_dimensions
     return {
-        "Action": [
-            number + dimension.first
-            for dimension in dimensions
-            for number in range(len(dimension.labels))
-        ],
+        "Action": [action for dimension in dimensions for action in dimension.actions],
         "Name": [name for labels in names.labels for name in labels],
         "Came as": [name for labels in own.labels for name in labels],
         "Of": [dimension.name for dimension in dimensions for _ in dimension.labels],

@@ -152,11 +152,6 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
         lambda: compressed(obs=np.zeros((2, 2)), acts=np.zeros((2, 10**7), np.int8)),
         "10,000,000 action dimensions",
     ),
-    "labels": (
-        "npz",
-        lambda: compressed(obs=np.zeros((2, 2)), acts=np.repeat([[0], [9999]], 4096, axis=1)),
-        "40,960,000 labels",
-    ),
     "another compression": ("npz", bzip2_that_says_little, "compressed in a way"),
     "a long header": ("npz", long_header, "cannot be read as NumPy's"),
     "a policy": (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,12 +29,13 @@ _LEAST_CHANGES = 5  # of a column, before another one may be called its next val
 
 
 @_INFINITE
-def settle(guess: Guess, values: Values) -> Guess:
+def settle(guess: Guess, values: Values, words: Collection[str] = ()) -> Guess:
     """Correct a guess by what the columns hold.
 
     Args:
         guess: By the columns' names.
         values: Of every column that it uses, each of shape (N,).
+        words: The columns whose values stand for words, which count nothing.
 
     Returns:
         The guess without features that are none.
@@ -46,7 +47,8 @@ def settle(guess: Guess, values: Values) -> Guess:
     together = same_episode(guess, values)
     _require_action(guess, values)
     if not guess.prefixed:
-        guess = guess.without(_counters(guess, values, together))
+        numbers = {name: held for name, held in values.items() if name not in words}
+        guess = guess.without(_counters(guess, numbers, together))
     guess = guess.without(_next_states(guess, values, together))
     if not guess.columns.observations:
         raise InputError(
@@ -198,7 +200,7 @@ def _require_action(guess: Guess, values: Values) -> None:
 
 def _counters(guess: Guess, values: Values, together: NDArray[np.bool_]) -> dict[str, str]:
     """Features that count the rows, or are the clock."""
-    features = guess.columns.observations
+    features = [name for name in guess.columns.observations if name in values]
     steps = {
         name: "it counts the steps"
         for name in features

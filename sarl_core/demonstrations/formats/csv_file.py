@@ -13,10 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import TRUTH
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
-from sarl_core.demonstrations.formats.parquet_file import column_from_arrow
-from sarl_core.demonstrations.formats.tables import TableColumn, as_float32, check_names, columns_of
+from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, is_text
+from sarl_core.demonstrations.formats.tables import (
+    TableColumn,
+    as_float32,
+    check_names,
+    columns_in_words,
+)
 from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
@@ -31,15 +37,16 @@ _BOMS = {
     codecs.BOM_UTF16_LE: "UTF-16",
     codecs.BOM_UTF16_BE: "UTF-16",
 }
+_MOST_DIFFERENT = 1_000  # texts of a column that are kept once each
 _MAX_LINE = 2**24  # characters of a header
 _BLOCK = 2**22  # bytes that are looked through at once
 _FEED, _RETURN = b"\n\r"
 # What Arrow's parser of numbers takes beside numbers, wherever it stands.
 _NO_NUMBERS = re.compile(rb"0x|nan\(", re.I)
-# A field that holds a number, nothing, or a truth value; in the grammar of Arrow's own matcher.
-_NUMBER_FIELD = (
-    r"^\s*([+-]?(\d+(POINT\d*)?|POINT\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)|true|false|)\s*$"
-)
+_NOTHING = ("", "NA", "N/A", "n/a", "#N/A", "<NA>", "NaN", "nan", "NAN", "null", "NULL", "Null")
+# A number, and a field that holds one, nothing, or a truth value; as Arrow's own matcher has it.
+_NUMBER_TEXT = r"([+-]?(\d+(POINT\d*)?|POINT\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity))"
+_NUMBER_FIELD = rf"^\s*({_NUMBER_TEXT}|true|false|na|#?n/a|<na>|null|)\s*$"
 
 
 @dataclass(frozen=True)
@@ -86,9 +93,6 @@ class CsvTable:
         # Numbers take up to 8 bytes each on the way, whatever they take as text.
         rows = _count_lines(self.body)
         require_memory(len(self.body) + table_memory(rows, 0, len(columns.used)))
-        # What Arrow takes for a number and a person does not: 0x10, nan(1).
-        if _NO_NUMBERS.search(self.body):
-            self._require_numbers(columns.used)
         try:
             # Straight to float32: by way of float64 a few numbers would be rounded twice.
             table = self._parse(columns.used, dict.fromkeys(columns.observations, pa.float32()))
@@ -100,29 +104,21 @@ class CsvTable:
                 raise InputError(
                     "it cannot be read as CSV; check its quotation marks and delimiters"
                 ) from error
-        texts = [
-            name
-            for name in columns.used
-            if not (
-                pa.types.is_floating(kind := table.schema.field(name).type)
-                or pa.types.is_integer(kind)
-                or pa.types.is_boolean(kind)
-                or pa.types.is_null(kind)
-            )
-        ]
-        if texts:
-            self._require_numbers(texts)
-            raise InputError(
-                f"column {quoted(texts[0])} holds both numbers and true or false; write numbers"
-            )
+        kinds = {name: table.schema.field(name).type for name in columns.used}
+        texts = {name for name, kind in kinds.items() if is_text(kind)}
+        # What Arrow takes for a number and a person does not: 0x10, nan(1).
+        if _NO_NUMBERS.search(self.body):
+            self._require_numbers([name for name in columns.used if name not in texts])
+        for name in texts:
+            self._require_words(name, table.column(name))
+        spelled = self._spelled([one for one in columns.actions if pa.types.is_boolean(kinds[one])])
         # Each column is given back as soon as its numbers stand in one piece.
         left = dict(zip(columns.used, table.columns, strict=True))
         del table
+        read = {name: column_from_arrow(name, left.pop(name)) for name in columns.used} | spelled
         return {
-            name: as_float32(column_from_arrow(name, left.pop(name)))
-            if name in columns.observations
-            else column_from_arrow(name, left.pop(name))
-            for name in columns.used
+            name: as_float32(column) if name in columns.observations else column
+            for name, column in read.items()
         }
 
     def _parse(self, used: Sequence[str], types: dict[str, Any]) -> Any:
@@ -134,13 +130,41 @@ class CsvTable:
             read_options=pyarrow.csv.ReadOptions(column_names=list(self.names)),
             parse_options=pyarrow.csv.ParseOptions(delimiter=self.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
-                null_values=[""],
+                null_values=list(_NOTHING),
                 strings_can_be_null=True,
+                auto_dict_encode=True,  # a word stands there once, however often it occurs
+                auto_dict_max_cardinality=_MOST_DIFFERENT,
                 decimal_point=self.decimal,
                 include_columns=list(used),
                 column_types=types,
             ),
         )
+
+    def _require_words(self, name: str, column: Any) -> None:
+        """Refuse a column of texts in which numbers stand: one of the two is a slip."""
+        import pyarrow.compute as pc
+
+        texts = pc.cast(pc.unique(column), "large_string")
+        pattern = rf"^\s*{_NUMBER_TEXT}\s*$".replace("POINT", re.escape(self.decimal))
+        if pc.any(pc.match_substring_regex(texts, pattern, ignore_case=True)).as_py():
+            self._require_numbers([name])
+            raise InputError(
+                f"column {quoted(name)} holds both numbers and true or false; write numbers"
+            )
+
+    def _spelled(self, names: Sequence[str]) -> dict[str, TableColumn]:
+        """Columns of true and false as somebody has written those, where it was always alike."""
+        import pyarrow as pa
+
+        if not names:
+            return {}
+        table = self._parse(names, dict.fromkeys(names, pa.large_string()))
+        read = {name: column_from_arrow(name, table.column(name)) for name in names}
+        return {
+            name: column
+            for name, column in read.items()
+            if len(set(map(str.lower, column.words)) & {*TRUTH}) == len(column.words)
+        }
 
     def _require_numbers(self, suspects: Sequence[str]) -> None:
         """Say in which row a file is wrong, block by block and with nothing taken for a number."""
@@ -296,17 +320,34 @@ def write_csv(demonstrations: Demonstrations, out: BinaryIO) -> None:
     import pyarrow as pa
     import pyarrow.csv
 
-    columns: dict[str, Any] = columns_of(demonstrations)
+    columns = columns_in_words(demonstrations)
     for name, values in columns.items():
         if "\n" in name or "\r" in name:
             raise InputError(
                 f"the column {name!r} has a line break in its name, which CSV cannot "
                 "hold; save it as .parquet"
             )
+        if isinstance(values, list):
+            _require_plain_words(name, values)
+            continue
         if name.startswith("action") and values.dtype.kind == "f":
             # Their type is found out on reading: as float64, with a point that says it is one.
             columns[name] = _decimals(values.astype(np.float64))
     pyarrow.csv.write_csv(pa.table(columns), out, pyarrow.csv.WriteOptions(quoting_style="needed"))
+
+
+def _require_plain_words(name: str, texts: Sequence[str]) -> None:
+    """Refuse words that would be read as something else."""
+    words = dict.fromkeys(texts)
+    numbers = re.compile(_NUMBER_FIELD.replace("POINT", "[.,]"), re.IGNORECASE)
+    if {*map(str.lower, words)} <= {*TRUTH}:
+        return
+    odd = next((one for one in words if numbers.match(one) or "\n" in one or "\r" in one), None)
+    if odd is not None:
+        raise InputError(
+            f"the column {name!r} holds {quoted(odd)} as a word, which would be read from CSV as "
+            "something else; save it as .parquet"
+        )
 
 
 def _decimals(values: Any) -> Any:

@@ -11,6 +11,7 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.fields import Indicator
 from sarl_core.documents import MisfitError, Number, conformed, parse_json
 from sarl_core.environments.feature_order import FeatureOrder
 from sarl_core.errors import InputError, quoted
@@ -31,6 +32,7 @@ class Metadata:
         action_names: m names.
         label_names: For each action dimension the names of its labels, () if continuous.
         label_first: The action that label 0 stands for.
+        label_codes: The action of each label, () where they count from the first.
         action_low: Lower bounds of continuous actions, m numbers.
         action_high: Upper bounds.
         bounds_from: Where those come from.
@@ -44,6 +46,7 @@ class Metadata:
     action_names: tuple[str, ...] = ()
     label_names: tuple[tuple[str, ...], ...] = ()
     label_first: tuple[int, ...] = ()
+    label_codes: tuple[tuple[int, ...], ...] = ()
     action_low: tuple[float, ...] = ()
     action_high: tuple[float, ...] = ()
     bounds_from: Literal["action space", "demonstrated values"] | None = None
@@ -70,6 +73,7 @@ class Metadata:
             action_names=order.put(self.action_names),
             label_names=order.put(self.label_names),
             label_first=order.put(self.label_first),
+            label_codes=order.put(self.label_codes),
             action_low=order.put(self.action_low),
             action_high=order.put(self.action_high),
         )
@@ -78,6 +82,7 @@ class Metadata:
 class _Named(Struct):
     name: str
     unit: str | None = None
+    indicator: Indicator | None = None
 
 
 class _Said(Struct):
@@ -90,6 +95,7 @@ class _Said(Struct):
     action_names: tuple[str, ...] = ()
     label_names: tuple[tuple[str, ...], ...] = ()
     label_first: tuple[int, ...] = ()
+    label_codes: tuple[tuple[int, ...], ...] = ()
     action_low: tuple[Number, ...] = ()
     action_high: tuple[Number, ...] = ()
     bounds_from: Literal["action space", "demonstrated values"] | None = None
@@ -134,7 +140,9 @@ def decode_metadata(text: str | bytes) -> Metadata:
         raise _malformed("has a number too large for a label under 'label_first'")
     if len(said.action_low) != len(said.action_high):
         raise _malformed("has more bounds 'action_low' than 'action_high', or fewer")
-    features = tuple(Feature(one.name, one.unit or "") for one in said.features)
+    if any(abs(code) > 2**31 for codes in said.label_codes for code in codes):
+        raise _malformed("has a number too large for a label under 'label_codes'")
+    features = tuple(Feature(one.name, one.unit or "", one.indicator) for one in said.features)
     return Metadata(**{**asdict(said), "features": features})
 
 

@@ -27,6 +27,7 @@ from sarl_core.demonstrations.formats.metadata import (
 )
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
+from sarl_core.demonstrations.words import coded
 from sarl_core.errors import InputError
 from sarl_core.limits import require_memory, table_memory
 
@@ -104,11 +105,6 @@ def recording_of_arrays(
         )
     if actions.ndim == 0:
         raise InputError(f"there is a single number under {keys['actions']!r}; give one a step")
-    if actions.dtype.kind == "b":
-        raise InputError(
-            f"the actions under {keys['actions']!r} are true and false; write them as "
-            "whole numbers 1 and 0"
-        )
     # One label wrapped in a vector, as some libraries write it; our own files mean it so.
     if actions.ndim > 2:
         actions = actions.reshape(len(actions), int(np.prod(actions.shape[1:])))
@@ -125,6 +121,7 @@ def recording_of_arrays(
             f"its metadata names {len(metadata.action_names)} action dimensions, but "
             f"there are {m} columns under {keys['actions']!r}; save the file again"
         )
+    actions, words = _labels(actions)
     episodes, terminated = _episodes(arrays, len(actions))
     return Recording(
         observations=observations,
@@ -133,6 +130,7 @@ def recording_of_arrays(
         action_columns=(f"the action under {keys['actions']!r}",)
         if m == 1
         else tuple(f"column {index} of {keys['actions']!r}" for index in range(m)),
+        action_words=words,
         episodes=episodes,
         steps=_one_a_step(arrays.get("steps")),
         rewards=_one_a_step(arrays.get("rewards")),
@@ -181,6 +179,19 @@ def write_npz(demonstrations: Demonstrations, out: BinaryIO) -> None:
     np.savez_compressed(
         out, allow_pickle=False, **arrays, **{KEY: np.array(encode_metadata(demonstrations))}
     )
+
+
+def _labels(actions: NDArray[Any]) -> tuple[NDArray[Any], tuple[tuple[str, ...], ...]]:
+    """Actions that are words, or true and false, as numbers, and what those stand for."""
+    if actions.dtype.kind not in "bU":
+        return actions, ()
+    columns = [coded(column) for column in actions.reshape(len(actions), -1).T]
+    codes = np.stack([column.codes for column in columns if column is not None], axis=1)
+    if (codes < 0).any():
+        row = int(np.argmax((codes < 0).any(axis=1)))
+        raise InputError(f"the action in row {row + 1} is an empty text; mend or remove that row")
+    words = tuple(column.words for column in columns if column is not None)
+    return codes.reshape(actions.shape), words
 
 
 def _columns(key: str, d: int, metadata: Metadata) -> tuple[str, ...]:
@@ -259,7 +270,8 @@ def _arrays(data: memoryview) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
         require_memory(len(data) + sum(entries[key].file_size for key in wanted.values()))
         promises = {what: promise_of(archive, entries[key]) for what, key in wanted.items()}
         for what, promise in promises.items():
-            if what != KEY and promise.dtype.kind not in "biuf":
+            kinds = "biufU" if what == "actions" else "biuf"
+            if what != KEY and promise.dtype.kind not in kinds:
                 raise InputError(
                     f"the array {wanted[what]!r} holds {promise.dtype}, which are no numbers; "
                     "save plain numbers"

@@ -38,10 +38,12 @@ from sarl_core.demonstrations.formats.tables import (
     coarse_notes,
     episode_fields,
     given,
+    label_words,
     names_of_features,
     numbers_of,
     observation_block,
     require_filled,
+    require_numbers,
 )
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
 from sarl_core.environments.description import EnvironmentDescription
@@ -169,8 +171,9 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
     with naming(names[0]):
         seen = _observations_of(table)
         features = seen.guess.columns.observations
-        observed = observation_block(seen.read, features)
-        coarse = coarse_notes(table, features, observed)
+        called = names_of_features(seen.guess, table.named) if table.named else None
+        block = observation_block(seen.read, features, called)
+        coarse = coarse_notes(table, block)
     with naming(names[1]):
         taken = _actions_of(others)
         done = action_block(taken.read, taken.guess.columns.actions)
@@ -178,14 +181,16 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         _require_half(table, seen, taken, short[1], "observations")
     with naming(names[1]):
         _require_half(others, taken, seen, short[0], "actions")
-    observed, fields, notes = _together(observed, done, (seen, taken), names)
+    observed, fields, notes = _together(block.values, done, (seen, taken), names)
     dimensions = taken.guess.columns.actions
     return Recording(
         observations=observed,
         actions=done,
-        observation_columns=tuple(f"{column!r} of {names[0]}" for column in features),
+        observation_columns=tuple(f"{column!r} of {names[0]}" for column in block.columns),
         action_columns=tuple(f"{column!r} of {names[1]}" for column in dimensions),
-        feature_names=names_of_features(seen.guess, table.named) if table.named else None,
+        feature_names=block.names,
+        indicators=block.indicators,
+        action_words=label_words(taken.read, dimensions),
         action_names=action_names(dimensions) if others.named else None,
         **fields,
         guess_labels=done.ndim == 1,
@@ -248,9 +253,11 @@ def _observations_of(table: CsvTable) -> _Half:
         guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
     require_clear(guess, table.names, actions=False)
     read = table.read(guess.columns)
-    guess = settle(guess, {name: column.values for name, column in read.items()})
+    words = {name for name, column in read.items() if column.words}
+    guess = settle(guess, {name: column.values for name, column in read.items()}, words)
     read = {name: read[name] for name in guess.columns.used}
     require_filled(read)
+    require_numbers(read, guess.columns.singles.values())
     return _Half(guess, read, guess_notes(guess))
 
 
@@ -260,12 +267,17 @@ def _actions_of(table: CsvTable) -> _Half:
         return _whole(table, ColumnMap((), table.names))
     guess = guess_roles(table.names)
     others = (*guess.columns.observations, *guess.unclear)
-    held = {name: column.values for name, column in table.read(ColumnMap((), others)).items()}
+    held = {
+        name: column.values
+        for name, column in table.read(ColumnMap((), others)).items()
+        if not column.words
+    }
     guess = guess.as_actions(counters(held))
     if not guess.columns.actions:
         require_clear(guess, table.names)
     read = table.read(guess.columns)
     require_filled(read)
+    require_numbers(read, guess.columns.singles.values())
     return _Half(guess, read, ())
 
 
@@ -333,7 +345,8 @@ def _own_observations(table: CsvTable) -> tuple[str, ...]:
     if not table.named or not guess.columns.actions or not guess.columns.observations:
         return ()
     read = table.read(ColumnMap((), guess.columns.observations))
-    counted = counters({name: column.values for name, column in read.items()})
+    numbers = {name: column.values for name, column in read.items() if not column.words}
+    counted = counters(numbers)
     return tuple(name for name in guess.columns.observations if name not in counted)
 
 

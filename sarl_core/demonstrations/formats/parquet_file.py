@@ -30,7 +30,8 @@ from sarl_core.demonstrations.formats.parquet_pages import (
     footer_size,
     largest_chunk,
 )
-from sarl_core.demonstrations.formats.tables import TableColumn, check_names, columns_of
+from sarl_core.demonstrations.formats.tables import MAX_NAME, TableColumn, check_names, columns_of
+from sarl_core.demonstrations.words import Coded, in_order
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import read_limit, require_memory, table_memory
 
@@ -75,7 +76,7 @@ class ParquetTable:
             A column for each name.
 
         Raises:
-            InputError: If a column holds lists or text, or the file is damaged.
+            InputError: If a column holds lists or far too much text, or the file is damaged.
         """
         with refusing_damage():
             schema, rows = self.file.schema_arrow, self.file.metadata.num_rows
@@ -91,18 +92,18 @@ class ParquetTable:
             require_memory(needed + _largest_of(self.file, self.data, used))
             flat = [name for name, leaf in leaves.items() if not leaf.path]
             others = [name for name in flat if not _is_numeric(schema.field(name).type)]
-            # It is refused in any case: it is read to name the row, where that takes little.
             if _COPIES * _largest_of(self.file, self.data, others) > read_limit():
                 raise InputError(
-                    f"column {quoted(others[0])} holds no numbers; write numbers, or leave it out"
+                    f"column {quoted(others[0])} holds no numbers and too much text; write "
+                    "numbers or a few words, or leave it out"
                 )
             # Texts by their dictionary: each stands there once, however often it occurs.
-            texts = [name for name in flat if _is_text(schema.field(name).type)]
+            texts = [name for name in flat if is_text(schema.field(name).type)]
             file = _opened(self.data, texts)
             read: dict[str, TableColumn] = {}
             for column in used:
                 wanted = {name: leaf for name, leaf in leaves.items() if leaf.column == column}
-                read |= _columns(file, column, wanted, columns.observations)
+                read |= _columns(file, column, wanted, columns.observations, schema)
             return {name: read[name] for name in columns.used}
 
 
@@ -160,31 +161,50 @@ def _opened(data: memoryview, texts: Sequence[str] = ()) -> Any:
 
 
 def _columns(
-    file: Any, column: str, leaves: Mapping[str, Leaf], observations: Collection[str]
+    file: Any,
+    column: str,
+    leaves: Mapping[str, Leaf],
+    observations: Collection[str],
+    schema: Any,
 ) -> dict[str, TableColumn]:
     """The leaves of one column, brought into their final form batch by batch."""
+    import pyarrow as pa
+
     rows = file.metadata.num_rows
     values: dict[str, NDArray[Any]] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
+    texts: dict[str, list[Any]] = {}  # together they are words, in one order
     at = 0
     for batch in file.iter_batches(_BATCH, columns=[column], use_threads=False):
         end = at + batch.num_rows
         if end > rows:
             raise _damaged()
         for name, leaf in leaves.items():
-            part = column_from_arrow(name, values_in(leaf, batch.column(0), at), at)
+            held = values_in(leaf, batch.column(0), at)
+            if is_text(held.type):
+                texts.setdefault(name, []).append(held)
+                continue
+            part = column_from_arrow(name, held, at)
             if name not in values:
-                dtype = np.float32 if name in observations else part.values.dtype
-                values[name] = np.empty(rows, dtype=dtype)
+                # True and false are more than 1 and 0.
+                as_it_is = name not in observations or part.values.dtype.kind == "b"
+                values[name] = np.empty(rows, dtype=part.values.dtype if as_it_is else np.float32)
             # What overflows float32 is found as infinite.
             with np.errstate(over="ignore", invalid="ignore"):
                 values[name][at:end] = part.values
             if part.missing is not None:
                 missing.setdefault(name, np.zeros(rows, dtype=np.bool_))[at:end] = part.missing
         at = end
-    if len(values) < len(leaves) or at != rows:
+    if len(values) + len(texts) < len(leaves) or at != rows:
         raise _damaged()
-    return {name: TableColumn(values[name], missing.get(name)) for name in leaves}
+    numbers = {name: TableColumn(one, missing.get(name)) for name, one in values.items()}
+    kind = schema.field(column).type  # a file that is read by dictionaries forgets their order
+    ordered = pa.types.is_dictionary(kind) and kind.ordered
+    words = {
+        name: TableColumn.of_words(_words(name, pa.chunked_array(one), ordered=ordered))
+        for name, one in texts.items()
+    }
+    return numbers | words
 
 
 def _leaves_of(file: Any, data: memoryview) -> dict[str, Leaf]:
@@ -253,7 +273,7 @@ def write_parquet(demonstrations: Demonstrations, out: BinaryIO) -> None:
 
 
 def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
-    """Numbers of an Arrow column.
+    """Numbers of an Arrow column, or its words.
 
     Args:
         name: For the message.
@@ -270,7 +290,10 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
     import pyarrow.compute as pc
 
     kind = column.type
-    if pa.types.is_dictionary(kind) and not _is_text(kind):
+    if is_text(kind):
+        ordered = pa.types.is_dictionary(kind) and kind.ordered
+        return TableColumn.of_words(_words(name, column, ordered=ordered))
+    if pa.types.is_dictionary(kind):
         column, kind = pc.cast(column, kind.value_type), kind.value_type
     if pa.types.is_decimal(kind):
         column, kind = pc.cast(column, pa.float64()), pa.float64()
@@ -293,6 +316,28 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
     return TableColumn(_numbers(pc.fill_null(column, filler)), missing)
 
 
+def _words(name: str, column: Any, *, ordered: bool) -> Coded:
+    """The words of an Arrow column, each looked at once however often it occurs."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    chunked = column if isinstance(column, pa.ChunkedArray) else pa.chunked_array([column])
+    if not pa.types.is_dictionary(chunked.type):
+        chunked = pc.dictionary_encode(chunked)
+    whole = chunked.unify_dictionaries().combine_chunks()
+    whole = whole.chunk(0) if isinstance(whole, pa.ChunkedArray) else whole
+    codes = np.asarray(pc.fill_null(pc.cast(whole.indices, pa.int64()), -1))
+    sizes = np.asarray(pc.fill_null(pc.binary_length(whole.dictionary), 0))
+    if sizes.size and sizes.max() > MAX_NAME:
+        row = int(np.argmax(codes == int(np.argmax(sizes))))
+        raise InputError(
+            f"column {quoted(name)} holds {quoted(_value(whole[row]))} in row {row + 1}, which is "
+            "no number and too long for a word; shorten it, or leave the column out"
+        )
+    texts = pc.cast(whole.dictionary, pa.large_string()).to_pylist()
+    return in_order(codes, [text or "" for text in texts], ordered=ordered)
+
+
 def _numbers(column: Any) -> NDArray[Any]:
     return np.asarray(column.to_numpy(zero_copy_only=False))
 
@@ -312,11 +357,12 @@ def _is_numeric(kind: Any) -> bool:
     )
 
 
-def _is_text(kind: Any) -> bool:
+def is_text(kind: Any) -> bool:
+    """Whether an Arrow type's values are texts, be it by a dictionary."""
     import pyarrow as pa
 
     if pa.types.is_dictionary(kind):
-        return _is_text(kind.value_type)
+        return is_text(kind.value_type)
     return bool(
         pa.types.is_string(kind)
         or pa.types.is_large_string(kind)

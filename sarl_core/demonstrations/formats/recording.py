@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.checks import MAX_LABELS
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.fields import ColumnUse
+from sarl_core.demonstrations.fields import ColumnUse, Indicator
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.requirements import (
@@ -30,11 +29,10 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers_note,
     without_fraction,
 )
+from sarl_core.demonstrations.words import by_name
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up, numbered, only_counts
-from sarl_core.errors import InputError
-
-_LARGEST_CODE = 2**31  # a label that is larger is a slip
+from sarl_core.errors import InputError, quoted
 
 
 @dataclass(frozen=True)
@@ -47,6 +45,8 @@ class Recording:
         observation_columns: What the d columns are called in messages.
         action_columns: What the m columns are called in messages.
         feature_names: d names, None where the file has none.
+        indicators: What each of the d says of a column of words, or None; () where none does.
+        action_words: What the numbers of each of the m stand for, () where they are numbers.
         action_names: m names, None where the file has none.
         episodes: Shape (N,), None where the file has none.
         steps: Shape (N,), likewise.
@@ -68,6 +68,8 @@ class Recording:
     action_columns: tuple[str, ...]
     feature_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
+    indicators: tuple[Indicator | None, ...] = ()
+    action_words: tuple[tuple[str, ...], ...] = ()
     episodes: NDArray[Any] | None = None
     steps: NDArray[Any] | None = None
     rewards: NDArray[Any] | None = None
@@ -163,8 +165,17 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
             f"there are {m} action columns, but {described.env_id} has {wanted_m} action "
             "dimensions; choose the environment it was recorded in, or map the columns"
         )
+    for name, indicator in zip(recording.observation_columns, recording.indicators, strict=False):
+        if indicator is not None and not indicator.is_truth:
+            raise InputError(
+                f"{name} holds words, as {quoted(indicator.value)}, and the observations of "
+                f"{described.env_id} are numbers; give the numbers that it gives, or leave the "
+                "environment out"
+            )
     metadata = recording.metadata
     says = metadata.is_discrete
+    if says is None and any(recording.action_words):
+        says = True
     if says is not None and says != described.is_discrete:
         kinds = ("continuous", "discrete")
         raise InputError(
@@ -172,8 +183,9 @@ def _fit(recording: Recording, described: EnvironmentDescription) -> Recording:
             f"{kinds[described.is_discrete]}; choose the environment it was recorded in"
         )
     recording = _in_order(recording, described)
+    metadata = recording.metadata
     counts = [len(labels) for labels in described.label_names]
-    if says and [len(labels) for labels in recording.metadata.label_names] != counts:
+    if metadata.is_discrete and [len(labels) for labels in metadata.label_names] != counts:
         raise InputError(
             f"its actions have other labels than those of {described.env_id}; choose the "
             "environment it was recorded in"
@@ -195,6 +207,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
             observations=recording.observations[:, features.places],
             observation_columns=features.put(recording.observation_columns),
             feature_names=described.feature_names,
+            indicators=features.put(recording.indicators),
             metadata=replace(metadata, features=features.put(metadata.features)),
         )
     if len(described.action_names) > 1:  # a single one needs no name
@@ -208,6 +221,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
                 actions=recording.actions[:, actions.places],
                 action_columns=actions.put(recording.action_columns),
                 action_names=described.action_names,
+                action_words=actions.put(recording.action_words),
                 metadata=recording.metadata.with_actions_in(actions),
             )
     notes = tuple(order.note for order in orders if order.note)
@@ -297,6 +311,8 @@ def _is_discrete(
         return says, None
     if described is not None:
         return described.is_discrete, None
+    if any(recording.action_words):
+        return True, None
     actions = recording.actions
     columns = actions.reshape(len(actions), -1).T
     if actions.dtype.kind != "f":
@@ -327,20 +343,21 @@ def _many_labels_note(columns: NDArray[Any], names: Sequence[str]) -> str | None
     return None
 
 
-def _features(
-    recording: Recording, described: EnvironmentDescription | None
-) -> dict[str, tuple[str, ...] | None]:
+def _features(recording: Recording, described: EnvironmentDescription | None) -> dict[str, Any]:
     metadata, names = recording.metadata, recording.feature_names
     if metadata.features:
         return {
             "feature_names": tuple(feature.name for feature in metadata.features),
             "feature_units": tuple(feature.unit for feature in metadata.features),
+            "indicators": tuple(feature.indicator for feature in metadata.features),
         }
+    indicators = recording.indicators or None
     if described is not None and (names is None or only_counts(names)):
         names = described.feature_names
     if described is not None and names == described.feature_names:
-        return {"feature_names": names, "feature_units": described.feature_units}
-    return {"feature_names": names, "feature_units": None}
+        units = described.feature_units
+        return {"feature_names": names, "feature_units": units, "indicators": indicators}
+    return {"feature_names": names, "feature_units": None, "indicators": indicators}
 
 
 def _action_names(
@@ -357,9 +374,9 @@ def _labels(
 ) -> tuple[NDArray[Any], dict[str, Any]]:
     """Discrete actions and what is known about their space."""
     actions, metadata = recording.actions, recording.metadata
-    names, first = metadata.label_names, metadata.label_first
+    names, first, codes = metadata.label_names, metadata.label_first, metadata.label_codes
     if described is not None and not names:
-        names, first = described.label_names, described.label_first
+        names, first, codes = described.label_names, described.label_first, ()
     columns = actions.reshape(len(actions), -1)
     if columns.dtype.kind == "f":
         require_finite(columns, recording.action_columns, recording.rows)
@@ -383,26 +400,34 @@ def _labels(
     if names:
         require_length(len(names), m, "lists of label names", "action dimensions")
         require_length(len(first or names), m, "first labels", "action dimensions")
-    counts = [len(labels) for labels in names] if names else [MAX_LABELS] * m
-    if not names:
-        _refuse_codes(whole, recording.action_columns)
-    require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
+        require_length(len(codes or names), m, "lists of label codes", "action dimensions")
+        whole = _by_name(recording, whole, names, first or (0,) * m, described)
+    if names and not any(codes):
+        counts = [len(labels) for labels in names]
+        require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
     flat = actions.ndim == 1 if described is None else described.action_shape == ()
     return _owned(whole.reshape(-1) if flat and m == 1 else whole, np.int64), {
-        "label_names": names or None,
+        "label_names": names or recording.action_words or None,
         "label_first": first or None,
+        "label_codes": codes or None,
     }
 
 
-def _refuse_codes(columns: NDArray[np.int64], names: Sequence[str]) -> None:
-    """Refuse a few labels that are numbered by large codes."""
-    for name, column in zip(names, columns.T, strict=True):
-        codes = np.unique(column)
-        if codes[0] >= 0 and MAX_LABELS <= codes[-1] < _LARGEST_CODE and len(codes) <= FEW_VALUES:
-            raise InputError(
-                f"{name} holds {len(codes)} different labels, numbered up to {codes[-1]}; number "
-                f"them from 0 to {len(codes) - 1}"
-            )
+def _by_name(
+    recording: Recording,
+    columns: NDArray[np.int64],
+    names: tuple[tuple[str, ...], ...],
+    first: tuple[int, ...],
+    described: EnvironmentDescription | None,
+) -> NDArray[np.int64]:
+    """Actions that are words as the actions of the labels that they name, (N, m)."""
+    whose = described.env_id if described is not None else "the file's own metadata"
+    columns = columns.copy()
+    for index, words in enumerate(recording.action_words):
+        if words:
+            places = by_name(words, names[index], recording.action_columns[index], whose=whose)
+            columns[:, index] = places[columns[:, index]] + first[index]
+    return columns
 
 
 def _values(

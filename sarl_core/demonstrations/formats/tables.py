@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import TRUTH, Indicator
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
@@ -27,6 +28,7 @@ from sarl_core.demonstrations.formats.columns import (
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
+from sarl_core.demonstrations.words import Coded, indicated, indicators_of, spelled
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
@@ -56,19 +58,37 @@ class Table(Protocol):
 
 @dataclass(frozen=True)
 class TableColumn:
-    """Numbers of one column.
+    """Numbers of one column, or words by number.
 
     Attributes:
-        values: Shape (N,), bool, integers or floats; NaN or 0 where missing.
+        values: Shape (N,), bool, integers or floats; NaN or 0 where missing. Of words their
+            numbers, int64; -1 where missing.
         missing: Shape (N,), where the column is empty, or None if it is nowhere.
+        words: What the numbers stand for, in their order; () where they are numbers.
     """
 
     values: NDArray[Any]
     missing: NDArray[np.bool_] | None = None
+    words: tuple[str, ...] = ()
+
+    @classmethod
+    def of_words(cls, coded: Coded) -> TableColumn:
+        """A column of words; one without any is empty."""
+        missing = coded.codes < 0
+        if not coded.words:
+            return cls(np.full(len(missing), np.nan), missing)
+        return cls(coded.codes, missing if missing.any() else None, coded.words)
+
+    def at(self, rows: NDArray[np.int64]) -> TableColumn:
+        """The same column in some of its rows."""
+        missing = None if self.missing is None else self.missing[rows]
+        return replace(self, values=self.values[rows], missing=missing)
 
 
 def as_float32(column: TableColumn) -> TableColumn:
-    """A column in the numbers that rules compare."""
+    """A column in the numbers that rules compare; words, and true and false, stay as they are."""
+    if column.words or column.values.dtype.kind == "b":
+        return column
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
         return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
 
@@ -123,23 +143,27 @@ def recording_from_table(
     check_map(guess.columns, table.names)
     read, rows, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
     if guessed:
-        guess = settle(guess, {name: column.values for name, column in read.items()})
+        words = {name for name, column in read.items() if column.words}
+        guess = settle(guess, {name: column.values for name, column in read.items()}, words)
         notes = guess_notes(guess)
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
     require_filled(read, rows)
+    require_numbers(read, chosen.singles.values(), rows)
     single = {role: read[name].values for role, name in chosen.singles.items()}
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
-    observations = observation_block(read, chosen.observations)
-    coarse = coarse_notes(table, chosen.observations, observations, rows)
+    called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
+    block = observation_block(read, chosen.observations, called)
+    coarse = coarse_notes(table, block, rows)
     return Recording(
-        observations=observations,
+        observations=block.values,
         actions=action_block(read, chosen.actions),
-        observation_columns=tuple(f"column {name!r}" for name in chosen.observations),
+        observation_columns=tuple(f"column {name!r}" for name in block.columns),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
-        feature_names=chosen.feature_names
-        or (names_of_features(guess, table.named) if named else None),
+        feature_names=block.names,
+        indicators=block.indicators,
+        action_words=label_words(read, chosen.actions),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
         **fields,
         rows=rows,
@@ -233,6 +257,8 @@ def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
         read = table.read(ColumnMap((), names))
     except InputError:
         raise unclear_columns(names, table.names) from None
+    if any(column.words for column in read.values()):
+        raise unclear_columns(names, table.names)
     return {name: column.values for name, column in read.items()}
 
 
@@ -255,33 +281,114 @@ def require_filled(read: Mapping[str, TableColumn], rows: NDArray[np.int64] | No
             )
 
 
-def observation_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArray[np.float32]:
-    """Columns side by side, shape (N, d)."""
-    observations = np.empty((len(read[names[0]].values), len(names)), dtype=np.float32)
+def require_numbers(
+    read: Mapping[str, TableColumn],
+    names: Iterable[str],
+    rows: NDArray[np.int64] | None = None,
+) -> None:
+    """Refuse words where numbers are needed.
+
+    Args:
+        read: The columns by name.
+        names: Those that hold numbers.
+        rows: The rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and its first word.
+    """
+    for name in names:
+        column = read[name]
+        if column.words:
+            row = int(np.argmax(column.values >= 0))
+            number = row if rows is None else int(rows[row])
+            raise InputError(
+                f"column {quoted(name)} holds {quoted(column.words[column.values[row]])} in row "
+                f"{number + 1}, which is no number; mend that row"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationBlock:
+    """The features of a table.
+
+    Attributes:
+        values: Shape (N, d), float32.
+        columns: The column of each; one of words is the column of several.
+        names: What they are called; None where the file does not say.
+        indicators: For each feature what it says of a column of words, or None.
+    """
+
+    values: NDArray[np.float32]
+    columns: tuple[str, ...]
+    names: tuple[str, ...] | None
+    indicators: tuple[Indicator | None, ...]
+
+
+def observation_block(
+    read: Mapping[str, TableColumn], columns: Sequence[str], names: Sequence[str] | None
+) -> ObservationBlock:
+    """Columns side by side, and in the place of each column of words what says which it holds.
+
+    Args:
+        read: The columns by name.
+        columns: Those of the features.
+        names: What they are called, None where the file does not say.
+
+    Returns:
+        The features.
+
+    Raises:
+        InputError: If a column holds too many words.
+    """
+    called = dict(zip(columns, columns if names is None else names, strict=True))
+    parts: list[tuple[str, Indicator | None]] = []
+    for column in columns:
+        of_words = _indicators(read[column], called[column])
+        parts += [(column, one) for one in of_words] if of_words else [(column, None)]
+    values = np.empty((len(read[columns[0]].values), len(parts)), dtype=np.float32)
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
-        for index, name in enumerate(names):
-            observations[:, index] = read[name].values
-    return observations
+        for index, (column, indicator) in enumerate(parts):
+            held = read[column]
+            if indicator is None or not held.words:
+                values[:, index] = held.values
+            else:
+                values[:, index] = indicated(Coded(held.values, held.words), [indicator])[:, 0]
+    unnamed = names is None and not any(indicator for _, indicator in parts)
+    return ObservationBlock(
+        values,
+        tuple(column for column, _ in parts),
+        None
+        if unnamed
+        else tuple(called[column] if one is None else one.name for column, one in parts),
+        tuple(indicator for _, indicator in parts),
+    )
+
+
+def _indicators(column: TableColumn, name: str) -> tuple[Indicator, ...]:
+    if column.values.dtype.kind == "b":
+        return indicators_of(name, TRUTH)
+    return indicators_of(name, column.words)
 
 
 def coarse_notes(
-    table: Table,
-    names: Sequence[str],
-    observations: NDArray[np.float32],
-    rows: NDArray[np.int64] | None = None,
+    table: Table, block: ObservationBlock, rows: NDArray[np.int64] | None = None
 ) -> tuple[str, ...]:
     """Sentences on features whose values are too close to one another for float32.
 
     Args:
         table: The opened file; a few of its columns are read again, with all their digits.
-        names: Columns of the d features.
-        observations: What was read of them, (N, d).
+        block: What was read of them.
         rows: Shape (N,), their rows in the file, from 0; None if they are all.
 
     Returns:
         One sentence for each of them.
     """
-    suspects = np.flatnonzero(crowded(observations)).tolist()
+    observations, names = block.values, block.columns
+    suspects = [
+        index
+        for index in np.flatnonzero(crowded(observations)).tolist()
+        if block.indicators[index] is None
+    ]
     if not suspects:
         return ()
     again = table.read(ColumnMap((), tuple(names[index] for index in suspects)))
@@ -298,17 +405,21 @@ def coarse_notes(
 def action_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArray[Any]:
     """Actions of shape (N,), or (N, m) where the columns' names say that they are vectors."""
     columns = [read[name].values for name in names]
-    for name, values in zip(names, columns, strict=True):
-        if values.dtype.kind == "b":
-            raise InputError(
-                f"column {name!r} holds true and false, which are no actions; write "
-                "them as whole numbers 1 and 0"
-            )
+    columns = [one.astype(np.int64) if one.dtype.kind == "b" else one for one in columns]
     return np.stack(columns, axis=1) if _is_vector(names) else columns[0]
 
 
+def label_words(
+    read: Mapping[str, TableColumn], names: Sequence[str]
+) -> tuple[tuple[str, ...], ...]:
+    """The words that the numbers of an action block stand for, () where they are numbers."""
+    return tuple(
+        TRUTH if read[name].values.dtype.kind == "b" else read[name].words for name in names
+    )
+
+
 def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
-    """The columns in which demonstrations are saved, in order."""
+    """The columns in which demonstrations are saved, in order, all of them numbers."""
     assert demonstrations.steps is not None
     columns: dict[str, NDArray[Any]] = {
         "episode": demonstrations.episodes,
@@ -329,6 +440,47 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
         "truncated": demonstrations.truncated,
     }
     return columns | {name: values for name, values in singles.items() if values is not None}
+
+
+def columns_in_words(demonstrations: Demonstrations) -> dict[str, Any]:
+    """The same for a file that has no place to say what numbers stand for.
+
+    Args:
+        demonstrations: To save.
+
+    Returns:
+        Texts in the place of what indicators say of a column, and of actions that are words. Where
+        an environment knows the names of its actions they stay numbers.
+    """
+    columns: dict[str, Any] = columns_of(demonstrations)
+    features, observations = demonstrations.features, demonstrations.observations
+    in_words: dict[str, Any] = {}
+    for name, values in columns.items():
+        indicator = next((one.indicator for one in features if f"obs_{one.name}" == name), None)
+        if indicator is None:
+            in_words[name] = values
+            continue
+        of_column = [
+            at
+            for at, one in enumerate(features)
+            if one.indicator is not None and one.indicator.column == indicator.column
+        ]
+        indicators = [one for at in of_column if (one := features[at].indicator) is not None]
+        in_words[f"obs_{indicator.column}"] = _texts(
+            spelled(observations[:, of_column], indicators)
+        )
+    if demonstrations.is_discrete and not demonstrations.env_id:
+        actions = [name for name in in_words if name == "action" or name.startswith("action_")]
+        for name, dimension in zip(actions, demonstrations.action_dimensions, strict=True):
+            if dimension.labels != tuple(map(str, dimension.actions)):
+                codes = dimension.labels_of(in_words[name])
+                in_words[name] = _texts(Coded(codes, dimension.labels))
+    return in_words
+
+
+def _texts(coded: Coded) -> list[str]:
+    words = [*coded.words, ""]  # the last one for -1
+    return [words[code] for code in coded.codes.tolist()]
 
 
 def _without_names(metadata: Metadata) -> Metadata:
@@ -413,12 +565,7 @@ def _without_empty_ends(
     if not np.array_equal(without, ends):
         return read, None, ()
     rows = np.flatnonzero(~ends)
-    shorter = {
-        name: TableColumn(
-            column.values[rows], None if column.missing is None else column.missing[rows]
-        )
-        for name, column in read.items()
-    }
+    shorter = {name: column.at(rows) for name, column in read.items()}
     return shorter, rows, ("the last row of each episode has no action and was dropped",)
 
 

@@ -92,7 +92,7 @@ class Program:
     def labels(self) -> tuple[tuple[int, int], ...]:
         """Of each discrete action the first and the last there is; () for numbers of intervals."""
         dimensions = [order.dimension for order in self.orders if not self.continuous]
-        return tuple((each.first, each.first + each.n_labels - 1) for each in dimensions)
+        return tuple((each.actions[0], each.actions[-1]) for each in dimensions)
 
 
 class CodeLine(NamedTuple):
@@ -250,7 +250,7 @@ def _outcome(
     rule: Rule, dimension: LabelledDimension, value: float, low: float, high: float
 ) -> Replacement:
     if not dimension.is_interval:
-        action = rule.action + dimension.first  # not through floating point: it may be large
+        action = dimension.actions[rule.action]  # not through floating point: it may be large
         return Replacement(action, action, action, open_low=False, open_high=False)
     return Replacement(
         None if np.isnan(value) else float(np.float32(value)),

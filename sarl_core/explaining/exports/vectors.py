@@ -137,8 +137,8 @@ def _no_actions(rule_set: RuleSet, rng: np.random.Generator) -> NDArray[Any]:
     """Actions one of whose values is none that there is: beyond all labels, or not finite."""
     rows = []
     for index, dimension in enumerate(rule_set.actions):
-        labels = (dimension.first - 1, dimension.first + dimension.n_labels)
-        for value in _ODD if dimension.is_interval else labels:
+        first, count = (0, 0) if dimension.is_interval else dimension.reach
+        for value in _ODD if dimension.is_interval else (first - 1, first + count):
             action = proposed_actions(rule_set, 1, rng)
             action[0, index] = value
             rows.append(action)
@@ -181,7 +181,7 @@ def _cell(value: Any) -> str:
 
 def _values(dimension: LabelledDimension) -> NDArray[Any]:
     if not dimension.is_interval:
-        return np.arange(dimension.n_labels, dtype=np.int64) + dimension.first
+        return np.array(dimension.actions, dtype=np.int64)
     edges = np.array(dimension.edges, dtype=np.float32)
     width = edges[-1] - edges[0] or np.float32(1)
     return np.concatenate(

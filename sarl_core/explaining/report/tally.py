@@ -92,10 +92,7 @@ def report_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Fitted:
     """
     fitted = rules_for(rule_set, demonstrations)
     for rules, data in zip(fitted.rule_set.actions, demonstrations.action_dimensions, strict=True):
-        if not rules.is_interval and (rules.n_labels, rules.first) != (
-            len(data.labels),
-            data.first,
-        ):
+        if not rules.is_interval and rules.actions != data.actions:
             raise InputError(
                 f"the action {rules.name!r} has {rules.n_labels} values in the rules and "
                 f"{len(data.labels)} in the demonstrations; give the demonstrations the rules "

@@ -111,7 +111,7 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
                 f"the action {one.name!r} has {divided[0]} in one rule set and {divided[1]} in the "
                 "other; mine both with the same divider and bounds"
             )
-        same_labels = one.n_labels == other.n_labels and one.first == other.first
+        same_labels = one.is_interval or one.actions == other.actions
         named = not known and not any(map(only_counts, (one.label_names, other.label_names)))
         if not same_labels or (named and one.label_names != other.label_names):
             raise InputError(

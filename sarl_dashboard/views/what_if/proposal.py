@@ -27,7 +27,7 @@ def proposal(actions: tuple[LabelledDimension, ...]) -> Any:
             continue
         names = [label_text(label, dimension) for label in range(dimension.n_labels)]
         chosen = st.selectbox(title, names, key=f"a{index}", bind="query-params")
-        values.append(dimension.first + names.index(chosen))
+        values.append(dimension.actions[names.index(chosen)])
     if actions[0].is_interval:
         return np.array(values, dtype=np.float32)
     return np.array(values, dtype=np.int64) if several else int(values[0])

@@ -16,7 +16,7 @@ from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
 from sarl_core.demonstrations.formats.tables import Table, TableColumn
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory
 
 _EPISODE = "episode"  # the column that says which file a row is from
@@ -206,7 +206,33 @@ def _joined(parts: Sequence[TableColumn]) -> TableColumn:
                 for part in parts
             ]
         )
+    worded = [part for part in parts if part.words]
+    if worded:
+        return _joined_words(parts, worded, missing)
     return TableColumn(np.concatenate([part.values for part in parts]), missing)
+
+
+def _joined_words(
+    parts: Sequence[TableColumn], worded: Sequence[TableColumn], missing: NDArray[np.bool_] | None
+) -> TableColumn:
+    """Columns of words as one, in the order of the file that has them all, else sorted."""
+    for part in parts:
+        if not part.words and (part.missing is None or not part.missing.all()):
+            raise InputError(
+                f"a column holds numbers in one file and words, as {quoted(worded[0].words[0])}, "
+                "in another; write it alike in all files"
+            )
+    words = max((part.words for part in worded), key=len)
+    if not all({*part.words} <= {*words} for part in worded):
+        words = tuple(sorted({word for part in worded for word in part.words}))
+    numbers = {word: number for number, word in enumerate(words)}
+    values = [
+        np.array([*(numbers[word] for word in part.words), -1])[
+            part.values if part.words else np.full(len(part.values), -1)
+        ]
+        for part in parts
+    ]
+    return TableColumn(np.concatenate(values).astype(np.int64), missing, words)
 
 
 def _renumbered(column: TableColumn, lengths: Sequence[int]) -> TableColumn:

@@ -1,0 +1,174 @@
+"""Words as actions and as features: labels and indicators, in memory and in every format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sarl_core import Demonstrations, load_demonstrations, mine_rules
+from sarl_core.demonstrations.fields import Indicator
+from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.shielding.shield import Shield
+
+ROWS = "mode,gap,done_by,action\n" + "".join(
+    f"{('heavy', 'light', 'medium')[i % 3]},{i % 7}.5,{str(i % 2 == 0).lower()},"
+    f"{'brake' if i % 3 == 0 else 'hoist'}\n"
+    for i in range(30)
+)
+
+
+def read(text: str, name: str = "log.csv", **options: Any) -> Demonstrations:
+    return read_demonstrations(text.encode(), name, **options)
+
+
+def test_words_of_a_file_are_labels_and_indicators() -> None:
+    log = read(ROWS)
+    assert log.label_names == (("brake", "hoist"),)
+    assert log.feature_names == (
+        "mode is heavy",
+        "mode is light",
+        "mode is medium",
+        "gap",
+        "done_by",
+    )
+    assert log.indicators is not None
+    assert log.indicators[4] == Indicator("done_by", "true", "false")
+    assert log.observations[:3].tolist() == [
+        [1, 0, 0, 0.5, 1],
+        [0, 1, 0, 1.5, 0],
+        [0, 0, 1, 2.5, 1],
+    ]
+    rules = mine_rules(log, supp_min=0.0, conf_min=1.0).to_text()
+    assert "If the mode is heavy, then brake" in rules
+    assert "If the mode is not heavy, then hoist" in rules
+
+
+def test_two_words_are_one_feature_and_both_are_said() -> None:
+    log = read(ROWS.replace("medium", "light"))
+    assert log.feature_names == ("mode is heavy", "gap", "done_by")
+    text = mine_rules(log, supp_min=0.0, conf_min=1.0).to_text()
+    assert "If the mode is heavy, then brake" in text
+    assert "If the mode is light, then hoist" in text
+
+
+@pytest.mark.parametrize(
+    ("actions", "names", "column"),
+    [
+        (np.array(["up", "down", "up", "down"]), ("down", "up"), [1, 0, 1, 0]),
+        (np.array([True, False, True, True]), ("false", "true"), [1, 0, 1, 1]),
+        (
+            pd.Categorical(["low", "high", "mid", "low"], ["low", "mid", "high"], ordered=True),
+            ("low", "mid", "high"),
+            [0, 2, 1, 0],
+        ),
+        (pd.Series(["b", "a", "c", "a"], dtype="category"), ("a", "b", "c"), [1, 0, 2, 0]),
+        (np.array([100, 90000, 205, 100]), ("100", "205", "90000"), [0, 2, 1, 0]),
+        (np.array([-1, 1, 1, -1]), ("-1", "1"), [0, 1, 1, 0]),
+        (np.array([3, 4, 5, 4]), ("3", "4", "5"), [0, 1, 2, 1]),
+    ],
+)
+def test_labels_keep_their_names_and_their_order(
+    actions: Any, names: tuple[str, ...], column: list[int]
+) -> None:
+    shown = Demonstrations(np.arange(8.0).reshape(4, 2), actions, np.zeros(4, int))
+    assert shown.label_names == (names,)
+    (dimension,) = shown.action_dimensions
+    assert dimension.labels_of(shown.action_columns[:, 0]).tolist() == column
+
+
+def test_several_columns_of_words() -> None:
+    frame = pd.DataFrame({"gear": ["up", "down", "up"], "lamp": ["on", "off", "off"]})
+    shown = Demonstrations(np.eye(3), frame, np.zeros(3, int), action_names=("gear", "lamp"))
+    assert shown.label_names == (("down", "up"), ("off", "on"))
+    rules = mine_rules(shown, supp_min=0.0, conf_min=1.0).to_text()
+    assert "then up" in rules
+    assert "then lamp on" in rules
+
+
+def test_an_ordered_category_of_parquet_keeps_its_order(tmp_path: Path) -> None:
+    levels = pd.Categorical(["low", "high", "mid"] * 4, ["low", "mid", "high"], ordered=True)
+    frame = pd.DataFrame({"obs_x": np.arange(12.0), "obs_level": levels, "action": levels})
+    frame.to_parquet(tmp_path / "log.parquet")
+    log = load_demonstrations(tmp_path / "log.parquet")
+    assert log.label_names == (("low", "mid", "high"),)
+    assert log.feature_names == ("x", "level is low", "level is mid", "level is high")
+
+
+def test_a_dictionary_column_without_an_order_is_sorted(tmp_path: Path) -> None:
+    action = pa.array(["push", "brake", "push", "brake"]).dictionary_encode()
+    pq.write_table(pa.table({"obs_x": [1.0, 2, 3, 4], "action": action}), tmp_path / "a.parquet")
+    log = load_demonstrations(tmp_path / "a.parquet")
+    assert log.label_names == (("brake", "push"),)
+    assert log.actions.tolist() == [1, 0, 1, 0]
+
+
+def test_words_name_the_actions_of_a_known_environment() -> None:
+    header = "obs_0,obs_1,obs_2,obs_3,action\n"
+    named = read(header + "0,0,0,0,Push right\n1,1,1,1,push left\n", env_id="CartPole-v1")
+    assert named.actions.tolist() == [1, 0]
+    truths = read(header + "0,0,0,0,True\n1,1,1,1,False\n", env_id="CartPole-v1")
+    assert truths.actions.tolist() == [1, 0]
+    with pytest.raises(InputError, match=r"'jump', which is none of the actions of CartPole-v1"):
+        read(header + "0,0,0,0,jump\n1,1,1,1,push left\n", env_id="CartPole-v1")
+    with pytest.raises(InputError, match=r"column 'obs_3' holds words, as 'a', and"):
+        read(header + "0,0,0,a,0\n1,1,1,b,1\n", env_id="CartPole-v1")
+
+
+def test_a_shield_executes_the_action_of_a_code(tmp_path: Path) -> None:
+    codes = np.array([100, 205, 90000] * 4)
+    shown = Demonstrations(codes[:, None] / 1000, codes, np.zeros(12, int))
+    rules = mine_rules(shown, supp_min=0.0, conf_min=1.0)
+    rules.save(tmp_path / "rules.json")
+    shield = Shield(RuleSet.load(tmp_path / "rules.json"))
+    states = np.array([[0.1], [0.2], [90.0], [90.0]], dtype=np.float32)
+    proposed = np.array([205, 205, 100, 777])  # no label, and no reason to let it pass
+    executed = shield.decide_batch(states, proposed).executed
+    assert executed.tolist() == [100, 205, 90000, 90000]
+    assert [
+        shield.decide(state, action).executed
+        for state, action in zip(states, proposed, strict=True)
+    ] == executed.tolist()
+
+
+WORDS = (
+    st.text("abcdefgh xyz'\",;é", min_size=1, max_size=8)
+    .map(str.strip)
+    .filter(lambda word: word and word not in ("na",))
+)
+
+
+@given(
+    st.lists(st.tuples(WORDS, WORDS, st.booleans()), min_size=3, max_size=12),
+    st.sampled_from(("parquet", "csv", "npz")),
+)
+def test_saved_words_are_read_again(rows: list[tuple[str, str, bool]], kind: str) -> None:
+    mode, action, brake = (pa.array(column) for column in zip(*rows, strict=True))
+    out = pa.BufferOutputStream()
+    table = pa.table({"obs_mode": mode, "obs_brake": brake, "action": action})
+    pq.write_table(table, out)
+    log = read_demonstrations(out.getvalue().to_pybytes(), "log.parquet")
+    with TemporaryDirectory() as folder:
+        save_demonstrations(log, path := Path(folder) / f"log.{kind}")
+        again = load_demonstrations(path)
+    assert again.label_names == log.label_names
+    assert again.features == log.features
+    assert np.array_equal(again.observations, log.observations)
+    assert np.array_equal(again.actions, log.actions)
+
+
+def test_a_word_that_csv_cannot_hold_is_refused(tmp_path: Path) -> None:
+    shown = Demonstrations(np.eye(2), np.array(["NA", "EU"]), np.zeros(2, int))
+    with pytest.raises(InputError, match=r"'action' holds 'NA' as a word"):
+        save_demonstrations(shown, tmp_path / "log.csv")
+    assert not (tmp_path / "log.csv").exists()
