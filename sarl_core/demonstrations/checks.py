@@ -18,6 +18,7 @@ from sarl_core.demonstrations.requirements import (
     column_of_numbers,
     flags,
     frozen,
+    require_codes,
     require_finite,
     require_labels,
     require_length,
@@ -31,7 +32,6 @@ from sarl_core.limits import MAX_FEATURES
 
 MAX_LABELS = 10_000  # of one action dimension whose space is not known
 MAX_ALL_LABELS = 100_000  # of all action dimensions together
-LARGEST_CODE = 2**31  # a label that is larger is a slip
 
 
 def normalise(raw: DemonstrationFields) -> dict[str, Any]:
@@ -288,13 +288,7 @@ def _named_labels(
 
 def _occurring_labels(column: NDArray[np.int64], action: str) -> _Labels:
     """Labels of which nothing is known but what was demonstrated: each is one by its number."""
-    large = np.abs(column) > LARGEST_CODE
-    if large.any():
-        row = int(np.argmax(large))
-        raise InputError(
-            f"action {action!r} is {column[row]} in row {row + 1}, too large for a label; number "
-            "the labels from 0, or write amounts with a decimal point"
-        )
+    require_codes(column[:, None], (f"action {action!r}",))
     codes: tuple[int, ...] = tuple(np.unique(column).tolist())
     if len(codes) > MAX_LABELS:
         raise InputError(

@@ -18,6 +18,7 @@ _FEW_STEPS = 2**12  # of float32 between the least and the largest value of a fe
 _STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
 _SEVERAL = 3  # episodes that run alike; two may do so by chance
 _MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
+_LARGEST_CODE = 2**31  # a label that is larger is a slip
 _EXACT = 2**53  # up to here every whole number is a float64
 # The sum of as many numbers as fit in memory is a float32 yet: scikit-learn sums up all values to
 # see whether some are missing, and takes them to be where the sum is no number.
@@ -92,6 +93,28 @@ def require_labels(
         raise InputError(
             f"{columns[i]} is {values[row, i]} in row {_number(row, rows)}, outside the action "
             f"space of whole numbers from {low[i]} to {high[i]}; mend that row"
+        )
+
+
+def require_codes(
+    values: NDArray[np.int64], columns: Sequence[str], rows: NDArray[np.int64] | None = None
+) -> None:
+    """Refuse numbers that are too large to be those of labels.
+
+    Args:
+        values: Shape (N, m).
+        columns: What the m columns are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and the first row.
+    """
+    large = np.abs(values) > _LARGEST_CODE
+    if large.any():
+        row, i = _first(large)
+        raise InputError(
+            f"{columns[i]} is {values[row, i]} in row {_number(row, rows)}, too large for a label; "
+            "number the labels from 0, or write amounts with a decimal point"
         )
 
 

@@ -16,7 +16,7 @@ from sarl_core.errors import InputError, quoted
 
 MOST_WORDS = 30
 """Of a feature: each is one more that a person has to tell apart in every rule."""
-_SHOWN = 12
+_LISTED = 12
 
 
 class Coded(NamedTuple):
@@ -193,5 +193,5 @@ def by_name(
 
 
 def _listed(names: Sequence[str]) -> str:
-    first = ", ".join(map(quoted, names[:_SHOWN]))
-    return first if len(names) <= _SHOWN else f"{first} and {len(names) - _SHOWN:,} more"
+    first = ", ".join(map(quoted, names[:_LISTED]))
+    return first if len(names) <= _LISTED else f"{first} and {len(names) - _LISTED:,} more"

@@ -20,6 +20,7 @@ from sarl_core.demonstrations.requirements import (
     column_of_numbers,
     flags,
     is_whole,
+    require_codes,
     require_finite,
     require_labels,
     require_length,
@@ -402,6 +403,8 @@ def _labels(
         require_length(len(first or names), m, "first labels", "action dimensions")
         require_length(len(codes or names), m, "lists of label codes", "action dimensions")
         whole = _by_name(recording, whole, names, first or (0,) * m, described)
+    else:
+        require_codes(whole, recording.action_columns, recording.rows)
     if names and not any(codes):
         counts = [len(labels) for labels in names]
         require_labels(whole, first or (0,) * m, counts, recording.action_columns, recording.rows)
