@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,8 @@ def open_tables(files: FileSet) -> tuple[Table, tuple[str, ...]]:
     if first.episode is None and _EPISODE not in tables[0].names:
         marks = {role: name for role, name in first.singles.items() if role in _MARKS}
     table = TableSet(tuple(paths), tuple(tables), marks, size)
-    how = f"{len(paths):,} files were read as one set, from {paths[0]!r} to {paths[-1]!r}"
+    first_file, last_file = (PurePosixPath(path).name for path in (paths[0], paths[-1]))
+    how = f"{len(paths):,} files were read as one set, from {first_file!r} to {last_file!r}"
     each = "" if marks is None else "; each begins an episode, as no column numbers them"
     return table, (f"{how}{each}",)
 

@@ -1,0 +1,302 @@
+"""Tables in other files than CSV and Parquet: JSON, TSV, Arrow, Excel, and any text under gzip."""
+
+from __future__ import annotations
+
+import builtins
+import datetime
+import gzip
+import io
+import json
+import zipfile
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.feather
+import pytest
+
+from sarl_core.demonstrations.formats import read_demonstrations, table_columns
+from sarl_core.errors import InputError
+from sarl_core.limits import READ_LIMIT
+
+N = 30
+ROWS = [
+    {"episode": i // 10, "obs_x": i / 8, "obs_y": -i / 4, "action": i % 2, "reward": 1}
+    for i in range(N)
+]
+
+
+def text(separator: str) -> bytes:
+    rows = [list(ROWS[0]), *(row.values() for row in ROWS)]
+    return "\n".join(separator.join(map(str, row)) for row in rows).encode()
+
+
+def lines(rows: list[Any]) -> bytes:
+    return "".join(json.dumps(row) + "\n" for row in rows).encode()
+
+
+def arrow(make: Callable[..., Any] = pa.ipc.new_file, compression: str | None = None) -> bytes:
+    table = pa.Table.from_pylist(ROWS)
+    out = io.BytesIO()
+    options = pa.ipc.IpcWriteOptions(compression=compression)
+    with make(out, table.schema, options=options) as writer:
+        writer.write_table(table, max_chunksize=7)
+    return out.getvalue()
+
+
+def feather() -> bytes:
+    out = io.BytesIO()
+    pyarrow.feather.write_feather(pa.Table.from_pylist(ROWS), out)
+    return out.getvalue()
+
+
+def workbook(*rows: Any, empty_sheet: bool = False) -> bytes:
+    book = openpyxl.Workbook()
+    sheet = book.active
+    if empty_sheet:
+        sheet = book.create_sheet("data")
+    for row in rows or (list(ROWS[0]), *(list(row.values()) for row in ROWS)):
+        sheet.append(list(row))
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+FILES: dict[str, tuple[str, Callable[[], bytes]]] = {
+    "TSV": ("demo.tsv", lambda: text("\t")),
+    "CSV under gzip": ("demo.csv.gz", lambda: gzip.compress(text(","))),
+    "TSV under gzip": ("demo.tsv.gz", lambda: gzip.compress(text("\t"))),
+    "gzip in two members": (
+        "demo.csv.gz",
+        lambda: gzip.compress(text(",")[:100]) + gzip.compress(text(",")[100:]),
+    ),
+    "JSON lines": ("demo.jsonl", lambda: lines(ROWS)),
+    "JSON lines of another ending": ("demo.ndjson", lambda: lines(ROWS)),
+    "JSON lines with a mark and empty lines": (
+        "demo.jsonl",
+        lambda: b"\xef\xbb\xbf" + lines(ROWS).replace(b"\n", b"\r\n\r\n"),
+    ),
+    "JSON lines under gzip": ("demo.jsonl.gz", lambda: gzip.compress(lines(ROWS))),
+    "JSON lines named JSON": ("demo.json", lambda: lines(ROWS)),
+    "a JSON list": ("demo.json", lambda: json.dumps(ROWS, indent=1).encode()),
+    "JSON by columns": (
+        "demo.json",
+        lambda: json.dumps({key: [row[key] for row in ROWS] for key in ROWS[0]}).encode(),
+    ),
+    "an Arrow file": ("demo.arrow", arrow),
+    "an Arrow stream": ("demo.arrow", lambda: arrow(pa.ipc.new_stream)),
+    "an Arrow file under zstd": ("demo.ipc", lambda: arrow(compression="zstd")),
+    "an Arrow stream under lz4": (
+        "demo.arrow",
+        lambda: arrow(pa.ipc.new_stream, compression="lz4"),
+    ),
+    "Feather": ("demo.feather", feather),
+    "Excel": ("demo.xlsx", workbook),
+    "Excel with an empty sheet": ("demo.xlsx", lambda: workbook(empty_sheet=True)),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_same_rows_are_the_same_demonstrations(name: str) -> None:
+    file_name, content = FILES[name]
+    read = read_demonstrations(content(), file_name)
+    assert read.digest == read_demonstrations(text(","), "demo.csv").digest
+    assert table_columns(content(), file_name) == tuple(ROWS[0])
+
+
+def test_objects_and_lists_in_json_are_columns() -> None:
+    rows = [
+        {"obs": {"pos": [i, i / 2], "speed": i / 4}, "action": i % 2, "info": {}, "log": [{"a": 1}]}
+        for i in range(N)
+    ]
+    read = read_demonstrations(lines(rows), "demo.jsonl")
+    assert read.feature_names == ("pos_0", "pos_1", "speed")
+    assert read.observations[4].tolist() == [4, 2, 1]
+
+
+def test_keys_that_come_later_are_empty_before() -> None:
+    rows: list[dict[str, Any]] = [dict(row) for row in ROWS]
+    rows[20]["obs_z"] = 1.5
+    with pytest.raises(InputError, match="column 'obs_z' is empty in row 1"):
+        read_demonstrations(lines(rows), "demo.jsonl")
+    rows[20] = dict(ROWS[20], remark="late")
+    assert len(read_demonstrations(lines(rows), "demo.jsonl")) == N
+
+
+def test_whole_numbers_and_fractions_of_a_column_may_stand_far_apart() -> None:
+    rows = [{"obs_x": 1 if i < 20_000 else 1.5, "action": i % 2} for i in range(20_010)]
+    read = read_demonstrations(lines(rows), "demo.jsonl")
+    assert read.observations[[0, -1], 0].tolist() == [1, 1.5]
+
+
+def changed(row: int, **values: Any) -> bytes:
+    rows: list[dict[str, Any]] = [dict(one) for one in ROWS]
+    rows[row] |= values
+    return lines(rows)
+
+
+def bomb_of_entities() -> bytes:
+    content = workbook()
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as before, zipfile.ZipFile(out, "w") as after:
+        for info in before.infolist():
+            part = before.read(info)
+            if info.filename.endswith("sheet1.xml"):
+                part = b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa">]>' + part
+            after.writestr(info.filename, part)
+    return out.getvalue()
+
+
+def far_row() -> bytes:
+    """A sheet whose only other row says that it is the one in a billion."""
+    out = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(workbook((1, 2), (3, 4)))) as before,
+        zipfile.ZipFile(out, "w") as after,
+    ):
+        for info in before.infolist():
+            part = before.read(info)
+            if info.filename.endswith("sheet1.xml"):
+                part = part.replace(b'<row r="2"', b'<row r="999999999"')
+            after.writestr(info.filename, part)
+    return out.getvalue()
+
+
+def compressed_arrow(size: int) -> bytes:
+    """Zeros that take little room, and unpack to a lot."""
+    table = pa.table({"obs_x": np.zeros(size), "action": np.zeros(size, np.int8)})
+    out = io.BytesIO()
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_file(out, table.schema, options=options) as writer:
+        writer.write_table(table)
+    return out.getvalue()
+
+
+def dictionary_arrow() -> bytes:
+    """A text of ten million signs that stands in each of a hundred thousand rows."""
+    codes = pa.array(np.zeros(100_000, np.int32))
+    column = pa.DictionaryArray.from_arrays(codes, pa.array(["x" * 10**7]))
+    table = pa.table({"obs_x": column, "obs_y": np.arange(1e5), "action": np.zeros(100_000, int)})
+    out = io.BytesIO()
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_stream(out, table.schema, options=options) as writer:
+        writer.write_table(table)
+    return out.getvalue()
+
+
+def no_values_arrow() -> bytes:
+    """Rows without a value take no room at all."""
+    table = pa.table({"obs_x": pa.nulls(10**8), "action": pa.nulls(10**8)})
+    out = io.BytesIO()
+    with pa.ipc.new_stream(out, table.schema) as writer:
+        writer.write_table(table)
+    return out.getvalue()
+
+
+def torn_offsets() -> bytes:
+    """A text that says that it ends beyond the file."""
+    table = pa.table({"obs_x": ["a", "b"], "action": [0, 1]})
+    out = io.BytesIO()
+    with pa.ipc.new_stream(out, table.schema) as writer:
+        writer.write_table(table)
+    offsets = np.array([0, 1, 2], np.int32).tobytes()
+    return out.getvalue().replace(offsets, np.array([0, 1, 2**30], np.int32).tobytes())
+
+
+BAD: dict[str, tuple[str, Callable[[], bytes], str]] = {
+    "no object": ("demo.jsonl", lambda: lines(ROWS) + b"[1, 2]\n", "row 31 is a list and no obj"),
+    "no JSON": ("demo.jsonl", lambda: lines(ROWS) + b"{\n", "row 31 is no JSON object"),
+    "no text": ("demo.jsonl", lambda: b"\xff\xfe" * 9, "row 1 is no JSON object"),
+    "NaN": ("demo.jsonl", lambda: changed(4, obs_x=float("nan")), "NaN. in row 5"),
+    "two kinds": ("demo.jsonl", lambda: changed(4, obs_x="left"), "'obs_x' holds numbers and te"),
+    "ragged lists": (
+        "demo.jsonl",
+        lambda: lines([{"obs": [1, 2], "action": 0}, {"obs": [1], "action": 1}]),
+        "'obs' holds a list of 1 in row 2, and one of 2 in the first",
+    ),
+    "two of one name": (
+        "demo.jsonl",
+        lambda: lines([{"obs": {"x": 1}, "obs.x": 2, "action": 0}] * 2),
+        "two values for the column 'obs.x'",
+    ),
+    "nested without end": (
+        "demo.jsonl",
+        lambda: b'{"obs": ' + b'{"a": ' * 900 + b"1" + b"}" * 901 + b"\n",
+        "row 1 is nested too deeply|row 1 is no JSON object",
+    ),
+    "nested beyond all": (
+        "demo.jsonl",
+        lambda: b"[" * 10**6 + b"]" * 10**6,
+        "row 1 is no JSON object|no object",
+    ),
+    "a column a row": (
+        "demo.jsonl",
+        lambda: lines([{f"obs_{i}": 1, "action": 0} for i in range(20_000)]),
+        "more than 4,096 columns|unpacks to",
+    ),
+    "no list": ("demo.json", lambda: b'{"a": 1}', "it is no list of rows"),
+    "columns of two lengths": (
+        "demo.json",
+        lambda: b'{"obs_x": [1, 2], "action": [1]}',
+        "different lengths, from 1 to 2",
+    ),
+    "an empty list": ("demo.json", lambda: b"[]", "there are no rows"),
+    "a bomb of gzip": ("demo.csv.gz", lambda: gzip.compress(bytes(2 * 10**8)), "it unpacks to"),
+    "gzip cut off": ("demo.csv.gz", lambda: gzip.compress(text(","))[:-9], "damaged or cut off"),
+    "gzip of Parquet": ("demo.csv.gz", lambda: gzip.compress(b"PAR1" * 9), "content is Parquet"),
+    "gzip without an ending": ("demo.gz", lambda: gzip.compress(text(",")), "has no extension"),
+    "text named gzip": ("demo.csv.gz", lambda: text(","), "not compressed with gzip"),
+    "Arrow cut off": ("demo.arrow", lambda: arrow()[:-3], "damaged or cut off"),
+    "a stream cut off": (
+        "demo.arrow",
+        lambda: arrow(pa.ipc.new_stream)[:-200],
+        "damaged or cut off",
+    ),
+    "a bomb of Arrow": ("demo.arrow", lambda: compressed_arrow(10**8), "it unpacks to"),
+    "a dictionary of Arrow": ("demo.arrow", dictionary_arrow, "it unpacks to|is no number|texts?"),
+    "no values": ("demo.arrow", no_values_arrow, "it unpacks to"),
+    "places beyond the file": ("demo.arrow", torn_offsets, "damaged or cut off"),
+    "entities": ("demo.xlsx", bomb_of_entities, "defines entities"),
+    "a row in a billion": ("demo.xlsx", far_row, "more rows than Excel can"),
+    "no workbook": ("demo.xlsx", lambda: b"PK\x03\x04" + bytes(99), "damaged"),
+    "an empty workbook": ("demo.xlsx", lambda: workbook(()), "nothing but white space"),
+    "a long row": ("demo.xlsx", lambda: workbook(("obs_x", "action"), (1, 0), (1, 0, 7)), "row 2"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_is_one_sentence(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(READ_LIMIT, "0.125")
+    file_name, content, reason = BAD[name]
+    with pytest.raises(InputError, match=reason) as error:
+        read_demonstrations(content(), file_name)
+    assert str(error.value).startswith(f"{file_name}: ")
+    assert "\n" not in str(error.value)
+
+
+def test_cells_of_excel_are_what_they_show() -> None:
+    day = datetime.datetime(2024, 5, 1, 12)
+    content = workbook(
+        (),
+        ("time", "obs_x", "on", "action"),
+        *((day, i / 10, i % 3 == 0, i % 2) for i in range(20)),
+    )
+    assert table_columns(content, "demo.xlsx") == ("time", "obs_x", "on", "action")
+    read = read_demonstrations(content, "demo.xlsx")
+    assert read.observations[:, 0].tolist() == [np.float32(i / 10) for i in range(20)]
+
+
+def test_where_openpyxl_is_missing_one_sentence_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = workbook()
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name == "openpyxl":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(InputError, match=r"save it as CSV, or install 'sarl-explorer\[excel\]'"):
+        read_demonstrations(content, "demo.xlsx")
