@@ -12,6 +12,7 @@ from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
 from sarl_core.cli.options import (
     AgentName,
+    ChoiceName,
     Divider,
     EnvOfFile,
     File,
@@ -90,6 +91,7 @@ def aggregate(
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
+    choose: ChoiceName = "return",
     seed: Seed = 0,
     max_steps: MaxSteps = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
@@ -123,6 +125,7 @@ def aggregate(
             validation=validation,
             seed=seed,
             max_steps=max_steps,
+            choose=choose,
         )
         start = read_demonstrations(file, env)
         environment = env or recorded_environment(start)
@@ -158,14 +161,20 @@ def aggregate(
         return
     from sarl_core.mining.language import share_text
 
+    known = any(one.failures is not None for one in aggregation.rounds)
     terminal.print_table(
-        ("Round", "Demonstrations", "Rules", "Mean return", "Coverage", "Expert disagrees"),
+        (
+            *("Round", "Demonstrations", "Rules", "Mean return"),
+            *(["Failures"] if known else []),
+            *("Coverage", "Expert disagrees"),
+        ),
         [
             (
                 str(one.number),
                 f"{one.pairs:,}",
                 str(one.rules),
                 f"{one.mean_return:.1f}",
+                *([] if one.failures is None else [f"{one.failures.count} of {one.failures.of}"]),
                 share_text(one.coverage, decimals=1),
                 share_text(one.disagreement, decimals=1),
             )
@@ -180,6 +189,7 @@ def aggregate(
             f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
             f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
             *_beside(reported, card["env_id"]),
+            f"Chosen by {card['chosen_by']}.",
             *(f"note: {note}" for note in notes),
         ]
     )

@@ -106,6 +106,14 @@ OnInvalidName = Annotated[
         "action none that there is: stop with an error, or let the action pass unchecked.",
     ),
 ]
+ChoiceName = Annotated[
+    Literal["return", "failures"],
+    typer.Option(
+        "--choose",
+        help="What comes first where the best is chosen: the highest mean return, or the fewest "
+        "failures and among equals the highest mean return. It is reported on other episodes.",
+    ),
+]
 Divider = Annotated[
     int,
     typer.Option(

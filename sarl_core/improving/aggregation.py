@@ -21,7 +21,8 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
-from sarl_core.improving.questions import Answers, ask, importance, scores
+from sarl_core.improving.questions import Answers, ask, importance
+from sarl_core.improving.questions import scores as label_scores_of
 from sarl_core.improving.refinement import generation_cost, generation_seed, refine
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -31,6 +32,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
+from sarl_core.rollouts.choices import check_choice, mean_score, scores
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
 from sarl_core.rollouts.player import EpisodeFaultError
 from sarl_core.rollouts.seeds import RunSeeds
@@ -56,6 +58,7 @@ class AggregationRound:
             otherwise in some action dimension.
         cut: How many of its episodes were cut off before their end.
         failures: How many of them failed; None where that is not known.
+        score: By which it would be chosen, were it all that is known (`choices.scores`).
     """
 
     number: int
@@ -67,6 +70,7 @@ class AggregationRound:
     needed: float
     cut: int = 0
     failures: Rate | None = None
+    score: tuple[float, ...] = ()
 
     @property
     def mean_return(self) -> float:
@@ -85,8 +89,8 @@ class Aggregation:
         trees: Of its rules, one an action dimension, with the pairs it was grown from.
         rounds: All that were finished.
         chosen: Number of the round whose rules are the best.
-        validation_mean: Mean return by which these very rules were chosen; too good by what luck
-            it had. None where the run was stopped before.
+        validation_mean: Mean return in the episodes by which these very rules were chosen; too good
+            by what luck they had. None where the run was stopped before.
         refined: Whether its thresholds and labels were moved afterwards.
         reported: Episodes that nothing was chosen by; None where the run was stopped before.
         demonstrations: All pairs of the chosen round.
@@ -191,6 +195,7 @@ def aggregate(
         CancelledError: If `progress` returned False before the first round was finished.
     """
     env_id = env_id or recorded_environment(start)
+    check_choice(plan.choose, env_id)
     agents = make_agent(agent, env_id), make_agent(expert, env_id)
     run = _Run(start, plan, env_id, *agents, jobs, executor)
     clock = _Clock(run.planned_units(), progress)
@@ -282,7 +287,7 @@ class _Run:
     def grow(self, index: int) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
         pairs = self.answers.pairs(index)
-        label_scores = scores(self.expert, pairs.observations)
+        label_scores = label_scores_of(self.expert, pairs.observations)
         ways: dict[str, Any] = {}
         if label_scores is not None:
             # Two ways to say what matters, in turns; which is better is seen, not known.
@@ -363,6 +368,7 @@ class _Run:
                 needed=float((otherwise | ~covered).any(axis=1).mean()),
                 cut=int(played.cut.sum()),
                 failures=played.failures,
+                score=mean_score(scores(played, self.plan.choose)),
             )
         )
         self.answers.add(table, wanted, seed=self.seed(number))
@@ -378,8 +384,8 @@ class _Run:
         """The best candidate, and its mean return over all episodes that it was given."""
         tried = successive_halving(
             len(candidates),
-            lambda index, first, count: (
-                self.shielded(candidates[index], first, count, clock).returns
+            lambda index, first, count: scores(
+                self.shielded(candidates[index], first, count, clock), self.plan.choose
             ),
             seed=seed,
             first=_FIRST_VALIDATION,
@@ -409,6 +415,7 @@ class _Run:
             generations=self.plan.generations,
             marks=_MARKS,
             max_steps=self.plan.max_steps,
+            choose=self.plan.choose,
             seed=self.plan.seed,
             jobs=self.jobs,
             executor=self.executor,
@@ -434,7 +441,7 @@ class _Run:
     def result(self) -> Aggregation:
         choice = self.choice
         if choice is None:  # stopped early: the episodes of the rounds are all there is
-            best = int(np.argmax([finished.mean_return for finished in self.rounds]))
+            best = max(range(len(self.rounds)), key=lambda index: self.rounds[index].score)
             choice = _Choice(best, self.trees[best])
         pairs = self.answers.pairs(choice.index)
         return Aggregation(

@@ -84,7 +84,8 @@ def chosen_by(aggregation: Aggregation) -> str:
     Args:
         aggregation: Finished or stopped.
     """
-    up_to = f"the mean of up to {aggregation.plan.validation} episodes"
+    first = "failures, then the mean" if aggregation.plan.choose == "failures" else "mean"
+    up_to = f"the {first} of up to {aggregation.plan.validation} episodes"
     if aggregation.seeds.validation is None:
         return "the episodes of their round only"
     if aggregation.seeds.second_validation is not None:
@@ -167,6 +168,7 @@ def _round(one: AggregationRound) -> dict[str, Any]:
         "std": round(spread.std, 2),
         "coverage": round(one.coverage, 4),
         "disagreement": round(one.disagreement, 4),
+        **({} if one.failures is None else {"failures": one.failures.count}),
     }
 
 

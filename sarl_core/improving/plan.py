@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.improving.refinement import EPISODES
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.rules import Thresholds
+from sarl_core.rollouts.choices import Choice
 from sarl_core.rollouts.seeds import (
     MOST_EPISODES_A_ROUND,
     MOST_ROUNDS,
@@ -37,6 +39,7 @@ class Plan:
         seed: Another one gives other episodes.
         max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where
             None.
+        choose: What comes first where the best is chosen.
     """
 
     max_rules: int
@@ -50,13 +53,18 @@ class Plan:
     report: int = 100
     seed: int = 0
     max_steps: int | None = None
+    choose: Choice = "return"
 
     def __post_init__(self) -> None:
         """Refuse what cannot be done.
 
         Raises:
-            InputError: If a number is out of range.
+            InputError: If a number is out of range, or something else is to be chosen by.
         """
+        if self.choose not in get_args(Choice):
+            raise InputError(
+                f"the best is to be chosen by {quoted(self.choose)}; give return or failures"
+            )
         for name, value, least, most in (
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import executor_of, run_each
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.choices import Choice, mean_score, scores
 from sarl_core.rollouts.episodes import LOST, rollout
 from sarl_core.rollouts.seeds import REFINEMENT, of_run
 from sarl_core.shielding.projection import Projection
@@ -90,6 +92,7 @@ def refine(
     generations: int,
     marks: int,
     max_steps: int | None = None,
+    choose: Choice = "return",
     seed: int = 0,
     jobs: int = 1,
     executor: Executor | None = None,
@@ -107,6 +110,7 @@ def refine(
         generations: How many steps to go.
         marks: How many points on the way to give back.
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
+        choose: What comes first where two directions are compared.
         seed: Another one gives another way.
         jobs: Processes; changes the speed, never the result.
         executor: Whose processes they are; this machine's where not given.
@@ -131,7 +135,7 @@ def refine(
     candidates = []
     stops = {round(generations * (number + 1) / marks) for number in range(marks)}
     total = generations * generation_cost()
-    most = -np.inf
+    most: tuple[float, ...] = ()
 
     def trees_at(point: NDArray[np.float64]) -> tuple[PolicyTree, ...]:
         return tuple(
@@ -149,16 +153,16 @@ def refine(
             for side in (1, -1)
         ]
         means = run_each(
-            _mean_return,
+            partial(_mean_scores, max_steps=max_steps, choose=choose),
             [
-                (env_id, structures, few, trees[0].divider, agent, projection, first, max_steps)
+                (env_id, structures, few, trees[0].divider, agent, projection, first)
                 for structures in shaken
             ],
             lost=LOST,
             executor=workers,
         )
-        if float(np.mean(means)) > most:
-            most = float(np.mean(means))
+        if (mean := mean_score(np.array(means))) > most:
+            most = mean
             if better is not None and number > 1:
                 better(trees_at(here))
         ranks = _ranks(np.array(means))
@@ -196,11 +200,12 @@ def pairs_of(pairs: Demonstrations, most: int) -> Demonstrations:
 
 
 def _ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places from -0.5, the least, to 0.5."""
+    """Places from -0.5, the least, to 0.5, by the first column, of equals by the next, (n, K)."""
     # Equal means share theirs, so that nothing is followed where all do as well as can be.
     ladder = np.empty(len(means))
-    ladder[np.argsort(means)] = np.linspace(-0.5, 0.5, len(means))
-    _, group, size = np.unique(means, return_inverse=True, return_counts=True)
+    ladder[np.lexsort(means.T[::-1])] = np.linspace(-0.5, 0.5, len(means))
+    _, group, size = np.unique(means, axis=0, return_inverse=True, return_counts=True)
+    group = group.reshape(-1)
     shared: NDArray[np.float64] = (np.bincount(group, weights=ladder) / size)[group]
     return shared
 
@@ -216,7 +221,7 @@ def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
     return spread
 
 
-def _mean_return(
+def _mean_scores(
     env_id: EnvironmentOrId,
     structures: Sequence[TreeStructure],
     few: Demonstrations,
@@ -224,8 +229,10 @@ def _mean_return(
     agent: Agent,
     projection: Projection,
     seed: int,
+    *,
     max_steps: int | None,
-) -> float:
+    choose: Choice,
+) -> tuple[float, ...]:
     trees = [
         count_tree(structure, few, index, divider=divider)
         for index, structure in enumerate(structures)
@@ -240,4 +247,4 @@ def _mean_return(
         keep_steps=False,
         max_steps=max_steps,
     )
-    return float(played.returns.mean())
+    return mean_score(scores(played, choose))

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.rollouts.choices import mean_score
+
 Score = Callable[[int, int, int], NDArray[np.float64]]
-"""Called with (candidate, first seed, how many); gives the return of each episode."""
+"""Called with (candidate, first seed, how many); gives the return of each episode, (E,), or of
+each what counts, the most important first and the return last, (E, K)."""
 
 
 @dataclass(frozen=True)
@@ -73,20 +76,25 @@ def successive_halving(
         The selection. The winner's mean is too good by what luck it was chosen for: report it on
         other episodes.
     """
-    returns: list[list[float]] = [[] for _ in range(candidates)]
+    scored: list[list[NDArray[np.float64]]] = [[] for _ in range(candidates)]
+
+    def means(candidate: int) -> tuple[float, ...]:
+        return mean_score(np.concatenate(scored[candidate]))
+
     left: Sequence[int] = range(candidates)
     given = 0
     while given < most:
         new = min(max(first, given), most - given)
         for candidate in left:
-            returns[candidate] += score(candidate, seed + given, new).tolist()
+            scores = score(candidate, seed + given, new)
+            scored[candidate].append(scores.reshape(len(scores), -1))
             if finished is not None:
                 finished(new)
         given += new
-        ranked = sorted(left, key=lambda candidate: -float(np.mean(returns[candidate])))
+        ranked = sorted(left, key=means, reverse=True)  # of equals, the first stays first
         left = ranked[: max(1, (len(ranked) + 1) // 2)]
     return Selection(
         best=left[0],
-        means=np.array([float(np.mean(one)) for one in returns]),
-        episodes=np.array([len(one) for one in returns], dtype=np.int64),
+        means=np.array([means(candidate)[-1] for candidate in range(candidates)]),
+        episodes=np.array([sum(map(len, one)) for one in scored], dtype=np.int64),
     )

@@ -70,3 +70,16 @@ def test_it_can_be_stopped():
 
     with pytest.raises(CancelledError):
         successive_halving(3, noisy([0, 1, 2]), seed=0, finished=finished)
+
+
+def test_failures_come_first_and_the_return_second():
+    """Of those that fail least often the one with the highest return, whatever others bring."""
+    failing, returns = [0.5, 0.0, 0.0, 0.1], [900.0, 1.0, 2.0, 50.0]
+
+    def score(candidate, first, count):
+        fails = np.arange(first, first + count) % 10 < 10 * failing[candidate]
+        return np.column_stack([-fails.astype(float), np.full(count, returns[candidate])])
+
+    found = successive_halving(4, score, seed=0, first=10, most=40)
+    assert found.best == 2
+    assert found.means.tolist() == returns
