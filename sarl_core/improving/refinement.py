@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,9 +152,19 @@ def refine(
             for side in (1, -1)
         ]
         means = run_each(
-            partial(_mean_scores, max_steps=max_steps, choose=choose),
+            _mean_scores,
             [
-                (env_id, structures, few, trees[0].divider, agent, projection, first)
+                (
+                    env_id,
+                    structures,
+                    few,
+                    trees[0].divider,
+                    agent,
+                    projection,
+                    first,
+                    max_steps,
+                    choose,
+                )
                 for structures in shaken
             ],
             lost=LOST,
@@ -229,7 +238,6 @@ def _mean_scores(
     agent: Agent,
     projection: Projection,
     seed: int,
-    *,
     max_steps: int | None,
     choose: Choice,
 ) -> tuple[float, ...]:

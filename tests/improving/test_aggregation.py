@@ -139,10 +139,13 @@ def test_refinement_follows_the_returns(cart):
 
 
 def test_where_all_do_alike_nothing_is_followed():
-    assert _ranks(np.array([3.0, 1.0, 2.0])).tolist() == [0.5, -0.5, 0.0]
-    assert np.allclose(_ranks(np.full(6, 500.0)), 0.0)
-    tied = _ranks(np.array([1.0, 7.0, 7.0, 0.0]))
+    assert _ranks(np.array([[3.0], [1.0], [2.0]])).tolist() == [0.5, -0.5, 0.0]
+    assert np.allclose(_ranks(np.full((6, 1), 500.0)), 0.0)
+    tied = _ranks(np.array([[1.0], [7.0], [7.0], [0.0]]))
     assert tied[1] == tied[2] > tied[0] > tied[3]
+    # Failures before returns.
+    both = _ranks(np.array([[-0.5, 9.0], [0.0, 1.0], [0.0, 2.0]]))
+    assert both.tolist() == [-0.5, 0.0, 0.5]
 
 
 def mean_return(rules: RuleSet) -> float:

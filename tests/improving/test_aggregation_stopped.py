@@ -167,14 +167,14 @@ def returning(monkeypatch, means):
     """Let the generations of a search bring these means, whatever is played."""
     asked = []
 
-    def mean_return(*arguments):
+    def mean_scores(*arguments):
         asked.append(arguments)
         generation = (len(asked) - 1) // (2 * refinement.PAIRS)
         if generation == len(means):
             raise KeyboardInterrupt
-        return means[generation]
+        return (means[generation],)
 
-    monkeypatch.setattr(refinement, "_mean_return", mean_return)
+    monkeypatch.setattr(refinement, "_mean_scores", mean_scores)
 
 
 def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
