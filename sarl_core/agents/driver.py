@@ -38,7 +38,7 @@ class Driver:
     ) -> NDArray[np.int64]:
         """See `Agent.act`; observations of Driving-v0, shape (B, 14)."""
         speed, _, to_the_left, to_the_right, gap, time, *sides = observations.T
-        left, right = _Lane(to_the_left, *sides[:4]), _Lane(to_the_right, *sides[4:])
+        left, right = _SideLane(to_the_left, *sides[:4]), _SideLane(to_the_right, *sides[4:])
         brakes = speed > _SLOWEST
         clear = (time >= np.where(brakes, _SOON, _SOON_AT_SLOWEST)) & (gap >= _CLOSE)
         brakes &= (time > _BRAKING_TIME) & (gap > _BRAKING_GAP)
@@ -61,7 +61,7 @@ class Driver:
         return chosen.astype(np.int64)[:, None]
 
 
-class _Lane(NamedTuple):
+class _SideLane(NamedTuple):
     """What a driver sees of a lane beside, each shape (B,)."""
 
     lanes: NDArray[np.float32]

@@ -9,7 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations, InputError, RuleSet, load_demonstrations, mine_rules
+from sarl_core import (
+    Demonstrations,
+    Environment,
+    InputError,
+    RuleSet,
+    load_demonstrations,
+    mine_rules,
+)
 from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.provenance import mining_command
 from sarl_core.explaining.report.report import Wishes, make_report
@@ -296,7 +303,9 @@ def test_of_one_environment_the_report_speaks_as_the_demonstrations_do(
 def test_only_a_command_that_makes_these_rules_is_printed(
     cart: Demonstrations, rules: RuleSet
 ) -> None:
-    mined = mining_command(rules, "rules.json", "cart.parquet", cart, env="CartPole-v1")
+    mined = mining_command(
+        rules, "rules.json", "cart.parquet", cart, env=Environment("CartPole-v1")
+    )
     assert mined is not None
     assert "--setting filtered --env CartPole-v1 --out rules.json" in mined
     wishes = PLAIN | {"commands": (mined, "python -m sarl_core report rules.json")}
