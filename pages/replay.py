@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import streamlit as st
 
-from sarl_dashboard.jobs.replays import latest
+from sarl_dashboard.jobs.replays import arrived, latest
 from sarl_dashboard.views.replay.episodes import comparison
 from sarl_dashboard.views.replay.film import film, headline
 from sarl_dashboard.views.replay.numbers import numbers
-from sarl_dashboard.views.replay.run import arrive, chosen_jump, run_bar
+from sarl_dashboard.views.replay.run import arrive, replay_bar, set_out
 from sarl_dashboard.views.replay.settings import settings
 from sarl_dashboard.views.replay.steps import step_by_step
 
@@ -18,19 +18,19 @@ st.caption(
     "breaks a rule is replaced before it is executed. The rules are learned from "
     "demonstrations: they guarantee nothing."
 )
-jump = chosen_jump()
-chosen = settings()
-run_bar(chosen, jump)
+set_out()
+asked_for = replay_bar(settings())
+jump = arrived()
 played = latest()
 if played is None:
     st.info(
         "Choose an agent and the rules, then press Run. What rules do shows best with the novice, "
         "which acts at random, and the unfiltered rules; those at the paper's filtered thresholds "
-        "may apply at few steps.",
+        "may apply at few steps. The work goes on while you look at other pages.",
         icon=":material/play_circle:",
     )
     st.stop()
-headline(played.replay, chosen)
+headline(played.replay, asked_for)
 numbers(played.replay)
 film(played.replay)
 step_by_step(played)

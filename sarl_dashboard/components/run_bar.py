@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, Literal
 
 import streamlit as st
 
-from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted
 from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known, run_batch
-from sarl_dashboard.jobs.job import Job, Place, Result, Tell
+from sarl_dashboard.jobs.job import Job, Place, Result
 from sarl_dashboard.text import refuse
 
 
@@ -21,23 +20,25 @@ class Offer(Generic[Result]):
 
     Attributes:
         key: Of everything that its result depends on.
-        start: Begins it.
+        start: Begins it; gives None where there is nothing left to be done.
         about: What it is, beside the button.
         complete: Whether all of it is known already.
         cancelled: What is said where it was called off.
         problems: Sentences on what of it could not be done.
         label: Of the button.
         icon: Of the button.
+        type: Of the button.
     """
 
     key: object
-    start: Callable[[], Job[Result]]
+    start: Callable[[], Job[Result] | None]
     about: str
     complete: bool
     cancelled: str = "Cancelled. What had been finished is kept; Run goes on from there."
     problems: Sequence[str] = ()
     label: str = "Run"
     icon: str = ":material/play_arrow:"
+    type: Literal["primary", "secondary"] = "primary"
 
 
 def run_bar(
@@ -69,7 +70,7 @@ def run_bar(
     with st.container(horizontal=True, vertical_alignment="center"):
         st.button(
             offer.label,
-            type="primary",
+            type=offer.type,
             icon=offer.icon,
             key=f"run_{place.name}",
             on_click=place.begin,
@@ -128,27 +129,3 @@ def episodes_bar(place: Place[EpisodeBatch], rows: Sequence[Row], episodes: int)
             problems=sorted({str(error) for key, error in problems if key in keys}),
         ),
     )
-
-
-def waited_for(work: Callable[[Tell], Result]) -> Result | None:
-    """Do work that the page waits for; say what is wrong where it fails.
-
-    Args:
-        work: Gives the result, and tells how far it is.
-
-    Returns:
-        The result; None where it failed.
-    """
-    slot = st.empty()
-    bar = slot.progress(0.0, "Starting …")
-
-    def tell(share: float, text: str) -> None:
-        bar.progress(min(max(share, 0.0), 1.0), text)
-
-    try:
-        return work(tell)
-    except SarlError as error:
-        refuse(error)
-        return None
-    finally:
-        slot.empty()

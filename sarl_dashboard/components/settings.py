@@ -6,19 +6,49 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
 import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
-from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS
+from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
 from sarl_dashboard.state.edits import offered as edits_offered
-from sarl_dashboard.state.environments import ENVIRONMENTS
+from sarl_dashboard.state.environments import ENVIRONMENTS, continuous
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import COMPACT, compact_file
+from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
 from sarl_dashboard.state.url import with_own
 
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
 Width = Literal["stretch"] | int
+
+
+def shield_choice(env: str | None) -> tuple[Projection, Outside]:
+    """What a shield does with an action that breaks a rule, as far as there is a choice.
+
+    Args:
+        env: As `environment_choice` gives it.
+    """
+    projection = projection_choice() if continuous(env) else PROJECTIONS[0]
+    return projection, outside_choice()
+
+
+def own_files(
+    agent: str, rules: str, env: str | None
+) -> tuple[PolicyFile | None, UploadedFile | None]:
+    """Ask for the policy and the rule file that were chosen as one's own.
+
+    Args:
+        agent: What was chosen.
+        rules: Likewise.
+        env: As `environment_choice` gives it.
+    """
+    policy = policy_upload("Policy", "policy_file", env) if agent == OWN_FILE else None
+    return policy, own_rule_file() if rules == OWN_FILE else None
+
+
+def own_rule_file() -> UploadedFile | None:
+    """Ask for a rule file."""
+    return st.file_uploader("Rule file (.json)", key="rule_file")
 
 
 def environment_choice() -> str | None:

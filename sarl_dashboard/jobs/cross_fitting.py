@@ -66,8 +66,6 @@ def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:
 def begin(demonstrations: Demonstrations, divider: int) -> None:
     """Grow the trees without each fold, in the place of what is on its way; for a callback too."""
     key, session = key_of(demonstrations, divider), owner()
-    if PLACE.job is not None:
-        PLACE.job.cancel()
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         return cross_fit(demonstrations, divider=divider, executor=executor, progress=progress)

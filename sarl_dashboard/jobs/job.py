@@ -23,8 +23,6 @@ from sarl_core.progress import CancelledError
 GONE_AFTER = 20.0  # seconds without a connection: longer than a reload, or a tunnel
 
 Result = TypeVar("Result")
-Tell = Callable[[float, str], None]
-"""Called with the share that is done, 0 to 1, and what is being done."""
 
 
 class Job(Generic[Result]):
@@ -93,7 +91,11 @@ class Job(Generic[Result]):
     def wanted(self) -> bool:
         """Whether to go on; for the work itself."""
         now = time.monotonic()
-        if not runtime.exists() or runtime.get_instance().is_active_session(self._session):
+        try:
+            here = runtime.get_instance().is_active_session(self._session)
+        except RuntimeError:  # there is no server whose visitor could leave
+            here = True
+        if here:
             self._seen = now
         return not self._cancelled and now - self._seen < GONE_AFTER
 
@@ -140,6 +142,13 @@ class Place(Generic[Result]):
         job = self.job
         return job is not None and (job.running or bool(self.gathering and job.stopping))
 
-    def begin(self, start: Callable[[], Job[Result]]) -> None:
-        """Begin work in the place of the one before; for a callback."""
-        st.session_state[f"_job_{self.name}"] = start()
+    def begin(self, start: Callable[[], Job[Result] | None]) -> None:
+        """Begin work in the place of the one before, which is called off; for a callback too.
+
+        Args:
+            start: Begins it; gives None where there is nothing left to be done.
+        """
+        if self.job is not None:
+            self.job.cancel()
+        if (job := start()) is not None:
+            st.session_state[f"_job_{self.name}"] = job

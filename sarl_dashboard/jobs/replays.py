@@ -28,15 +28,16 @@ from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.steps import StepTable
 from sarl_core.shielding.shield import Outside, Projection, Shield
 from sarl_dashboard.cache import key_of
-from sarl_dashboard.jobs.job import Tell
+from sarl_dashboard.jobs.job import Job, Place, Result
 from sarl_dashboard.memory_cache import BoundedCache
 from sarl_dashboard.state.agents import ChosenAgent
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 MOST_REPLAYS, MOST_COMPARISONS, MOST_FORKS = 6, 8, 8
+_WHOLE, _PLAYED = 1_000, 0.7  # of the work, and the share of it before pictures are encoded
 MOST_PICTURES = 64  # of a replay, some 30 kB each
-_LATEST = "_replay"
+_LATEST, _READY = "_replay", "_replay_ready"
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,9 +170,34 @@ def latest() -> Played | None:
     return None if order is None or replay is None else Played(order, replay)
 
 
-def show_next(order: ReplayOrder) -> None:
-    """Make the replay of an order, which is kept, the latest."""
-    st.session_state[_LATEST] = order
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """A way to a replay.
+
+    Attributes:
+        order: Of the replay.
+        step: To be looked at; None for the one that is looked at.
+    """
+
+    order: ReplayOrder
+    step: int | None = None
+
+
+REPLAY = Place[Jump]("replay")
+
+
+def arrived() -> Jump | None:
+    """The way to a replay that is ready by now, which becomes the latest; each once."""
+    job = REPLAY.job
+    jump: Jump | None = st.session_state.pop(_READY, None)
+    if job is not None and job.result is not None:
+        jump, job.result = job.result, None
+    if jump is None:
+        return None
+    st.session_state[_LATEST] = jump.order
+    if jump.step is not None:
+        st.session_state["step"] = jump.step
+    return jump
 
 
 def compared(order: ReplayOrder) -> tuple[ReplayOrder, int] | None:
@@ -195,19 +221,32 @@ def compared(order: ReplayOrder) -> tuple[ReplayOrder, int] | None:
 # --- running -----------------------------------------------------------------------------------
 
 
-def run(order: ReplayOrder, tell: Tell) -> ReplayPair:
-    """Run the episode, without the rules and with them, and draw it.
+def replaying(jump: Jump) -> Job[Jump] | None:
+    """Run an episode, without the rules and with them, and draw it.
 
-    Raises:
-        SarlError: If it cannot be run.
+    Args:
+        jump: To the replay.
+
+    Returns:
+        None if the replay is kept: it is arrived at.
     """
+    cache, order = replay_cache(), jump.order
+    if order.key in cache:
+        st.session_state[_READY] = jump
+        return None
+
+    def work(job: Job[Jump]) -> None:
+        cache.put(order.key, _replay(order, job))
+        job.result = jump
+
+    return Job(order.key, work, _WHOLE)
+
+
+def _replay(order: ReplayOrder, job: Job[Jump]) -> ReplayPair:
     shield, rule_set = order.shield, order.rule_set
-    tell(0.0, "Making the agent …")
+    job.text = "Making the agent …"
     agent = order.agent()
-
-    def playing(done: int, total: int) -> None:
-        tell(0.7 * done / total, "Playing the episode and drawing it …")
-
+    playing = _part(job, lambda *_: "Playing the episode and drawing it …", 0.0, _PLAYED)
     if shield is None or rule_set is None:
         film = render_episode(order.env_id, agent, seed=order.seed, progress=playing)
     else:
@@ -219,14 +258,10 @@ def run(order: ReplayOrder, tell: Tell) -> ReplayPair:
             progress=playing,
             describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
         )
-
-    def encoding(done: int, total: int) -> None:
-        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
-
     description = order.description
     dimensions = environment_dimensions(description, rule_set)
     film = film.named(dimensions)
-    film.gif(progress=encoding)
+    film.gif(progress=_encoding(job))
     return ReplayPair(
         order=order,
         film=film,
@@ -238,79 +273,95 @@ def run(order: ReplayOrder, tell: Tell) -> ReplayPair:
     )
 
 
-def compare(order: ReplayOrder, episodes: int, tell: Tell) -> tuple[tuple[str, Episodes], ...]:
-    """Run several episodes with the rules and without; of the first run the steps are kept.
+def _part(
+    job: Job[Result], text: Callable[[int, int], str], first: float, last: float
+) -> Callable[[int, int], bool]:
+    """The progress of a part of some work, from one share of it to another."""
+
+    def progress(done: int, total: int) -> bool:
+        job.text = text(done, total)
+        share = first + (last - first) * done / total
+        return job.progress(round(_WHOLE * share), _WHOLE)
+
+    return progress
+
+
+def _encoding(job: Job[Result]) -> Callable[[int, int], bool]:
+    return _part(job, lambda done, total: f"Picture {done:,} of {total:,} …", _PLAYED, 1.0)
+
+
+Runs = tuple[tuple[str, Episodes], ...]
+"""With the rules, where there are some, and without; of the first the steps are kept."""
+EPISODE_RUNS = Place[Runs]("episodes")
+
+
+def comparing(order: ReplayOrder, episodes: int) -> Job[Runs]:
+    """Run several episodes with the rules and without.
 
     Args:
         order: Of the first of them.
         episodes: How many.
-        tell: How far it is.
-
-    Raises:
-        SarlError: If they cannot be run.
     """
+    cache, key = comparison_cache(), (order.key, episodes)
+    return Job(key, lambda job: cache.put(key, _compare(order, episodes, job)), _WHOLE)
+
+
+def _compare(order: ReplayOrder, episodes: int, job: Job[Runs]) -> Runs:
     agent, shield = order.agent(), order.shield
-    runs: list[tuple[str, Episodes]] = []
     wanted = [(ALONE, None)] if shield is None else [(WITH, shield), (WITHOUT, None)]
-    for part, (name, guard) in enumerate(wanted):
 
-        def playing(done: int, total: int, name: str = name, part: int = part) -> None:
-            tell((part + done / total) / len(wanted), f"{done} of {total} episodes, {name} …")
-
-        runs.append(
-            (
-                name,
-                rollout(
-                    order.env_id,
-                    agent,
-                    shield=guard,
-                    episodes=episodes,
-                    seed=order.seed,
-                    keep_steps=part == 0,
-                    progress=playing,
-                ),
-            )
+    def run(part: int, name: str, guard: Shield | None) -> tuple[str, Episodes]:
+        return name, rollout(
+            order.env_id,
+            agent,
+            shield=guard,
+            episodes=episodes,
+            seed=order.seed,
+            keep_steps=part == 0,
+            progress=_part(
+                job,
+                lambda done, total: f"{done} of {total} episodes, {name} …",
+                part / len(wanted),
+                (part + 1) / len(wanted),
+            ),
         )
-    return tuple(runs)
+
+    return tuple(run(part, *one) for part, one in enumerate(wanted))
 
 
-def run_fork(order: ReplayOrder, step: int, rest: Rest, tell: Tell) -> Fork:
+FORK = Place[Fork]("fork")
+
+
+def forking(order: ReplayOrder, step: int, rest: Rest) -> Job[Fork]:
     """Run the episode with what the shield changed at a step, and without it, and draw both.
 
     Args:
         order: Of the episode; it has rules.
         step: At which the change is withheld.
         rest: What the shield does after it.
-        tell: How far it is.
-
-    Raises:
-        SarlError: If it cannot be run.
     """
+    cache, key = fork_cache(), (order.key, step, rest)
+    return Job(key, lambda job: cache.put(key, _fork(order, step, rest, job)), _WHOLE)
+
+
+def _fork(order: ReplayOrder, step: int, rest: Rest, job: Job[Fork]) -> Fork:
     shield, rule_set = order.shield, order.rule_set
     assert shield is not None
     assert rule_set is not None
-    tell(0.0, "Making the agent …")
-    agent = order.agent()
-
-    def playing(done: int, total: int) -> None:
-        tell(0.7 * done / total, "Playing both and drawing them …")
-
-    def encoding(done: int, total: int) -> None:
-        tell(0.7 + 0.3 * done / total, f"Picture {done:,} of {total:,} …")
-
+    job.text = "Making the agent …"
     branched = fork(
         order.env_id,
-        agent,
+        order.agent(),
         shield,
         step=step,
         rest=rest,
         seed=order.seed,
         describe_rule=lambda index: sentence(rule_set.rules[index], rule_set, evidence=False),
-        progress=playing,
+        progress=_part(job, lambda *_: "Playing both and drawing them …", 0.0, _PLAYED),
     )
     dimensions = environment_dimensions(order.description, rule_set)
     branched = replace(branched, replay=branched.replay.named(dimensions))
-    branched.gif(progress=encoding)
+    branched.gif(progress=_encoding(job))
     return branched
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from html import unescape
 from pathlib import Path
 
@@ -49,3 +50,22 @@ def metrics(app: AppTest) -> dict[str, str]:
     return {metric.label: metric.value for metric in app.metric} | {
         unescape(label): unescape(value) for label, value in cards
     }
+
+
+def run_through(app: AppTest, name: str) -> AppTest:
+    """Begin work beside the page, where it is offered, and look in until it is done."""
+    keys = [button.key for button in app.button]
+    if f"run_{name}" in keys:
+        app.button(key=f"run_{name}").click().run()
+    return finished(app, name)
+
+
+def finished(app: AppTest, name: str) -> AppTest:
+    """Look in until work is done, as the browser does every second."""
+    for _ in range(3_000):
+        assert not app.exception, app.exception
+        if f"cancel_{name}" not in [button.key for button in app.button]:
+            return app
+        time.sleep(0.1)
+        app.run()
+    raise AssertionError("the work does not end")

@@ -1,27 +1,14 @@
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import pytest
-from streamlit.testing.v1 import AppTest
 
 from sarl_core import Shield, load_demonstrations, mine_rules
 from sarl_core.studies.ablation_run import ablate
-from tests.app.screens import errors, metrics, open_page, texts
+from tests.app.screens import errors, finished, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
-
-
-def finished(app: AppTest) -> AppTest:
-    """Look in until the work is done, as the browser does every second."""
-    for _ in range(3_000):
-        assert not app.exception, app.exception
-        if "cancel_ablation" not in [button.key for button in app.button]:
-            return app
-        time.sleep(0.1)
-        app.run()
-    raise AssertionError("the work does not end")
 
 
 def test_every_rule_is_what_the_library_gives_and_kept() -> None:
@@ -29,7 +16,7 @@ def test_every_rule_is_what_the_library_gives_and_kept() -> None:
     app = open_page("ablation", ablation_episodes="6", **query)
     assert "press Run" in texts(app)
     app.button(key="run_ablation").click().run()
-    finished(app)
+    finished(app, "ablation")
     assert not errors(app)
     rules = mine_rules(
         load_demonstrations(DATA / "cartpole.parquet"), supp_min=0.005, conf_min=0.95
@@ -57,7 +44,7 @@ def test_called_off_it_says_so() -> None:
     )
     app.button(key="run_ablation").click().run()
     app.button(key="cancel_ablation").click().run()
-    finished(app)
+    finished(app, "ablation")
     assert "Cancelled. What had been finished is kept" in texts(app)
     assert not app.button(key="run_ablation").disabled
 

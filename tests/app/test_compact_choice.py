@@ -13,7 +13,7 @@ from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.language import sentence, share_text
 from sarl_core.mining.rule_tree import recount
-from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -229,8 +229,7 @@ def test_compact_rules_that_cannot_be_used_are_said_and_the_thresholds_stay(
 def test_compact_rules_are_replayed_where_there_are_some(compact: RuleSet) -> None:
     app = open_page("replay", data="cartpole", rules="compact", agent="novice", seed="3")
     assert app.selectbox(key="rules").value == "compact"
-    app.button(key="run").click().run()
-    assert not app.exception
+    run_through(app, "replay")
     assert not errors(app)
     assert f"{len(compact):,} rules (compact)" in texts(app)
     assert metrics(app)["Covered"] == "100 %"

@@ -13,7 +13,7 @@ from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import RuleSet, rules_from_json, rules_to_json
 from sarl_core.mining.validation.holding_out import hold_out
-from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -241,7 +241,7 @@ def test_the_file_holds_the_edits_and_others_can_choose_them() -> None:
     app.switch_page("replay.py").run()
     app.selectbox(key="rules").select("edited")
     app.selectbox(key="agent").select("novice").run()
-    click(app, "run")
+    run_through(app, "replay")
     assert not errors(app)
     assert f"{len(FILTERED):,} rules (edited)" in texts(app)
     app.switch_page("difference.py").run()
@@ -286,7 +286,7 @@ def edited_in(app: AppTest) -> RuleSet:
     app.switch_page("replay.py").run()
     app.selectbox(key="rules").select("edited")
     app.selectbox(key="agent").select("novice").run()
-    click(app, "run")
+    run_through(app, "replay")
     found = app.session_state["_replay"].rule_set
     assert isinstance(found, RuleSet)
     return found

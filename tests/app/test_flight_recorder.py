@@ -14,7 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.rendering.forking import fork
 from sarl_core.rollouts.episodes import Episodes
-from tests.app.screens import errors, html, metrics, open_page, texts
+from tests.app.screens import errors, finished, html, metrics, open_page, run_through, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 SEED = 100_003
@@ -33,9 +33,7 @@ def wanted() -> Episodes:
 def replayed(**query: str) -> AppTest:
     asked = {"data": "cartpole", "rules": "filtered", "seed": str(SEED), **query}
     app = open_page("replay", **asked)
-    app.button(key="run").click().run()
-    assert not app.exception, app.exception
-    return app
+    return run_through(app, "replay")
 
 
 def table(app: AppTest) -> pd.DataFrame:
@@ -110,7 +108,7 @@ def test_a_filter_that_leaves_nothing_says_so(wanted: Episodes) -> None:
     app = replayed(rules="none")
     (alone,) = [one.value for one in app.dataframe if "Step" in one.value.columns]
     assert list(alone.columns[:3]) == ["Step", "Done", "Reward"]
-    assert "fork" not in [button.key for button in app.button]
+    assert "run_fork" not in [button.key for button in app.button]
 
 
 def test_the_change_of_a_step_is_withheld(wanted: Episodes) -> None:
@@ -118,13 +116,12 @@ def test_the_change_of_a_step_is_withheld(wanted: Episodes) -> None:
     changes = np.flatnonzero(wanted.steps.intervened)
     calm = int(np.flatnonzero(~wanted.steps.intervened)[0])
     app = replayed(step=str(calm), withhold="the shield from here on")
-    assert "fork" not in [button.key for button in app.button]
+    assert "run_fork" not in [button.key for button in app.button]
     assert "Choose a step at which the rules changed" in texts(app)
     step = int(changes[3])
     app.slider(key="step").set_value(step).run()
     assert "The shield is off from this step to the end" in texts(app)
-    app.button(key="fork").click().run()
-    assert not app.exception
+    run_through(app, "fork")
     assert not errors(app)
     found = fork("CartPole-v1", "novice", shield(), step=step, rest="alone", seed=SEED)
     shown = metrics(app)
@@ -141,8 +138,7 @@ def test_the_change_of_a_step_is_withheld(wanted: Episodes) -> None:
 
 def test_the_steps_of_all_episodes_and_the_way_to_another() -> None:
     app = replayed()
-    app.button(key="compare").click().run()
-    assert not app.exception
+    run_through(app, "episodes")
     app.session_state["recorded"] = "all episodes"
     app.run()
     assert not app.exception
@@ -154,8 +150,7 @@ def test_the_steps_of_all_episodes_and_the_way_to_another() -> None:
     assert set(table(app)["Seed"]) == {SEED + 4}
     assert "is not among them" in texts(app)
     click(app, 6).run()
-    app.run()
-    assert not app.exception
+    finished(app.run(), "replay")
     if app.number_input(key="seed").value == SEED + 4:  # a click reaches the callback in a browser
         assert app.slider(key="step").value == 6
         assert metrics(app)["Length with rules"] == f"{int(everything.lengths[4]):,}"

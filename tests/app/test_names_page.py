@@ -9,7 +9,7 @@ from sarl_core import load_demonstrations, mine_rules
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import ROUTER, errors, html, open_page, texts
+from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 
@@ -104,8 +104,7 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
     ).run()
     for rules in ("own file", "unfiltered", "none"):
         app.selectbox(key="rules").select(rules).run()
-        app.button(key="run").click().run()
-        assert not app.exception, app.exception
+        run_through(app, "replay")
         assert not errors(app)
         replayed = kept(app)
         assert replayed.features[2] == Feature("lean", "turns")
@@ -125,7 +124,7 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
     app.button(key="names_back").click().run()
     app.switch_page("replay.py").run()
     assert "The settings have changed since" in texts(app)
-    app.button(key="run").click().run()
+    run_through(app, "replay")
     assert kept(app).dimensions[0].label_names == ("push left", "push right")
 
 

@@ -13,15 +13,13 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules, save_demonstrations
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import errors, html, metrics, open_page, texts
+from tests.app.screens import errors, finished, html, metrics, open_page, run_through, texts
 
 DATA = Path(__file__).parents[2] / "data"
 
 
 def run(app: AppTest) -> AppTest:
-    app.button(key="run").click().run()
-    assert not app.exception, app.exception
-    return app
+    return run_through(app, "replay")
 
 
 def test_before_a_run_the_page_says_what_to_do() -> None:
@@ -120,8 +118,7 @@ def test_a_continuous_action_is_replaced_in_three_ways(projection: str) -> None:
 
 def test_twenty_episodes_are_compared() -> None:
     app = run(open_page("replay", data="cartpole", rules="unfiltered"))
-    app.button(key="compare").click().run()
-    assert not app.exception
+    run_through(app, "episodes")
     (table,) = [one.value for one in app.dataframe if "Run" in one.value.columns]
     assert table["Run"].tolist() == ["With the rules", "Without"]
     assert len(app.get("plotly_chart")) == 3
@@ -244,8 +241,7 @@ def test_a_bad_rule_file_is_refused(content: bytes) -> None:
 
 def test_the_agent_alone_is_run_over_twenty_episodes() -> None:
     app = run(open_page("replay", data="cartpole", rules="none"))
-    app.button(key="compare").click().run()
-    assert not app.exception
+    run_through(app, "episodes")
     (table,) = [one.value for one in app.dataframe if "Run" in one.value.columns]
     assert table["Run"].tolist() == ["Agent alone"]
 
@@ -301,8 +297,7 @@ def test_few_covered_steps_are_said_and_the_unfiltered_rules_offered() -> None:
     covered = metrics(app)["Covered"]
     assert float(covered.split()[0].strip("<")) < 30
     assert f"{covered} of the steps" in texts(app) or "No rule applied" in texts(app)
-    app.button(key="try_unfiltered").click().run()
-    assert not app.exception
+    finished(app.button(key="try_unfiltered").click().run(), "replay")
     assert app.selectbox(key="rules").value == "unfiltered"
     assert "rules (unfiltered)" in texts(app)
     assert "settings have changed" not in texts(app)
@@ -313,8 +308,7 @@ def test_few_covered_steps_are_said_and_the_unfiltered_rules_offered() -> None:
 def test_on_a_seed_of_the_demonstrations_the_page_says_so() -> None:
     def said(**query: str) -> str:
         app = open_page("replay", data="cartpole", rules="unfiltered", **query)
-        app.button(key="run").click().run(timeout=60)
-        return texts(app)
+        return texts(run(app))
 
     assert "an episode of this seed" in said(seed="3")
     assert "an episode of this seed" not in said()

@@ -17,26 +17,15 @@ from sarl_core import load_demonstrations, mine_rules
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.studies.comparison import Arm, compare
-from tests.app.screens import errors, open_page, texts
+from tests.app.screens import errors, finished, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
 
 
-def finished(app: AppTest) -> AppTest:
-    """Look in until the work is done, as the browser does every second."""
-    for _ in range(3_000):
-        assert not app.exception, app.exception
-        if "cancel_comparison" not in [button.key for button in app.button]:
-            return app
-        time.sleep(0.1)
-        app.run()
-    raise AssertionError("the work does not end")
-
-
 def run(app: AppTest) -> AppTest:
     app.button(key="run_comparison").click().run()
-    return finished(app)
+    return finished(app, "comparison")
 
 
 def rows(app: AppTest) -> dict[str, dict[str, Any]]:
@@ -132,7 +121,7 @@ def test_the_work_goes_on_while_other_pages_are_looked_at() -> None:
     app.switch_page("rules.py").run()
     assert not app.exception
     app.switch_page("shield.py").run()
-    assert len(rows(finished(app))) == 6
+    assert len(rows(finished(app, "comparison"))) == 6
 
 
 @pytest.mark.parametrize("projection", ["centre", "clip", "expert"])

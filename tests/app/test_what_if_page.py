@@ -14,7 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import ROUTER, html, open_page, texts
+from tests.app.screens import ROUTER, html, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data"
 COVERED, UNCOVERED = "a random covered state", "a random uncovered state"
@@ -121,7 +121,7 @@ def test_a_step_of_the_replay_is_taken_and_outside_its_data_it_says_so() -> None
     app = open_page(
         "replay", data="cartpole", agent="novice", rules="unfiltered", outside="abstain"
     )
-    app.button(key="run").click().run()
+    run_through(app, "replay")
     assert "a rule was broken outside the data" in texts(app)
     order = app.session_state["_replay"]
     assert order.shield.outside == "abstain"

@@ -17,14 +17,14 @@ from sarl_dashboard.components.settings import (
     no_boxes_notice,
     notes_notice,
     offered_rule_sets,
-    outside_choice,
-    projection_choice,
+    own_files,
+    shield_choice,
 )
 from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.jobs.episodes import Row
-from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, PROJECTIONS, agent_for, policy_upload
+from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, agent_for
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
-from sarl_dashboard.state.environments import continuous, demonstrated, environment_of
+from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
 
@@ -111,15 +111,8 @@ def settings() -> AblationChoice:
                 help="The episodes start from this seed, the next one, and so on, the same with "
                 "every rule taken out. The same seeds give the same result.",
             )
-            projection = PROJECTIONS[0]
-            if continuous(env):
-                projection = projection_choice()
-            outside = outside_choice()
-        policy_file = rule_file = None
-        if agent == OWN_FILE:
-            policy_file = policy_upload("Policy", "policy_file", env)
-        if rules == OWN_FILE:
-            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+            projection, outside = shield_choice(env)
+        policy_file, rule_file = own_files(agent, rules, env)
 
     env_id, first = environment_of(env), int(seed or 0)
     describe_environment(env_id)

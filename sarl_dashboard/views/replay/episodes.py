@@ -18,13 +18,14 @@ from sarl_core.rollouts.flips import pace_of
 from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import flips_rate, flips_title
-from sarl_dashboard.components.run_bar import waited_for
+from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.replays import (
+    EPISODE_RUNS,
     EPISODES,
     WITH,
     ReplayOrder,
-    compare,
     compared,
+    comparing,
     comparison_cache,
 )
 
@@ -46,17 +47,25 @@ def comparison(order: ReplayOrder) -> None:
         )
         or EPISODES[0]
     )
-    runs = comparison_cache().get((order.key, episodes))
+    key = (order.key, episodes)
+    offer = Offer(
+        key=key,
+        start=lambda: comparing(order, episodes),
+        about="One episode may be luck. Run more of them, each on a seed of its own.",
+        complete=False,
+        cancelled="Cancelled; nothing was kept.",
+        label=f"Run {episodes} episodes",
+        icon=":material/stacked_bar_chart:",
+        type="secondary",
+    )
+
+    def bar(at_work: bool) -> None:
+        if at_work or key not in comparison_cache():
+            run_bar(EPISODE_RUNS, offer)
+
+    watched(EPISODE_RUNS, bar)
+    runs = comparison_cache().get(key)
     if runs is None:
-        st.caption("One episode may be luck. Run more of them, each on a seed of its own.")
-        if st.button(
-            f"Run {episodes} episodes", key="compare", icon=":material/stacked_bar_chart:"
-        ):
-            runs = waited_for(lambda tell: compare(order, episodes, tell))
-            if runs is not None:
-                comparison_cache().put((order.key, episodes), runs)
-                st.session_state["_compared"] = (order, episodes)
-                st.rerun()
         return
     if ran != (order, episodes):
         st.session_state["_compared"] = (order, episodes)

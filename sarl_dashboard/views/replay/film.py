@@ -8,30 +8,30 @@ import streamlit as st
 
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import no_boxes_notice, notes_notice
-from sarl_dashboard.jobs.replays import ReplayPair, movie
+from sarl_dashboard.jobs.replays import REPLAY, ReplayOrder, ReplayPair, movie
 from sarl_dashboard.state.agents import FRESH_SEED
 from sarl_dashboard.state.environments import demonstrated
 from sarl_dashboard.state.rule_files import NO_RULES, OWN_FILE
 from sarl_dashboard.text import escaped
-from sarl_dashboard.views.replay.settings import ReplaySettings
 
 
-def headline(replay: ReplayPair, settings: ReplaySettings) -> None:
+def headline(replay: ReplayPair, asked_for: ReplayOrder | None) -> None:
     """Whose episode it is, and what should be known about it.
 
     Args:
         replay: To show.
-        settings: As they are now.
+        asked_for: By the settings as they are now; None where it cannot be had.
     """
     order, rule_set = replay.order, replay.order.rule_set
+    changed = asked_for is None or asked_for.key != order.key
     st.markdown(
         f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(order.env_id)}**, seed "
         f"{order.seed}"
         + (f", {len(rule_set):,} rules ({order.rules})" if rule_set else "")
         + (
-            ""
-            if settings.ask_for(order)
-            else "  \n:orange[:material/info: The settings have changed since: press Run.]"
+            "  \n:orange[:material/info: The settings have changed since: press Run.]"
+            if changed and not REPLAY.at_work
+            else ""
         )
     )
     notes_notice(note for episode in replay.film.episodes for note in episode.remarks)

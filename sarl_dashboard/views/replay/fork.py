@@ -8,8 +8,8 @@ from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.forking import Fork, Rest
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.components.run_bar import waited_for
-from sarl_dashboard.jobs.replays import Played, fork_cache, run_fork
+from sarl_dashboard.components.run_bar import Offer, run_bar, watched
+from sarl_dashboard.jobs.replays import FORK, Played, fork_cache, forking
 from sarl_dashboard.text import escaped
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
@@ -32,32 +32,39 @@ def fork_section(played: Played, current: int) -> None:
             else "The rules changed nothing in this episode, so there is nothing to withhold."
         )
         return
-    with st.container(horizontal=True, vertical_alignment="bottom"):
-        chosen = st.segmented_control(
-            "Withhold",
-            list(RESTS),
-            default=next(iter(RESTS)),
-            key="withhold",
-            bind="query-params",
-            required=True,
-        )
-        rest = RESTS[chosen or next(iter(RESTS))]
-        key = (order.key, current, rest)
-        branched = fork_cache().get(key)
-        slot = st.empty()
-        if branched is None and slot.button(
-            f"Go on without the change at step {current:,}",
-            key="fork",
-            icon=":material/call_split:",
-        ):
-            branched = waited_for(lambda tell: run_fork(order, current, rest, tell))
-            if branched is not None:
-                fork_cache().put(key, branched)
-                slot.empty()
-    st.caption(
+    chosen = st.segmented_control(
+        "Withhold",
+        list(RESTS),
+        default=next(iter(RESTS)),
+        key="withhold",
+        bind="query-params",
+        required=True,
+    )
+    rest = RESTS[chosen or next(iter(RESTS))]
+    key = (order.key, current, rest)
+    about = (
         f"{REST_TEXT[rest]} Up to step {current:,} both are the same episode, and the agent draws "
         "the same random numbers in both."
     )
+    offer = Offer(
+        key=key,
+        start=lambda: forking(order, current, rest),
+        about=about,
+        complete=False,
+        cancelled="Cancelled; nothing was kept.",
+        label=f"Go on without the change at step {current:,}",
+        icon=":material/call_split:",
+        type="secondary",
+    )
+
+    def bar(at_work: bool) -> None:
+        if at_work or key not in fork_cache():
+            run_bar(FORK, offer)
+        else:
+            st.caption(about)
+
+    watched(FORK, bar, seconds=0.5)
+    branched = fork_cache().get(key)
     if branched is not None:
         show(branched)
 

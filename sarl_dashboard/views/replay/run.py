@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_dashboard.components.run_bar import waited_for
+from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.replays import (
+    REPLAY,
+    Jump,
     Played,
     ReplayOrder,
     compared,
     latest_order,
-    replay_cache,
-    run,
-    show_next,
+    replaying,
 )
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.replay.settings import ReplaySettings
-
-
-@dataclass(frozen=True, eq=False)
-class Jump:
-    """A way to a step of another episode of a comparison.
-
-    Attributes:
-        order: Of that episode.
-        step: In it.
-    """
-
-    order: ReplayOrder
-    step: int
 
 
 def jump_to(seed: int, step: int) -> None:
@@ -40,36 +25,42 @@ def jump_to(seed: int, step: int) -> None:
     st.rerun()  # as a whole: it is another replay
 
 
-def chosen_jump() -> Jump | None:
-    """Where a step of another episode was chosen in the flight recorder, the way there.
+def set_out() -> None:
+    """Where a step of another episode was chosen in the flight recorder, set out for it.
 
     The widgets are told, so this comes before they are drawn.
     """
     seed, step = st.session_state.pop("_jump", (None, None))
     order = latest_order()
     comparison = None if order is None or seed is None else compared(order)
-    if comparison is None:
-        return None
-    st.session_state["seed"], st.session_state["step"] = seed, step
-    return Jump(comparison[0].of_seed(seed), step)
+    if comparison is not None:
+        st.session_state["seed"] = seed
+        jump = Jump(comparison[0].of_seed(seed), step)
+        REPLAY.begin(lambda: replaying(jump))
 
 
-def run_bar(settings: ReplaySettings, jump: Jump | None) -> None:
-    """The button; what it asks for, or a jump, becomes the latest replay."""
-    started = st.button("Run", type="primary", icon=":material/play_arrow:", key="run")
-    if jump is None and not started and not st.session_state.pop("_run", False):
-        return
+def replay_bar(settings: ReplaySettings) -> ReplayOrder | None:
+    """The button, or how far the work is; what the settings ask for, None if it cannot be had."""
     try:
-        order = settings.order() if jump is None else jump.order
+        order = settings.order()
     except SarlError as error:
         refuse(error)
-        return
-    if replay_cache().get(order.key) is None:
-        replay = waited_for(lambda tell: run(order, tell))
-        if replay is None:
-            return
-        replay_cache().put(order.key, replay)
-    show_next(order)
+        order = None
+    offer = None
+    if order is not None:
+        jump = Jump(order)
+        also = "" if order.rule_set is None else ", with the rules and without"
+        offer = Offer(
+            key=order.key,
+            start=lambda: replaying(jump),
+            about=f"One episode, on seed {order.seed:,}{also}.",
+            complete=False,
+            cancelled="Cancelled; nothing was kept.",
+        )
+        if st.session_state.pop("_run", False):
+            REPLAY.begin(offer.start)
+    watched(REPLAY, lambda _: run_bar(REPLAY, offer), seconds=0.5)
+    return order
 
 
 def arrive(jump: Jump, played: Played) -> None:
@@ -78,6 +69,6 @@ def arrive(jump: Jump, played: Played) -> None:
     The slider of another episode is another widget, and a new one takes its step from the URL: now
     that it is there, it is told again, and the row of the step with it.
     """
-    if played.order is jump.order:
+    if played.order is jump.order and jump.step is not None:
         st.session_state["_step"], st.session_state["_jumped"] = jump.step, True
         st.rerun()

@@ -8,7 +8,6 @@ import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.environments.description import describe_environment
-from sarl_core.errors import SarlError
 from sarl_core.explaining.words.replay import named_description
 from sarl_core.rollouts.player import shield_for
 from sarl_core.shielding.projection import Projection
@@ -16,17 +15,15 @@ from sarl_core.shielding.shield import Outside, Shield
 from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
-    outside_choice,
-    projection_choice,
+    own_files,
+    shield_choice,
 )
 from sarl_dashboard.jobs.replays import ReplayOrder
 from sarl_dashboard.state.agents import (
     AGENTS,
     FRESH_SEED,
-    PROJECTIONS,
     PolicyFile,
     agent_for,
-    policy_upload,
 )
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import continuous, environment_of
@@ -74,13 +71,6 @@ class ReplaySettings:
             description,
         )
 
-    def ask_for(self, order: ReplayOrder) -> bool:
-        """Whether they still ask for what is on screen."""
-        try:
-            return self.order().key == order.key
-        except SarlError:
-            return False
-
 
 def settings() -> ReplaySettings:
     """The widgets."""
@@ -117,15 +107,8 @@ def settings() -> ReplaySettings:
                 help="Both runs start in the same state and draw the same random numbers; the "
                 "same seed gives the same replay.",
             )
-            projection = PROJECTIONS[0]
-            if continuous(env):
-                projection = projection_choice()
-            outside = outside_choice()
-        policy_file = rule_file = None
-        if agent == OWN_FILE:
-            policy_file = policy_upload("Policy", "policy_file", env)
-        if rules == OWN_FILE:
-            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+            projection, outside = shield_choice(env)
+        policy_file, rule_file = own_files(agent, rules, env)
     return ReplaySettings(
         env, agent, policy_file, rules, rule_file, int(seed or 0), projection, outside
     )

@@ -11,13 +11,12 @@ from sarl_core.shielding.shield import Outside, Projection
 from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
-    outside_choice,
-    projection_choice,
+    own_rule_file,
+    shield_choice,
 )
 from sarl_dashboard.state.agents import (
     AGENTS,
     FRESH_SEED,
-    PROJECTIONS,
     PolicyFile,
     policy_uploads,
 )
@@ -75,10 +74,7 @@ def settings() -> ShieldChoices:
                 help="The episodes start from this seed, the next one, and so on, the same for "
                 "all agents. The same seeds give the same result.",
             )
-            projection = PROJECTIONS[0]
-            if continuous(env):
-                projection = projection_choice()
-            outside = outside_choice()
+            projection, outside = shield_choice(env)
         agents = st.pills(
             "Agents",
             AGENTS,
@@ -106,9 +102,7 @@ def settings() -> ShieldChoices:
             "this environment. Edited: what you made of them on the Edit page. Own file: rules you "
             "saved.",
         )
-        rule_file = None
-        if OWN_FILE in shields:
-            rule_file = st.file_uploader("Rule file (.json)", key="rule_file")
+        rule_file = own_rule_file() if OWN_FILE in shields else None
     return ShieldChoices(
         env,
         int(episodes or 1),
