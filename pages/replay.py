@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
-from sarl_dashboard.jobs.replays import arrived, latest
+from sarl_dashboard.jobs.replays import REPLAY, arrived, latest
 from sarl_dashboard.views.replay.episodes import comparison
 from sarl_dashboard.views.replay.film import film, headline
 from sarl_dashboard.views.replay.numbers import numbers
@@ -23,12 +23,13 @@ asked_for = replay_bar(settings())
 jump = arrived()
 played = latest()
 if played is None:
-    st.info(
-        "Choose an agent and the rules, then press Run. What rules do shows best with the novice, "
-        "which acts at random, and the unfiltered rules; those at the paper's filtered thresholds "
-        "may apply at few steps. The work goes on while you look at other pages.",
-        icon=":material/play_circle:",
-    )
+    if not REPLAY.at_work:
+        st.info(
+            "Choose an agent and the rules, then press Run. What rules do shows best with the "
+            "novice, which acts at random, and the unfiltered rules; those at the paper's filtered "
+            "thresholds may apply at few steps. The work goes on while you look at other pages.",
+            icon=":material/play_circle:",
+        )
     st.stop()
 headline(played.replay, asked_for)
 numbers(played.replay)

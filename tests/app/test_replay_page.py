@@ -67,6 +67,19 @@ def test_the_rules_keep_a_novice_upright() -> None:
     assert shown["Changed"] != "0 %"
 
 
+def test_a_run_is_called_off_or_goes_on_while_another_page_is_read() -> None:
+    app = open_page("replay", data="lunar_lander", rules="unfiltered", seed="77")
+    app.button(key="run_replay").click().run()
+    app.button(key="cancel_replay").click().run()
+    assert "Cancelled; nothing was kept" in texts(app)
+    assert not metrics(app)
+    app.button(key="run_replay").click().run()
+    assert "press Run" not in texts(app)
+    app.switch_page("rules.py").run()
+    app.switch_page("replay.py").run()
+    assert int(metrics(finished(app, "replay"))["Length with rules"]) > 0
+
+
 def test_the_same_request_is_not_run_again_and_another_is_noticed() -> None:
     app = run(open_page("replay", data="cartpole", seed="5"))
     before = metrics(app)

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from sarl_core.demonstrations.formats import load_demonstrations
 from tests.bad_inputs import ROWS, changed, csv_bytes
-from tests.browser.walking import metric, no_trace, parameters, settle, visit
+from tests.browser.walking import PATIENCE, metric, no_trace, parameters, settle, visit
 
 
 def upload(screen: Page, name: str, content: bytes) -> None:
@@ -104,7 +104,7 @@ def test_a_rule_is_opened(screen: Page) -> None:
 def replay(screen: Page, query: str) -> None:
     visit(screen, f"/replay?{query}", "Replay")
     screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_role("heading", name="Step by step")).to_be_visible()
+    expect(screen.get_by_role("heading", name="Step by step")).to_be_visible(timeout=PATIENCE)
     settle(screen)
 
 

@@ -45,7 +45,7 @@ def test_a_row_of_another_episode_brings_its_replay(screen: Page) -> None:
         expect(screen.get_by_role("spinbutton", name="Seed")).to_have_value(str(seed))
         settle(screen)
         slider = screen.get_by_role("slider", name="Step")
-        expect(slider).to_have_attribute("aria-valuetext", str(step))
+        expect(slider).to_have_attribute("aria-valuetext", str(step), timeout=PATIENCE)
         words = screen.locator(".sarl-step")
         state = steps.observation[(steps.episode == episode) & (steps.step == step)][0]
         for value in state.tolist():

@@ -15,7 +15,7 @@ from playwright.sync_api import Locator, Page, expect
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.mining.language import number_text
 from sarl_core.rollouts.steps import StepTable
-from tests.browser.walking import metric, no_trace, parameters, settle, visit
+from tests.browser.walking import PATIENCE, metric, no_trace, parameters, settle, visit
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 SEED = 100_003
@@ -37,7 +37,8 @@ def wanted() -> StepTable:
 def replay(screen: Page, query: str = "") -> None:
     visit(screen, f"{ADDRESS}{query}", "Replay")
     screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_role("heading", name="Flight recorder")).to_be_visible()
+    recorder = screen.get_by_role("heading", name="Flight recorder")
+    expect(recorder).to_be_visible(timeout=PATIENCE)
     expect(screen.locator(".st-key-recorder_table canvas").first).to_be_visible()
     settle(screen)
 
@@ -136,7 +137,7 @@ def test_both_pictures_of_a_fork_are_shown_and_downloaded(screen: Page, wanted: 
     expect_step(screen, step, wanted)
     screen.get_by_role("button", name=f"Go on without the change at step {step}").click()
     both = screen.get_by_alt_text("Left: with the change. Right: without it.")
-    expect(both).to_be_visible()
+    expect(both).to_be_visible(timeout=PATIENCE)
     settle(screen)
     assert metric(screen, "Return with it") == metric(screen, "Return with rules")
     for key, shown in (
