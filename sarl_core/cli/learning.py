@@ -14,6 +14,7 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.options import (
+    ChoiceName,
     Env,
     Json,
     MaxSteps,
@@ -68,6 +69,7 @@ def learn(
         ),
     ] = 50,
     max_steps: MaxSteps = None,
+    choose: ChoiceName = "return",
     figures: Annotated[
         bool, typer.Option("--figures", help="Also draw the study, as .png.")
     ] = False,
@@ -101,6 +103,7 @@ def learn(
             projection,
             episodes,
             max_steps,
+            choose,
         )
         notes = plan.notes
     with terminal.working("Learning") as advance, _stopping(watched) as stopped:

@@ -156,6 +156,8 @@ class Trial:
         intervention_rate: Share of the steps that the rules changed; 0 without a shield.
         coverage: Share of the steps to which a rule applied; 0 without a shield.
         cut: Episodes that were cut off before their end; none of them is among the crashes.
+        failed: Whether each ended by failure; none where that was not known, or not kept.
+        costs: What each cost; none likewise.
     """
 
     returns: tuple[Number, ...]
@@ -163,6 +165,8 @@ class Trial:
     intervention_rate: Share
     coverage: Share
     cut: Count = 0
+    failed: tuple[bool, ...] = ()
+    costs: tuple[Number, ...] = ()
 
     @property
     def mean(self) -> float:
@@ -182,6 +186,8 @@ class Trial:
             "intervention_rate": self.intervention_rate,
             "coverage": self.coverage,
             **({"cut": self.cut} if self.cut else {}),
+            **({"failed": list(self.failed)} if self.failed else {}),
+            **({"costs": list(self.costs)} if self.costs else {}),
         }
 
 

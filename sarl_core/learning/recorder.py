@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.callbacks import BaseCallback
 
-from sarl_core.environments.failures import failed
+from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.environments.signals import SignalTally, StepOutcomes
 from sarl_core.learning.arms import Handover, LearningArm
 from sarl_core.learning.curves import Columns, LearningEpisodes
 from sarl_core.learning.learners import MaskedPPO
@@ -32,7 +33,7 @@ class Recorder(BaseCallback):
 
     def __init__(
         self,
-        env_id: str,
+        env_id: EnvironmentOrId,
         arm: LearningArm,
         env: Any,
         before: LearningEpisodes,
@@ -56,7 +57,7 @@ class Recorder(BaseCallback):
             keep: Called more rarely, with the curve so far, to save what was learned.
         """
         super().__init__()
-        self.env_id, self.arm, self.env = env_id, arm, env
+        self.arm, self.env = arm, env
         self.steps = steps
         self.tell, self.keep = tell, keep
         self.stopped = False
@@ -66,6 +67,9 @@ class Recorder(BaseCallback):
             self.handover.ended(shielded=bool(shielded), crashed=bool(crashed))
         self.generator = np.random.default_rng(seed)
         count = env.num_envs
+        self.tally = SignalTally(
+            env_id, count, lambda place: f"of episode {len(self.columns['ends'])} while learning"
+        )
         self.returns, self.lengths, self.interventions, self.covered = np.zeros((4, count))
         self.reported = self.saved = time.monotonic()
         self._share(np.arange(count))
@@ -83,10 +87,11 @@ class Recorder(BaseCallback):
             self.interventions += decision.intervened
             self.covered += (decision.rules >= 0).any(axis=1)
             rewards += self.arm.penalty * decision.intervened
+        self._take_in(dones, rewards, infos)
         self.returns += rewards
         self.lengths += 1
         if dones.any():
-            self._note(np.flatnonzero(dones), rewards, infos)
+            self._note(np.flatnonzero(dones))
         now = time.monotonic()
         if now - self.saved > _SAVED_EVERY:
             self.keep(self.curve())
@@ -101,9 +106,27 @@ class Recorder(BaseCallback):
         buffer = getattr(self.model, "rollout_buffer", None)
         return buffer is not None and buffer.pos == buffer.buffer_size - 1
 
-    def _note(self, ended: NDArray[np.int64], rewards: NDArray[np.float64], infos: Any) -> None:
-        cut = np.array([infos[place].get("TimeLimit.truncated", False) for place in ended])
-        crashed = failed(self.env_id, ~cut, rewards[ended])
+    def _take_in(self, dones: NDArray[np.bool_], rewards: NDArray[np.float64], infos: Any) -> None:
+        """See what the step says of failure."""
+        observations = np.array(self.locals["new_obs"], dtype=np.float32)
+        terminated = dones.astype(np.bool_)  # a copy
+        for place in np.flatnonzero(dones).tolist():
+            # What is new there is the first observation of the next episode.
+            observations[place] = infos[place]["terminal_observation"]
+            terminated[place] = not infos[place].get("TimeLimit.truncated", False)
+        actions = self.locals.get("clipped_actions", self.locals["actions"])
+        if self.arm.shielded:
+            actions = self.env.decision.executed
+        places = np.arange(len(dones))
+        steps = self.lengths.astype(np.int64)
+        self.tally.add(
+            places, steps, StepOutcomes(observations, list(actions), rewards, terminated, infos)
+        )
+
+    def _note(self, ended: NDArray[np.int64]) -> None:
+        for place in ended.tolist():
+            self.tally.end(place)
+        crashed = self.tally.failures[ended] == 1.0
         shielded = self._enforced()[ended]
         row = {
             "ends": np.full(len(ended), self.num_timesteps),
@@ -118,6 +141,8 @@ class Recorder(BaseCallback):
             self.columns[name] += values.tolist()
         for values in (self.returns, self.lengths, self.interventions, self.covered):
             values[ended] = 0
+        for place in ended.tolist():
+            self.tally.restart(place)
         for was_shielded, has_crashed in zip(shielded.tolist(), crashed.tolist(), strict=True):
             self.handover.ended(shielded=was_shielded, crashed=has_crashed)
         self._share(ended)

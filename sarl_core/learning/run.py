@@ -183,7 +183,7 @@ def _learn(
 
     begun = learner.num_timesteps
     recorder = Recorder(
-        str(env_id), arm, env, before, steps=steps, seed=seed + begun, tell=tell, keep=keep
+        env_id, arm, env, before, steps=steps, seed=seed + begun, tell=tell, keep=keep
     )
     go_on = tell(before, begun)
     if go_on and begun < steps:
@@ -249,5 +249,7 @@ def _try(
         crashes=int(played.failed.sum()),
         intervention_rate=float(played.interventions.sum()) / steps,
         coverage=float(played.covered.sum()) / steps,
-        cut=int(played.cut.sum()),
+        cut=int((played.cut & ~played.failed).sum()),
+        failed=tuple(played.failed.tolist()) if played.failures_known else (),
+        costs=() if np.isnan(played.costs).any() else tuple(played.costs.tolist()),
     )

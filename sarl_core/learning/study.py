@@ -34,6 +34,7 @@ from sarl_core.learning.study_files import (
 from sarl_core.learning.summary import summarise_study
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.progress import CancelledError, Progress
+from sarl_core.rollouts.choices import Choice, check_choice
 from sarl_core.shielding.projection import Projection
 
 MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
@@ -53,6 +54,7 @@ class LearningPlan:
         projection: What becomes of a continuous action that breaks a rule.
         episodes: Of each trial after learning.
         max_steps: After which one of these is cut off; `episodes.MAX_STEPS` where None.
+        choose: What comes first where the best way to learn is chosen.
     """
 
     env_id: EnvironmentOrId
@@ -63,6 +65,7 @@ class LearningPlan:
     projection: Projection = "centre"
     episodes: int = TRIAL_EPISODES
     max_steps: int | None = None
+    choose: Choice = "return"
 
     def __post_init__(self) -> None:
         """Refuse what cannot be learned.
@@ -81,6 +84,7 @@ class LearningPlan:
             raise InputError(f"episodes is {self.episodes} and must be at least 1")
         if self.max_steps is not None and self.max_steps < 1:
             raise InputError(f"max_steps is {self.max_steps} and must be at least 1")
+        check_choice(self.choose, self.env_id)
         for arm in self.arms:
             for seed in (min(self.seeds), max(self.seeds)):
                 check_learning(self.env_id, self.rules, arm, steps=self.steps, seed=seed)
@@ -113,6 +117,7 @@ class LearningPlan:
             "projection": self.projection,
             "trial_episodes": self.episodes,
             "trial_max_steps": self.max_steps,
+            "choose": self.choose,
             "rules": None
             if rules is None
             else {
@@ -192,12 +197,12 @@ def run_study(
 def _claim(folder: Path, plan: LearningPlan) -> None:
     """Write the plan down, or check that it is the one that was begun here.
 
-    More arms, seeds or runs may be asked for later; what runs share must stay.
+    More arms, seeds or runs may be asked for later, and another choice; what runs share must stay.
     """
     path, settings = folder / PLAN, plan.settings()
     if path.is_file():
         before = read_json(path)
-        free = ("arms", "seeds")
+        free = ("arms", "seeds", "choose")
         other = [
             name for name in settings if name not in free and before.get(name) != settings[name]
         ]

@@ -22,6 +22,7 @@ from sarl_core.files import whole_file
 from sarl_core.learning.arms import ARMS, LearningArm
 from sarl_core.learning.curves import NO_EPISODES, Columns, LearningEpisodes, Trial
 from sarl_core.limits import limited_bytes
+from sarl_core.rollouts.choices import Choice
 
 FORMAT = "sarl-learning"
 VERSION = 1
@@ -101,8 +102,14 @@ class LearningStudy:
     @property
     def environment(self) -> Environment:
         """The environment and what is called a failure in it: to be told of, and not to be made."""
-        failure = self.settings.get("failure")
+        made_with = self.settings.get("made_with")
+        failure = made_with.get("failure") if isinstance(made_with, dict) else None
         return Environment(self.env_id, failure=failure if isinstance(failure, str) else "")
+
+    @property
+    def choose(self) -> Choice:
+        """What comes first where the best way to learn is chosen."""
+        return "failures" if self.settings.get("choose") == "failures" else "return"
 
     @property
     def complete(self) -> bool:

@@ -12,7 +12,16 @@ import numpy as np
 from sarl_core.learning.arms import ARMS, LearningArm
 from sarl_core.learning.curves import Trial
 from sarl_core.learning.study_files import LearningRun, LearningStudy
-from sarl_core.rollouts.statistics import ReturnStatistics, summarise_groups
+from sarl_core.rollouts.choices import Choice
+from sarl_core.rollouts.statistics import (
+    MeanInterval,
+    Rate,
+    ReturnStatistics,
+    cost_interval,
+    rate_over_groups,
+    summarise_groups,
+    worst_tenth,
+)
 
 SAFE_SHARE = 0.5
 """An arm is called safe while learning if it crashes at most this share as often as the learner
@@ -31,7 +40,12 @@ class TrialSummary:
             chosen by the one can be told by the other.
         returns: Of all their episodes: mean, and interquartile mean with its 95 % interval over
             learners and episodes.
-        crash_rate: Share of all episodes that ended by failure.
+        crash_halves: The same two halves' shares of failures; those of all episodes where it was
+            not kept which ones failed.
+        failures: Episodes that ended by failure, with the 95 % interval of their share, over
+            learners where there are several.
+        worst_tenth: Mean return of the worst tenth of all episodes.
+        cost: What an episode costs on average, with its 95 % interval; None where it is not known.
         intervention_rate: Mean share of the steps that the rules changed.
         coverage: Mean share of the steps to which a rule applied.
         episodes: How many there are, of all runs.
@@ -41,11 +55,19 @@ class TrialSummary:
     means: tuple[float, ...]
     halves: tuple[float, float]
     returns: ReturnStatistics
-    crash_rate: float
+    crash_halves: tuple[float, float]
+    failures: Rate
+    worst_tenth: float
+    cost: MeanInterval | None
     intervention_rate: float
     coverage: float
     episodes: int
     cut: int
+
+    @property
+    def crash_rate(self) -> float:
+        """Share of all episodes that ended by failure."""
+        return self.failures.rate
 
     @property
     def mean(self) -> float:
@@ -117,7 +139,8 @@ class ArmSummary:
 
     def _trials(self, trials: TrialSummary) -> dict[str, Any]:
         fields = _trial_dict(trials)
-        return fields if self.failures_known else fields | {"crash_rate": None}
+        unknown = dict.fromkeys(("crash_rate", "crash_low", "crash_high"))
+        return fields if self.failures_known else fields | unknown
 
 
 def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
@@ -135,18 +158,26 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
     return tuple(_judged(summary, by_arm.get(summary.arm.alone)) for summary in by_arm.values())
 
 
-def best(summaries: Sequence[ArmSummary]) -> ArmSummary | None:
+def best(summaries: Sequence[ArmSummary], choose: Choice = "return") -> ArmSummary | None:
     """The arm that is safe while learning and good afterwards.
 
     Args:
         summaries: Of `summarise_study`.
+        choose: What comes first.
 
     Returns:
         Of those that are both, the one with the highest mean return afterwards, without a
-        shield, in the first half of the episodes; None if there is none.
+        shield, in the first half of the episodes, or with the fewest failures there, and of equals
+        the highest return; None if there is none.
     """
     both = [summary for summary in summaries if summary.safe and summary.good]
-    return max(both, key=lambda summary: summary.alone.halves[0], default=None)
+
+    def score(summary: ArmSummary) -> tuple[float, ...]:
+        trials = summary.alone
+        fewest = [-trials.crash_halves[0]] if choose == "failures" else []
+        return (*fewest, trials.halves[0])
+
+    return max(both, key=score, default=None)
 
 
 def _summary(study: LearningStudy, arm: LearningArm) -> ArmSummary:
@@ -181,19 +212,45 @@ def _shielded(runs: Sequence[LearningRun]) -> TrialSummary | None:
 
 def _trials(trials: Sequence[Trial]) -> TrialSummary:
     episodes = sum(len(trial.returns) for trial in trials)
+    failures = rate_over_groups(
+        [trial.crashes for trial in trials],
+        [len(trial.returns) for trial in trials],
+        sum(trial.cut for trial in trials),
+    )
     return TrialSummary(
         means=tuple(trial.mean for trial in trials),
-        halves=(
-            float(np.mean([trial.returns[: (len(trial.returns) + 1) // 2] for trial in trials])),
-            float(np.mean([trial.returns[len(trial.returns) // 2 :] for trial in trials])),
-        ),
+        halves=_halves([trial.returns for trial in trials]),
         returns=_returns(tuple(trial.returns for trial in trials)),
-        crash_rate=sum(trial.crashes for trial in trials) / episodes,
+        crash_halves=_halves([trial.failed for trial in trials])
+        if all(trial.failed for trial in trials)
+        else (failures.rate, failures.rate),
+        failures=failures,
+        worst_tenth=worst_tenth(
+            np.concatenate([trial.returns for trial in trials]), worst="lowest"
+        ),
+        cost=_cost(trials),
         intervention_rate=float(np.mean([trial.intervention_rate for trial in trials])),
         coverage=float(np.mean([trial.coverage for trial in trials])),
         episodes=episodes,
         cut=sum(trial.cut for trial in trials),
     )
+
+
+def _halves(groups: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """The means of the first and of the second half of each learner's episodes."""
+    return (
+        float(np.mean([group[: (len(group) + 1) // 2] for group in groups])),
+        float(np.mean([group[len(group) // 2 :] for group in groups])),
+    )
+
+
+def _cost(trials: Sequence[Trial]) -> MeanInterval | None:
+    """Over learners where there are several: what one of them does costs alike each time."""
+    if not all(trial.costs for trial in trials):
+        return None
+    if len(trials) == 1:
+        return cost_interval(trials[0].costs)
+    return cost_interval([float(np.mean(trial.costs)) for trial in trials])
 
 
 @lru_cache(maxsize=256)
@@ -246,6 +303,18 @@ def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
         "iqm_low": returns.low,
         "iqm_high": returns.high,
         "crash_rate": trials.crash_rate,
+        "crash_low": trials.failures.low,
+        "crash_high": trials.failures.high,
+        "worst_tenth": trials.worst_tenth,
+        **(
+            {}
+            if trials.cost is None
+            else {
+                "cost": trials.cost.mean,
+                "cost_low": _number(trials.cost.low),
+                "cost_high": _number(trials.cost.high),
+            }
+        ),
         "intervention_rate": trials.intervention_rate,
         "coverage": trials.coverage,
         **({"cut": trials.cut} if trials.cut else {}),

@@ -102,6 +102,31 @@ def rate_of(happened: ArrayLike, unknown: ArrayLike = False) -> Rate:
     return Rate(count, of, count / of, low, high, most - count)
 
 
+def rate_over_groups(counts: Sequence[int], of_each: Sequence[int], unknown: int = 0) -> Rate:
+    """A share where episodes are of several learners.
+
+    Episodes of one learner are alike, so the interval is that of the mean of the learners' shares
+    (Student's). Where these do not differ, as where nothing ever happened, it is that of all
+    episodes together.
+
+    Args:
+        counts: How often it happened with each of G learners, (G,).
+        of_each: Among how many, (G,).
+        unknown: Of how many it is not known, in all; then, too, all count together.
+
+    Returns:
+        The share of all episodes.
+    """
+    count, of = sum(counts), sum(of_each)
+    order = np.arange(of)
+    together = rate_of(order < count, (order >= count) & (order < count + unknown))
+    shares = [part / whole for part, whole in zip(counts, of_each, strict=True)]
+    if unknown or len(set(shares)) == 1:
+        return together
+    over = mean_interval(shares)
+    return replace(together, low=max(over.low, 0.0), high=min(over.high, 1.0))
+
+
 def mean_interval(values: ArrayLike) -> MeanInterval:
     """The mean of a few runs, as learners with seeds of their own, with its 95 % interval.
 

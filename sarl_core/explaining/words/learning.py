@@ -19,7 +19,9 @@ from sarl_core.learning.summary import (
     reference,
 )
 from sarl_core.mining.language import at_least_text, counted, share_text, threshold_text
+from sarl_core.rollouts.choices import CHOICE_TEXTS
 from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
+from sarl_core.rollouts.failures import interval_text
 
 _SAME = 1.0  # returns that differ by no more are the same
 _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the rules decide
@@ -34,6 +36,8 @@ HEADINGS = (
     "Return after",
     "Typical return, 95 % interval",
     "Crashed after",
+    "Worst tenth after",
+    "Cost after",
     "Shield on",
 )
 
@@ -85,7 +89,9 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
                 _with_worst(alone.mean, alone.means),
                 f"{rounded_text(alone.returns.iqm)} ({rounded_text(alone.returns.low)} to "
                 f"{rounded_text(alone.returns.high)})",
-                _crash_share(alone) if known else "–",
+                f"{_crash_share(alone)} ({interval_text(alone.failures)})" if known else "–",
+                rounded_text(alone.worst_tenth),
+                _cost(alone),
                 "–" if shielded is None else rounded_text(shielded.mean),
             )
         )
@@ -105,8 +111,9 @@ def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
     if not summaries:
         return ["No run is finished yet."]
     judged = [summary for summary in summaries if summary.safe is not None]
-    paragraphs = [_answer(study, judged, summaries), *_others(judged, best(judged))]
-    paragraphs.append(_alone(summaries, best(judged)))
+    safest = best(judged, study.choose)
+    paragraphs = [_answer(study, judged, summaries), *_others(judged, safest)]
+    paragraphs.append(_alone(summaries, safest))
     paragraphs += [_rules(study, summaries), _cut(study, summaries), _conditions(study)]
     return [paragraph for paragraph in paragraphs if paragraph]
 
@@ -136,7 +143,7 @@ def _answer(
             "Whether a way to learn is safe and good shows only beside the same learner without a "
             "shield: run it too."
         )
-    safest = best(judged)
+    safest = best(judged, study.choose)
     if safest is None:
         return (
             "No way to learn was both safe while learning and good afterwards without the shield."
@@ -144,14 +151,22 @@ def _answer(
     alone = reference(summaries, safest.arm)
     assert alone is not None  # else it were not judged
     after = rounded_text(safest.alone.halves[1])
+    crashes = [_crash_share(one.alone) for one in (safest, alone)]
+    chosen = "these returns are of the second"
+    if study.choose == "failures":
+        # What was chosen by a share cannot be reported by it.
+        crashes = [
+            at_least_text(one.alone.crash_halves[1], one.alone.cut) for one in (safest, alone)
+        ]
+        chosen = f"{CHOICE_TEXTS['failures']}; these shares and returns are of the second"
     return (
         f"Safe while learning and good afterwards: “{safest.arm.title}”. While learning it crashed "
         f"{_times(safest.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
-        f"crashes in {_crash_share(safest.alone)} of the episodes; the same learner "
+        f"crashes in {crashes[0]} of the episodes; the same learner "
         f"that never had a shield returns {rounded_text(alone.alone.halves[1])} and crashes in "
-        f"{_crash_share(alone.alone)}. (It was chosen by the first half of the episodes "
-        "afterwards; these returns are of the second.)"
+        f"{crashes[1]}. (It was chosen by the first half of the episodes "
+        f"afterwards{': ' if study.choose == 'failures' else '; '}{chosen}.)"
     )
 
 
@@ -240,6 +255,14 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
         "These rules speak in nearly every state, so with the shield on it is they who act, "
         f"whatever was learned: return {rounded_text(covered[0].mean)}{crashes}."
     )
+
+
+def _cost(trials: TrialSummary) -> str:
+    cost = trials.cost
+    if cost is None:
+        return "–"
+    between = f" ({rounded_text(cost.low, 1)} to {rounded_text(cost.high, 1)})"
+    return rounded_text(cost.mean, 1) + ("" if np.isnan(cost.low) else between)
 
 
 def _crash_share(trials: TrialSummary) -> str:

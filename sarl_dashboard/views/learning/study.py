@@ -30,7 +30,7 @@ def show_study(study: LearningStudy, name: str) -> None:
     """
     summaries = summarise_study(study)
     answer, *more = finding(study, summaries)
-    way = best(summaries)
+    way = best(summaries, study.choose)
     (st.success if way is not None else st.info)(
         escaped(answer), icon=":material/verified_user:" if way is not None else ":material/info:"
     )
