@@ -15,15 +15,15 @@ from sarl_dashboard.state.rule_files import NO_RULES, OWN_FILE
 from sarl_dashboard.text import escaped
 
 
-def headline(replay: ReplayPair, asked_for: ReplayOrder | None) -> None:
+def headline(replay: ReplayPair, current_order: ReplayOrder | None) -> None:
     """Whose episode it is, and what should be known about it.
 
     Args:
         replay: To show.
-        asked_for: By the settings as they are now; None where it cannot be had.
+        current_order: By the settings as they are now; None where it cannot be had.
     """
     order, rule_set = replay.order, replay.order.rule_set
-    changed = asked_for is None or asked_for.key != order.key
+    changed = current_order is None or current_order.key != order.key
     st.markdown(
         f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(order.env_id)}**, seed "
         f"{order.seed}"
