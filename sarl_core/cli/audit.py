@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,9 +19,12 @@ if TYPE_CHECKING:
     from sarl_core.auditing.audit import Audit
     from sarl_core.auditing.comparison import LogComparison
     from sarl_core.auditing.guards import GuardCondition
+    from sarl_core.demonstrations.dataset import Demonstrations
 
 _FAILED = 3  # a condition of --fail-on holds
 _LISTED = 12
+_LOOK_SECONDS = 1.0
+_REST = 3  # times as long as reading took
 
 
 def audit(
@@ -71,6 +77,14 @@ def audit(
         ),
     ] = None,
     projection: ProjectionName = "centre",
+    follow: Annotated[
+        bool,
+        typer.Option(
+            "--follow",
+            help="Go on while the log (lines of text) grows, with a line on standard error "
+            "whenever it has; Ctrl-C ends with the answer.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Hold rules against a log: where they were broken, how often, and whether it drifts.
@@ -90,18 +104,22 @@ def audit(
         rule_set = RuleSet.load(rules)
         mined_from = None if demonstrations is None else read_demonstrations(demonstrations, None)
 
-        def hold(path: Path) -> Audit:
+        def hold(path: Path, steps: Demonstrations | None = None) -> Audit:
             try:
                 return against(
                     rule_set,
-                    read_demonstrations(path, None),
+                    read_demonstrations(path, None) if steps is None else steps,
                     projection=projection,
                     demonstrations=mined_from,
                 )
             except InputError as error:
                 raise InputError(_with_path(error, path)) from error
 
-        held = hold(log)
+        rotated: InputError | None = None
+        if follow:
+            held, rotated = _followed(log, partial(hold, log), guards)
+        else:
+            held = hold(log)
         comparison = None if compare is None else LogComparison(held, hold(compare))
         if out is not None:
             from sarl_core.explaining.exports.audit import save_audit
@@ -114,7 +132,43 @@ def audit(
         _print(held, comparison, f"{log} against {rules}")
         if out is not None:
             terminal.print_lines([f"Wrote {out}."])
+    if rotated is not None:
+        raise rotated
     _guard(held, guards)
+
+
+def _followed(
+    log: Path, hold: Callable[[Demonstrations], Audit], guards: list[GuardCondition]
+) -> tuple[Audit, InputError | None]:
+    """Audit a log again and again while it grows, until Ctrl-C or until it is rotated."""
+    from sarl_core.auditing.growing import GrowingLog, RotatedError
+    from sarl_core.mining.language import share_text
+
+    growing = GrowingLog(log)
+    held: Audit | None = None
+    try:
+        while True:
+            began = time.monotonic()
+            if (steps := growing.read()) is not None:
+                held = hold(steps)
+                failed = [one.text for one in guards if one.holds(held)]
+                terminal.print_notes(
+                    [
+                        f"{held.steps:,} steps, {held.broken:,} broken "
+                        f"({share_text(held.broken / held.steps)})"
+                        + "".join(f"; {text} holds" for text in failed)
+                    ]
+                )
+            # All is read again, so that a long log is read less often.
+            time.sleep(max(_LOOK_SECONDS, _REST * (time.monotonic() - began)))
+    except KeyboardInterrupt:
+        if held is None:
+            raise
+        return held, None
+    except RotatedError as error:
+        if held is None:
+            raise
+        return held, error
 
 
 def _with_path(error: InputError, path: Path) -> str:
