@@ -82,6 +82,11 @@ PAGES = [
         icon=":material/shield:",
     ),
     st.Page(
+        "audit.py",
+        title="Audit",
+        icon=":material/fact_check:",
+    ),
+    st.Page(
         "ablation.py",
         title="Ablation",
         icon=":material/content_cut:",

@@ -69,3 +69,46 @@ def test_what_cannot_be_is_one_sentence(
     assert out == ""
     assert error.count("\n") == 1
     assert said in error
+
+
+HEAD = (
+    "episode,step,obs_cart position,obs_cart velocity,obs_pole angle,"
+    "obs_pole angular velocity,action\n"
+)
+
+
+def test_a_growing_log_is_followed_line_by_line_until_it_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "run.csv"
+    log.write_text(HEAD)
+    more = iter(["0,0,0,0,0.1,0,1\n0,1,0,0,0.1,0,0\n0,2,0", ",0,0.1,0,0\n", None])
+
+    def wait(seconds: float) -> None:
+        text = next(more)
+        if text is None:
+            raise KeyboardInterrupt
+        with log.open("a") as file:
+            file.write(text)
+
+    monkeypatch.setattr("time.sleep", wait)
+    asked = ["audit", RULES, str(log), "--follow", "--json", "--fail-on", "breaks>0.6"]
+    assert main(asked) == 3
+    out, error = capsys.readouterr()
+    assert "note: 2 steps, 1 broken (50 %)\n" in error
+    assert "note: 3 steps, 2 broken (67 %); breaks>0.6 holds\n" in error
+    assert json.loads(out)["broken"] == 2
+
+
+def test_a_log_that_is_rotated_ends_with_what_was_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "run.csv"
+    log.write_text(HEAD + "0,0,0,0,0.1,0,1\n0,1,0,0,0.1,0,0\n")
+    monkeypatch.setattr("time.sleep", lambda seconds: log.write_text(HEAD))
+    assert main(["audit", RULES, str(log), "--follow", "--json"]) == 2
+    out, error = capsys.readouterr()
+    assert json.loads(out)["steps"] == 2
+    assert "run.csv was rotated" in error
+    assert main(["audit", RULES, LOG, "--follow"]) == 2
+    assert "cannot be followed" in capsys.readouterr().err

@@ -81,9 +81,11 @@ def audit_html(audit: Audit, *, title: str, comparison: LogComparison | None = N
         rules=broken_rules_html(audit),
         episodes=_episodes(audit),
         drift=drift_text(audit.drift),
-        moved=_moved(audit.drift.all, "now, and before"),
+        moved=moved_html(audit.drift.all, "now, and before"),
         compared="" if comparison is None else comparison_text(comparison),
-        differences="" if comparison is None else _moved(comparison.differences, "after, before"),
+        differences=""
+        if comparison is None
+        else moved_html(comparison.differences, "after, before"),
         notes=audit.notes,
     )
 
@@ -144,7 +146,16 @@ def _episodes(audit: Audit) -> Markup:
     return table_html(columns, rows, "Episodes")
 
 
-def _moved(moved: tuple[Moved, ...], label: str) -> Markup:
+def moved_html(moved: tuple[Moved, ...], label: str) -> Markup:
+    """Shares before and now with the intervals of their differences, those that differ first.
+
+    Args:
+        moved: Of a drift or a comparison.
+        label: Which of the two is which, for those who do not see it.
+
+    Returns:
+        HTML.
+    """
     ordered = sorted(moved, key=lambda one: (not one.drifted, -abs(one.now - one.before)))
     columns = (
         Column("What"),

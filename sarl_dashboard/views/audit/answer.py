@@ -1,0 +1,91 @@
+"""What the rules say of a log: numbers, drift, two logs side by side, rules and files."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import PurePath
+
+import streamlit as st
+
+from sarl_core.auditing.audit import Audit
+from sarl_core.explaining.exports.audit import audit_html, broken_rules_html, moved_html
+from sarl_core.explaining.html.headings import heading
+from sarl_core.explaining.html.number_cards import Number, number_cards
+from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
+from sarl_core.explaining.words.audit import audit_facts, comparison_text, drift_text
+from sarl_core.mining.language import share_text
+from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.text import escaped
+from sarl_dashboard.views.audit.logs import Logs
+
+
+def show_answer(logs: Logs) -> None:
+    """Everything but the steps of single episodes.
+
+    Args:
+        logs: What was audited.
+    """
+    held = logs.first
+    notes_notice(held.notes)
+    facts = dict(audit_facts(held))
+    numbers = [
+        ("Steps", f"{held.steps:,}", "steps"),
+        ("Coverage", share_text(held.coverage), "coverage"),
+        ("Agreement", share_text(held.agreement) if held.covered else "–", "agreement"),
+        ("Broken", f"{held.broken:,}", "breaks"),
+        ("Longest run", f"{held.longest_run:,}", "longest run"),
+        ("Near misses", f"{held.near_count:,}", "near misses"),
+        ("Freedom", share_text(held.freedom), "freedom"),
+    ]
+    st.html(number_cards([Number(label, value, facts[fact]) for label, value, fact in numbers]))
+    _sentence(drift_text(held.drift), warns=bool(held.drift.drifted))
+    with st.expander("Every share that was compared", icon=":material/compare_arrows:"):
+        st.html(moved_html(held.drift.all, "now, and before"))
+    if logs.comparison is not None:
+        st.html(heading("Before and after"))
+        comparison = logs.comparison
+        _sentence(
+            comparison_text(comparison), warns=any(one.drifted for one in comparison.differences)
+        )
+        st.html(moved_html(comparison.differences, "after, and before"))
+    if held.broken:
+        st.html(heading("By rule"))
+        st.html(broken_rules_html(held))
+    _downloads(logs)
+
+
+def _sentence(text: str, *, warns: bool) -> None:
+    if warns:
+        st.warning(escaped(text), icon=":material/moving:")
+    else:
+        st.info(escaped(text), icon=":material/info:")
+
+
+def _downloads(logs: Logs) -> None:
+    stem = f"audit-{PurePath(logs.name).stem}"
+    held = logs.first
+    with st.container(horizontal=True, gap="small"):
+        download(
+            "Report",
+            lambda: str(
+                audit_html(held, title=f"Audit of {logs.name}", comparison=logs.comparison)
+            ),
+            f"{stem}.html",
+            key="audit_html",
+            meaning="One page that opens by itself",
+        )
+        download("JSON", partial(_json, logs), f"{stem}.json", key="audit_json")
+        download("Steps as CSV", partial(_steps, held), f"{stem}.csv", key="audit_csv")
+
+
+def _json(logs: Logs) -> str:
+    document = logs.first.to_dict()
+    if logs.comparison is not None:
+        document["comparison"] = logs.comparison.to_dict()
+    return json.dumps(document, indent=1)
+
+
+def _steps(held: Audit) -> str:
+    return str(safe_cells(held.to_frame()).to_csv(index=False))
