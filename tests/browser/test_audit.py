@@ -34,6 +34,6 @@ def test_a_break_leads_to_its_rule_and_to_what_if(screen: Page) -> None:
     link.click()
     expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
     settle(screen)
-    expect(screen.get_by_text(name, exact=False).first).to_be_visible()
+    expect(screen.get_by_text(f"{name} · support")).to_be_visible()
     assert parameters(screen)["rule"]
     no_trace(screen)
