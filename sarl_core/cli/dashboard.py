@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,23 +12,61 @@ from typing import Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.errors import WorkError
+from sarl_core.cli.options import Cost, EnvArguments, Failure, Wrappers
+from sarl_core.environments.environment import Environment
+from sarl_core.errors import InputError, WorkError
 
 
 def app(
     port: Annotated[
         int, typer.Option("--port", min=1, max=65535, help="Where it listens, on this machine.")
     ] = 8501,
+    env: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--env",
+            metavar="ENV",
+            show_default=False,
+            help="Let visitors use this environment, module:Id included. May be given several "
+            "times; nothing else of your own is ever imported.",
+        ),
+    ] = None,
+    env_args: EnvArguments = None,
+    wrapper: Wrappers = None,
+    failure: Failure = None,
+    cost: Cost = None,
+    agent: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--agent",
+            metavar="NAME=MODULE:NAME",
+            show_default=False,
+            help="Let visitors use this agent of your own under this name. May be given several "
+            "times.",
+        ),
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            "--settings",
+            metavar="FILE",
+            show_default=False,
+            help="A .toml or .json file that says the same: environments, each with its id, "
+            "arguments, wrappers, failure and cost, and agents.",
+        ),
+    ] = None,
 ) -> None:
     """Start the dashboard; Ctrl-C ends it.
 
     Example: `python -m sarl_core app --port 8600`
     """
     script = _script()
+    with terminal.working("Starting"):
+        offers = _offers(env or [], env_args, wrapper or [], failure, cost, agent or [], settings)
     terminal.print_lines([f"The dashboard is at http://localhost:{port} (Ctrl-C ends it)."])
     sys.stdout.flush()
     command = [sys.executable, "-m", "streamlit", "run", str(script), "--server.port", str(port)]
-    with subprocess.Popen(command) as server:
+    with subprocess.Popen(command, env=os.environ | offers) as server:
         try:
             code = server.wait()
         except KeyboardInterrupt:
@@ -35,6 +74,44 @@ def app(
             return
     if code:
         raise WorkError(f"the dashboard ended with code {code}; what it printed says why")
+
+
+def _offers(
+    envs: list[str],
+    env_args: str | None,
+    wrappers: list[str],
+    failure: str | None,
+    cost: str | None,
+    agents: list[str],
+    settings: Path | None,
+) -> dict[str, str]:
+    """What visitors may use, tried, and handed to the server by a variable of its environment."""
+    from sarl_core.agents.offers import VARIABLE, Offers, named_agents, read_offers
+    from sarl_core.environments.description import describe_environment
+    from sarl_core.environments.imports import named_object
+
+    beside = (env_args, wrappers or None, failure, cost)
+    if len(envs) != 1 and any(value is not None for value in beside):
+        raise InputError(
+            "--env-args, --wrapper, --failure and --cost belong to one --env; for several, write "
+            "them in a file and give it with --settings"
+        )
+    listed = Offers() if settings is None else read_offers(settings)
+    offers = Offers(
+        (
+            *listed.environments,
+            *(
+                Environment(one, env_args or "{}", tuple(wrappers), failure or "", cost or "")
+                for one in envs
+            ),
+        ),
+        (*listed.agents, *named_agents(agents).items()),
+    )
+    for environment in offers.environments:
+        describe_environment(environment)
+    for name, spec in offers.agents:
+        named_object(spec, f"the agent {name}")
+    return {VARIABLE: offers.to_text()}
 
 
 def _script() -> Path:

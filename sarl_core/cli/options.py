@@ -122,7 +122,7 @@ Divider = Annotated[
         help="Intervals of each continuous action dimension.",
     ),
 ]
-_EnvArguments = Annotated[
+EnvArguments = Annotated[
     str | None,
     typer.Option(
         "--env-args",
@@ -131,7 +131,7 @@ _EnvArguments = Annotated[
         help="What the environment is made with, as a JSON object: '{\"g\": 3.7}'.",
     ),
 ]
-_Wrappers = Annotated[
+Wrappers = Annotated[
     list[str] | None,
     typer.Option(
         "--wrapper",
@@ -142,7 +142,7 @@ _Wrappers = Annotated[
         "the innermost first.",
     ),
 ]
-_Failure = Annotated[
+Failure = Annotated[
     str | None,
     typer.Option(
         "--failure",
@@ -153,7 +153,7 @@ _Failure = Annotated[
         "terminated, info). An episode has failed if this is true at one of its steps.",
     ),
 ]
-_Cost = Annotated[
+Cost = Annotated[
     str | None,
     typer.Option(
         "--cost",
@@ -198,8 +198,8 @@ def with_environment(command: Callable[..., None], *, played: bool = False) -> C
         environment, option = get_args(one.annotation)
         text: Any = str if environment is Environment else str | None
         parameters.append(one.replace(kind=keyword, annotation=Annotated[text, option]))
-        beside: dict[str, Any] = {"env_args": _EnvArguments, "wrapper": _Wrappers}
-        beside |= {"failure": _Failure, "cost": _Cost} if played else {}
+        beside: dict[str, Any] = {"env_args": EnvArguments, "wrapper": Wrappers}
+        beside |= {"failure": Failure, "cost": Cost} if played else {}
         for name, annotation in beside.items():
             parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
 

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.environment import EnvironmentOrId
 
 _STEPS = 100  # where an environment does not say how fast it runs
 
@@ -41,7 +42,7 @@ class Pace(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def pace_of(env_id: str) -> Pace:
+def pace_of(env_id: EnvironmentOrId) -> Pace:
     """By what the flips in an environment are counted.
 
     Args:

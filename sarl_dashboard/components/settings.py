@@ -13,7 +13,7 @@ from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
 from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
 from sarl_dashboard.state.edits import offered as edits_offered
-from sarl_dashboard.state.environments import ENVIRONMENTS, continuous
+from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
 from sarl_dashboard.state.rule_choice import EDITED
 from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
 from sarl_dashboard.state.url import with_own
@@ -55,7 +55,7 @@ def environment_choice() -> str | None:
     """The environment: a usual one, or any id that was typed (URL: env)."""
     return st.selectbox(
         "Environment",
-        with_own(ENVIRONMENTS, "env"),
+        with_own((AS_DEMONSTRATED, *usual_environments()), "env"),
         key="env",
         bind="query-params",
         accept_new_options=True,

@@ -17,6 +17,7 @@ from typing import Protocol
 import streamlit as st
 
 from sarl_core.agents.agent import Agent
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import Processes
@@ -57,7 +58,7 @@ class Row:
     """
 
     name: str
-    env_id: str
+    env_id: EnvironmentOrId
     seed: int
     agent: AgentMaker
     rules: RuleSet | None = None

@@ -12,6 +12,7 @@ from threading import Lock
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.improving.aggregation import Aggregation, AggregationRound, aggregate
 from sarl_core.improving.gaps import Gaps, gaps_so_far
 from sarl_core.improving.plan import Plan
@@ -42,7 +43,7 @@ class ImprovementOrder:
     """
 
     start: Demonstrations
-    env_id: str
+    env_id: EnvironmentOrId
     plan: Plan
     expert: AgentMaker | None
     rules: RuleSet | None

@@ -22,6 +22,7 @@ from threading import Lock
 import streamlit as st
 
 import sarl_core
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.files import shared_temporary_folder
 from sarl_core.learning.arms import LearningArm
@@ -62,7 +63,7 @@ class LearningOrder:
         projection: What becomes of a continuous action that breaks a rule.
     """
 
-    env_id: str
+    env_id: EnvironmentOrId
     rules: RuleSet | None
     arms: tuple[LearningArm, ...]
     steps: int
@@ -73,7 +74,7 @@ class LearningOrder:
     def conditions(self) -> str:
         """Digest of what all runs share."""
         rules = self.rules.digest if self.rules is not None else ""
-        shared = (self.env_id, rules, self.steps, self.projection)
+        shared = (as_environment(self.env_id).key, rules, self.steps, self.projection)
         return digest_of(repr(shared).encode())[:16]
 
     @property
@@ -92,6 +93,11 @@ def base() -> Path:
     """The folder of all studies that visitors asked for; SARL_LEARNING names another one."""
     name = f"sarl-explorer-{os.getuid()}" if hasattr(os, "getuid") else "sarl-explorer"
     return Path(os.environ.get("SARL_LEARNING", "") or shared_temporary_folder() / name)
+
+
+def _import_path() -> str:
+    """Where a module that this server offers is found, by a process in another folder."""
+    return os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), str(Path.cwd()))))
 
 
 def study_of(order: LearningOrder) -> LearningStudy | None:
@@ -142,13 +148,13 @@ class Training:
             self.process = subprocess.Popen(
                 [
                     *(sys.executable, "-m", "sarl_core", "learn", "--stop-with-input"),
-                    *("--env", order.env_id, *rules, "--steps", str(order.steps)),
+                    *(*as_environment(order.env_id).words, *rules, "--steps", str(order.steps)),
                     *(part for arm in order.arms for part in ("--arm", arm.name)),
                     *("--seeds", str(order.seeds), "--projection", order.projection),
                     *("--out", str(self.folder)),
                 ],
                 cwd=ROOT,
-                env=os.environ | {"OMP_NUM_THREADS": "1"},
+                env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": _import_path()},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=log,

@@ -16,6 +16,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.environments.description import EnvironmentDescription
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.explaining.state_path import PathFinder
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
@@ -55,7 +56,7 @@ class ReplayOrder:
         description: Of the environment, under the names in force.
     """
 
-    env_id: str
+    env_id: EnvironmentOrId
     agent: ChosenAgent
     rules: str
     rule_set: RuleSet | None

@@ -21,17 +21,29 @@ from sarl_core.agents.agent import (
     make_agent,
     shipped_experts,
 )
-from sarl_core.errors import InputError, SarlError
+from sarl_core.agents.own import own_agent
+from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.shielding.shield import Projection
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.environments import environment_of
+from sarl_dashboard.state.environments import environment_of, offers
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.text import digest_of
 
-AGENTS = ("novice", "untrained", "expert", OWN_FILE)
+AGENTS = ("novice", "untrained", "expert")
 PROJECTIONS: tuple[Projection, ...] = ("centre", "clip", "expert")
 FRESH_SEED = FRESH  # far from those the demonstrations were recorded with
+
+
+def own_agents() -> dict[str, str]:
+    """Agents of whoever runs the server: ``module:name`` by the name on screen."""
+    return dict(offers().agents)
+
+
+def offered_agents() -> tuple[str, ...]:
+    """Whom a visitor may choose: the usual ones, those of whoever runs the server, an own file."""
+    return (*AGENTS, *own_agents(), OWN_FILE)
 
 
 def _latest_expert() -> int:
@@ -46,9 +58,9 @@ def _expert_digest(env_id: str, stamp: int) -> str:
     return digest_of(path.read_bytes())
 
 
-def has_expert(env_id: str) -> bool:
+def has_expert(env_id: EnvironmentOrId) -> bool:
     """Whether an expert is shipped for an environment."""
-    return bool(_expert_digest(env_id, _latest_expert()))
+    return bool(_expert_digest(str(env_id), _latest_expert()))
 
 
 @dataclass(frozen=True)
@@ -56,7 +68,7 @@ class ChosenAgent:
     """An agent that was chosen, which a call makes.
 
     Attributes:
-        choice: One of `AGENTS`.
+        choice: One of `offered_agents`.
         env_id: Environment.
         seed: Of what is random in it.
         files: Names and contents of the policy, and of the statistics of its observations.
@@ -64,7 +76,7 @@ class ChosenAgent:
     """
 
     choice: str
-    env_id: str
+    env_id: EnvironmentOrId
     seed: int
     files: tuple[tuple[str, bytes], ...] = ()
     expert: str = ""
@@ -80,6 +92,9 @@ class ChosenAgent:
         Raises:
             InputError: If it cannot be made.
         """
+        own = own_agents().get(self.choice)
+        if own is not None:
+            return own_agent(own, self.env_id)
         if not self.files:
             return make_agent(self.choice, self.env_id, seed=self.seed)
         with tempfile.TemporaryDirectory() as folder:
@@ -180,14 +195,18 @@ def _notes(chosen: ChosenAgent) -> tuple[str, ...]:
     return agent.notes if isinstance(agent, PolicyAgent) else ()
 
 
-def agent_for(choice: str, uploaded: PolicyFile | None, env_id: str, seed: int) -> ChosenAgent:
+def agent_for(
+    choice: str, uploaded: PolicyFile | None, env_id: EnvironmentOrId, seed: int
+) -> ChosenAgent:
     """The agent that was chosen.
 
     Raises:
         InputError: If there is no such agent.
     """
+    if choice not in offered_agents():
+        raise InputError(f"there is no agent {quoted(choice)} here; choose another one")
     if choice != OWN_FILE:
-        expert = _expert_digest(env_id, _latest_expert()) if choice == "expert" else ""
+        expert = _expert_digest(str(env_id), _latest_expert()) if choice == "expert" else ""
         return ChosenAgent(choice, env_id, seed, expert=expert)
     if uploaded is None:
         raise InputError("no policy has been uploaded; upload one, or choose another agent")

@@ -6,46 +6,63 @@ here it is the server, and the id may come with a link or in a stranger's file.
 
 from __future__ import annotations
 
+from functools import cache
+
+from sarl_core.agents.offers import Offers
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import Environment, EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
 
 
-def registered(env_id: str) -> str:
-    """An environment's id, if Gymnasium knows it without importing anything.
+@cache
+def offers() -> Offers:
+    """What whoever runs this server offers; the only names of modules that are ever imported."""
+    return Offers.of_process()
+
+
+def registered(env_id: str) -> Environment:
+    """An environment that is offered here, or that Gymnasium knows without importing anything.
 
     Args:
         env_id: From a visitor: typed, in a link, or in a file.
 
     Returns:
-        The same id, without blanks around it.
+        With the arguments and wrappers that it is offered with.
 
     Raises:
-        InputError: If it names a module, or no environment.
+        InputError: If it names a module that is not offered, or no environment.
     """
     import gymnasium
 
     env_id = env_id.strip()
+    if (offered := offers().environment(env_id)) is not None:
+        return offered
     if ":" in env_id:
         raise InputError(
-            f"the environment {env_id!r} names a module to import, which the dashboard does not "
-            "do; give an id that Gymnasium knows by itself, such as CartPole-v1, or use the "
-            "command line"
+            f"the environment {env_id!r} names a module to import, which the dashboard does only "
+            "for those it was started with; give an id that Gymnasium knows by itself, such as "
+            f"CartPole-v1, or start it with `sarl app --env {env_id}`"
         )
     if env_id not in gymnasium.registry:
         raise InputError(
             f"Gymnasium knows no environment {env_id!r}; give an id with its version, such as "
             "CartPole-v1"
         )
-    return env_id
+    return Environment(env_id)
 
 
 AS_DEMONSTRATED = "as demonstrated"
-ENVIRONMENTS = (AS_DEMONSTRATED, *(env_id for _, env_id in SHIPPED_SETS.values()))
 
 
-def environment_of(choice: str | None) -> str:
-    """The environment's id.
+def usual_environments() -> tuple[str, ...]:
+    """Ids of those that are offered, and of those with demonstrations."""
+    own = (environment.id for environment in offers().environments)
+    return tuple(dict.fromkeys((*own, *(env_id for _, env_id in SHIPPED_SETS.values()))))
+
+
+def environment_of(choice: str | None) -> Environment:
+    """The environment that was chosen.
 
     Raises:
         InputError: If the demonstrations do not say theirs, or the dashboard does not take it.
@@ -69,13 +86,13 @@ def continuous(choice: str | None) -> bool:
         return False
 
 
-def demonstrated(env_id: str, seed: int, episodes: int) -> bool:
+def demonstrated(env_id: EnvironmentOrId, seed: int, episodes: int) -> bool:
     """Whether the chosen demonstrations were recorded on some of these seeds."""
     demonstrations = chosen_demonstrations()
     return (
         demonstrations is not None
         and demonstrations.seed is not None
-        and demonstrations.env_id == env_id
+        and demonstrations.env_id == str(env_id)
         and demonstrations.seed < seed + episodes
         and seed < demonstrations.seed + demonstrations.n_episodes
     )

@@ -22,7 +22,7 @@ from sarl_dashboard.components.settings import (
 )
 from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.jobs.episodes import Row
-from sarl_dashboard.state.agents import AGENTS, FRESH_SEED, agent_for
+from sarl_dashboard.state.agents import FRESH_SEED, agent_for, offered_agents
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
@@ -67,7 +67,7 @@ def settings() -> AblationChoice:
             env = environment_choice()
             agent = st.selectbox(
                 "Agent",
-                AGENTS,
+                offered_agents(),
                 key="agent",
                 bind="query-params",
                 help="Whom the rules hold. With the novice, which acts at random, they have the "

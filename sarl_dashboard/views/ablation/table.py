@@ -113,7 +113,7 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
             "Click a heading to sort, the box at the left of a row to read the rule.",
             width="content",
         )
-        name = choice.wanted.row.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+        name = str(choice.wanted.row.env_id).rsplit("/", 1)[-1].rsplit(":", 1)[-1]
         download(
             "Download CSV",
             lambda: csv(ablation),

@@ -13,14 +13,14 @@ from sarl_core.demonstrations.formats import (
     read_files,
     table_columns,
 )
+from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
-from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations, set_upload
-from sarl_dashboard.state.environments import registered
+from sarl_dashboard.state.data import chosen_demonstrations, set_upload
+from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
 
 _LOGGER = logging.getLogger(__name__)
-ENVIRONMENTS = tuple(env_id for _, env_id in SHIPPED_SETS.values())
 
 
 def uploaded_files() -> list[tuple[memoryview, str]]:
@@ -40,7 +40,7 @@ def read_upload(columns: ColumnMap | None = None) -> None:
         return
     try:
         with st.spinner("Reading and checking …"):
-            demonstrations = read_files(files, env_id=environment() or None, columns=columns)
+            demonstrations = read_files(files, env_id=environment(), columns=columns)
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
@@ -57,14 +57,14 @@ def read_upload(columns: ColumnMap | None = None) -> None:
     st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
 
 
-def environment() -> str:
-    """The environment that names and bounds are taken from, "" for none.
+def environment() -> Environment | None:
+    """The environment that names and bounds are taken from, None for none.
 
     Raises:
         InputError: If the dashboard does not take it.
     """
     env_id = str(st.session_state.get("upload_env") or "").strip()
-    return registered(env_id) if env_id else ""
+    return registered(env_id) if env_id else None
 
 
 def read_mapped() -> None:
@@ -136,7 +136,7 @@ def upload_section(*, expanded: bool) -> None:
         )
         right.selectbox(
             "Environment (optional)",
-            with_own(ENVIRONMENTS, "upload_env"),
+            with_own(usual_environments(), "upload_env"),
             index=None,
             accept_new_options=True,
             placeholder="none",

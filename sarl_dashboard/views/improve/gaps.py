@@ -15,7 +15,7 @@ from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
-from sarl_dashboard.text import escaped
+from sarl_dashboard.text import escaped, file_name
 
 MOST_FEATURES = 12
 GAP_ROWS = 200
@@ -53,7 +53,7 @@ def show_gaps(outcome: Outcome, gaps: Gaps, *, at_work: bool) -> None:
     download(
         "Download all as CSV",
         lambda: str(gaps.to_frame().to_csv(index=False)).encode(),
-        f"gaps-{outcome.order.env_id.rsplit('/', 1)[-1]}.csv",
+        f"gaps-{file_name(str(outcome.order.env_id))}.csv",
         key="gaps_csv",
     )
     st.caption(

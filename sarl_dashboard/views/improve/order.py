@@ -7,6 +7,7 @@ import shlex
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.budgeted_trees import MIN_RULES
@@ -14,7 +15,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.improving import ImprovementOrder
-from sarl_dashboard.state.agents import agent_for, has_expert
+from sarl_dashboard.state.agents import agent_for, has_expert, own_agents
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, data_parts, upload_name
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.mined import grown_trees, mined_rules
@@ -44,6 +45,8 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
         if choices.policy_file is None:
             raise InputError("no policy has been uploaded; upload one, or choose another expert")
         expert = agent_for(OWN_FILE, choices.policy_file, env_id, choices.seed)
+    elif choices.expert in own_agents():
+        expert = agent_for(choices.expert, None, env_id, choices.seed)
     else:
         if not has_expert(env_id):
             raise InputError(
@@ -70,7 +73,7 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
 
 
 def gaps_order(
-    choices: ImproveChoices, demonstrations: Demonstrations, env_id: str
+    choices: ImproveChoices, demonstrations: Demonstrations, env_id: EnvironmentOrId
 ) -> ImprovementOrder:
     """Which states need a demonstration, at the thresholds in force."""
     trees = grown_trees(demonstrations, choices.divider)
@@ -89,18 +92,22 @@ def gaps_order(
 def command_for(
     choices: ImproveChoices,
     demonstrations: Demonstrations,
-    env_id: str,
+    env_id: EnvironmentOrId,
     thresholds: Thresholds | None,
 ) -> str:
     """The same on the command line, for the card."""
     name = chosen_dataset()
     file = f"data/demonstrations/{name}.parquet" if name in SHIPPED_SETS else upload_name()
+    expert = own_agents().get(choices.expert, "expert")
+    if choices.policy_file is not None:
+        expert = choices.policy_file.name
     statistics = choices.policy_file.statistics if choices.policy_file else None
-    words = ["python", "-m", "sarl_core", "aggregate", file]
+    environment = as_environment(env_id)
+    own = () if environment.key == demonstrations.env_id else environment.words
+    words = ["python", "-m", "sarl_core", "aggregate", file, *own]
     for option, value, usual in (
         ("--max-rules", choices.max_rules, None),
-        ("--env", env_id, demonstrations.env_id),
-        ("--expert", choices.policy_file.name if choices.policy_file else "expert", "expert"),
+        ("--expert", expert, "expert"),
         ("--normalise", statistics.name if statistics else None, None),
         ("--rounds", choices.rounds, None),
         ("--episodes", choices.episodes, None),

@@ -30,6 +30,7 @@ from sarl_dashboard.state.data import (
     set_upload,
     uploaded_demonstrations,
 )
+from sarl_dashboard.text import file_name
 from sarl_dashboard.views.improve.gaps import show_gaps
 
 
@@ -238,7 +239,7 @@ def show_rounds(
 
 def take_away(outcome: Outcome, improved: Aggregation) -> None:
     """The rules, their card and the demonstrations, to keep and to go on with."""
-    name = f"{outcome.order.env_id.rsplit('/', 1)[-1]}-{len(improved.rule_set)}-rules"
+    name = f"{file_name(str(outcome.order.env_id))}-{len(improved.rule_set)}-rules"
     if not improved.is_finished:
         name += ".stopped"
     in_use = uploaded_demonstrations() is improved.demonstrations

@@ -10,7 +10,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.improving.refinement import generation_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_dashboard.components.settings import environment_choice
-from sarl_dashboard.state.agents import PolicyFile, policy_upload
+from sarl_dashboard.state.agents import PolicyFile, own_agents, policy_upload
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER
 
@@ -54,7 +54,7 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
             env = environment_choice()
             expert = st.selectbox(
                 "Expert",
-                (SHIPPED_EXPERT, OWN_FILE, NOBODY),
+                (SHIPPED_EXPERT, *own_agents(), OWN_FILE, NOBODY),
                 key="expert",
                 bind="query-params",
                 help="Who is asked. Shipped: the expert that comes with this environment. Own "

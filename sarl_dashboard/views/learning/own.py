@@ -11,7 +11,7 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.learning import LearningOrder, learning, study_of
-from sarl_dashboard.text import escaped, refuse
+from sarl_dashboard.text import escaped, file_name, refuse
 from sarl_dashboard.views.learning.settings import settings
 from sarl_dashboard.views.learning.study import archive, show_curves, show_study
 
@@ -83,7 +83,8 @@ def offer_of(order: LearningOrder, study: LearningStudy | None) -> Offer[Learnin
     return Offer(
         key=order.folder,
         start=lambda: learning(order),
-        about=f"{counted(runs, 'run')} of {order.steps:,} steps in {escaped(order.env_id)}{after}",
+        about=f"{counted(runs, 'run')} of {order.steps:,} steps in "
+        f"{escaped(str(order.env_id))}{after}",
         complete=complete,
         cancelled="Stopped. What was learned is kept, and Go on takes it up from there, with new "
         "episodes: the numbers will be as good, but not the same as without the pause.",
@@ -104,7 +105,7 @@ def downloads(order: LearningOrder, study: LearningStudy) -> None:
         download(
             "Download policy (.npz)",
             lambda: policy_path(order.folder, run.arm, run.seed).read_bytes(),
-            f"{order.env_id.rsplit('/', 1)[-1]}-{run.name}.npz",
+            f"{file_name(str(order.env_id))}-{run.name}.npz",
             key="learn_npz",
         )
         download(

@@ -11,7 +11,7 @@ from sarl_core.learning.study import LearningPlan
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import PROJECTIONS
-from sarl_dashboard.state.environments import environment_of, registered
+from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, compact_file
 from sarl_dashboard.text import refuse
@@ -94,7 +94,7 @@ def settings() -> LearningOrder | None:
             else None
         )
     try:
-        env_id = registered(environment_of(None))
+        env_id = environment_of(None)
         rule_set = rules_for(rules, file)
         chosen = tuple(arm for arm in ARMS.values() if arm.name in names)
         if not chosen:

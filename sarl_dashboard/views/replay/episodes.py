@@ -14,10 +14,9 @@ from sarl_core.explaining.words.fork import ending_text
 from sarl_core.mining.language import share_text
 from sarl_core.rendering.forking import endings
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.flips import pace_of
 from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart
-from sarl_dashboard.components.flips import flips_rate, flips_title
+from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.replays import (
     EPISODE_RUNS,
@@ -110,7 +109,7 @@ def comparison(order: ReplayOrder) -> None:
 
 def every_episode(episodes: Episodes, *, shielded: bool) -> None:
     """A row an episode."""
-    pace = pace_of(episodes.env_id)
+    pace = pace_of_played(episodes.env_id)
     columns: dict[str, object] = {
         "Seed": episodes.seeds,
         "Return": episodes.returns,

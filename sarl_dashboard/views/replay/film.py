@@ -25,7 +25,7 @@ def headline(replay: ReplayPair, current_order: ReplayOrder | None) -> None:
     order, rule_set = replay.order, replay.order.rule_set
     changed = current_order is None or current_order.key != order.key
     st.markdown(
-        f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(order.env_id)}**, seed "
+        f"**{escaped(replay.plain.agent.capitalize())}** in **{escaped(str(order.env_id))}**, seed "
         f"{order.seed}"
         + (f", {len(rule_set):,} rules ({order.rules})" if rule_set else "")
         + (
@@ -48,7 +48,7 @@ def film(replay: ReplayPair) -> None:
         )
     gif = replay.film.gif()
     st.image(gif, width="content", alt="The episode, with the rules and without")
-    env = order.env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
+    env = str(order.env_id).rsplit("/", 1)[-1].rsplit(":", 1)[-1]
     name = f"replay-{env}-{order.agent.choice}-{order.seed}"
     with st.container(horizontal=True):
         download("Download GIF", gif, f"{name}.gif", key="gif")

@@ -20,10 +20,10 @@ from sarl_dashboard.components.settings import (
 )
 from sarl_dashboard.jobs.replays import ReplayOrder
 from sarl_dashboard.state.agents import (
-    AGENTS,
     FRESH_SEED,
     PolicyFile,
     agent_for,
+    offered_agents,
 )
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import continuous, environment_of
@@ -80,7 +80,7 @@ def settings() -> ReplaySettings:
             env = environment_choice()
             agent = st.selectbox(
                 "Agent",
-                AGENTS,
+                offered_agents(),
                 key="agent",
                 bind="query-params",
                 help="Novice: random actions. Untrained: a fresh network, its actions sampled. "

@@ -25,8 +25,8 @@ from sarl_core.explaining.words.replay import StepView, step_texts, step_view
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, label_text, number_text
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.flips import pace_of
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.flips import pace_of_played
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.views.replay.fork import fork_section
@@ -206,7 +206,7 @@ def changes(replay: ReplayPair, current: int, mark: str) -> None:
 def flips_text(episodes: Episodes) -> str:
     """How often the shield switched on and off in some episodes, as a sentence."""
     flips = int(episodes.flips.sum()) if episodes.flips is not None else 0
-    pace = pace_of(episodes.env_id)
+    pace = pace_of_played(episodes.env_id)
     rate = pace.rate(flips, int(episodes.lengths.sum()))
     return (
         f"The shield switched on or off {counted(flips, 'time')}: {number_text(rate)} {pace.each}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.comparison import ArmStyle, arm_style
 from sarl_core.mining.rule_set import RuleSet
@@ -12,7 +13,7 @@ from sarl_core.shielding.shield import Outside
 from sarl_core.studies.comparison import Arm
 from sarl_dashboard.components.settings import no_boxes_notice
 from sarl_dashboard.jobs.episodes import Row
-from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, ChosenAgent, agent_for
+from sarl_dashboard.state.agents import PROJECTIONS, ChosenAgent, agent_for, offered_agents
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
 from sarl_dashboard.text import refuse
@@ -66,7 +67,7 @@ def free_name(name: str, taken: Sequence[str]) -> str:
     return next(each for each in names if each not in taken)
 
 
-def pilots(choices: ShieldChoices, env_id: str) -> list[Pilot]:
+def pilots(choices: ShieldChoices, env_id: EnvironmentOrId) -> list[Pilot]:
     """The chosen agents.
 
     Raises:
@@ -83,7 +84,7 @@ def pilots(choices: ShieldChoices, env_id: str) -> list[Pilot]:
             if any(pilot.agent.digest == agent.digest for pilot in chosen):
                 continue  # a file uploaded twice is one
             name = free_name(
-                file.name.rsplit(".", 1)[0], (*AGENTS, *(pilot.name for pilot in chosen))
+                file.name.rsplit(".", 1)[0], (*offered_agents(), *(pilot.name for pilot in chosen))
             )
             chosen.append(Pilot(name, place + number, agent))
     return chosen
@@ -111,7 +112,7 @@ def guards(choices: ShieldChoices) -> list[Guard]:
     return chosen
 
 
-def line(choices: ShieldChoices, env_id: str, pilot: Pilot, guard: Guard) -> ShieldLine:
+def line(choices: ShieldChoices, env_id: EnvironmentOrId, pilot: Pilot, guard: Guard) -> ShieldLine:
     """One agent with one shield."""
     projection = choices.projection if guard.rules is not None else PROJECTIONS[0]
     outside: Outside = choices.outside if guard.rules is not None else "act"

@@ -15,9 +15,9 @@ from sarl_dashboard.components.settings import (
     shield_choice,
 )
 from sarl_dashboard.state.agents import (
-    AGENTS,
     FRESH_SEED,
     PolicyFile,
+    offered_agents,
     policy_uploads,
 )
 from sarl_dashboard.state.environments import continuous
@@ -77,7 +77,7 @@ def settings() -> ShieldChoices:
             projection, outside = shield_choice(env)
         agents = st.pills(
             "Agents",
-            AGENTS,
+            offered_agents(),
             selection_mode="multi",
             default=["novice", "expert"],
             key="agents",
@@ -109,7 +109,7 @@ def settings() -> ShieldChoices:
         int(seed or 0),
         projection,
         outside,
-        [name for name in AGENTS if name in agents],
+        [name for name in offered_agents() if name in agents],
         [name for name in offered if name in shields],
         policy_files,
         rule_file,

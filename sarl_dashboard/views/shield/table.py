@@ -11,14 +11,13 @@ from sarl_core.explaining.figures.comparison import returns_figure, typical_figu
 from sarl_core.explaining.words.comparison import POLICY_TEXT, verdict_on_all
 from sarl_core.mining.language import at_least_text, share_text
 from sarl_core.rollouts.episodes import Episodes
-from sarl_core.rollouts.flips import pace_of
 from sarl_core.studies.comparison import Comparison
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.components.flips import flips_rate, flips_title
+from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import COMPARISON, known
-from sarl_dashboard.state.agents import AGENTS
+from sarl_dashboard.state.agents import offered_agents
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.shield.lines import ShieldLine
 
@@ -61,7 +60,7 @@ def show(finished: Finished, *, at_work: bool) -> None:
             )
         return
     lines = [line for line, _ in finished]
-    env_id, seed = lines[0].row.env_id, lines[0].row.seed
+    env_id, seed = str(lines[0].row.env_id), lines[0].row.seed
     comparison = Comparison(
         env_id, seed, tuple(line.arm for line in lines), tuple(episodes for _, episodes in finished)
     )
@@ -99,7 +98,7 @@ def show(finished: Finished, *, at_work: bool) -> None:
         key="comparison_table",
     )
     if not at_work:
-        name = env_id.rsplit("/", 1)[-1]
+        name = env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
         download(
             "Download CSV",
             lambda: csv(comparison),
@@ -153,7 +152,7 @@ def agent_name(agent: str) -> str:
     """An agent in the middle of a sentence, after "the"."""
     if agent == "untrained":
         return "untrained agent"
-    return agent if agent in AGENTS else f"agent {agent}"
+    return agent if agent in offered_agents() else f"agent {agent}"
 
 
 def rules_name(shield: str) -> str:
@@ -243,7 +242,7 @@ def csv(comparison: Comparison) -> bytes:
     frame.insert(2, "projection", projections)
     ways = [arm.outside if arm.rules is not None else "" for arm in comparison.arms]
     frame.insert(3, "outside", ways)
-    unit = pace_of(comparison.env_id).unit.replace(" ", "_")
+    unit = pace_of_played(comparison.env_id).unit.replace(" ", "_")
     frame[f"flips_per_{unit}"] = [
         flips_rate(episodes) if arm.rules is not None and episodes.flips is not None else None
         for arm, episodes in zip(comparison.arms, comparison.episodes, strict=True)

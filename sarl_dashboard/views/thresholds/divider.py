@@ -8,6 +8,7 @@ import streamlit as st
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import SarlError
 from sarl_core.explaining.figures.divider import error_figure, occupancy_figure, snapped_figure
 from sarl_core.mining.quantisation import (
@@ -97,8 +98,8 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
         return
     if not has_expert(env_id):
         st.info(
-            f"No expert is shipped for {escaped(env_id)}, so there is nobody whose actions could "
-            "be snapped.",
+            f"No expert is shipped for {escaped(str(env_id))}, so there is nobody whose actions "
+            "could be snapped.",
             icon=":material/info:",
         )
         return
@@ -176,7 +177,7 @@ class SnappedExpert:
 
 
 def snapped_rows(
-    demonstrations: Demonstrations, env_id: str, divided: Divided
+    demonstrations: Demonstrations, env_id: EnvironmentOrId, divided: Divided
 ) -> dict[Combination, Row]:
     """What is run, by divider and way to snap; the expert as it is first."""
     expert = agent_for("expert", None, env_id, FRESH_SEED)
