@@ -21,7 +21,7 @@ from sarl_core.agents.agent import (
     make_agent,
     shipped_experts,
 )
-from sarl_core.agents.own import own_agent
+from sarl_core.agents.own import OwnAgent, own_agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.rollouts.seeds import FRESH
@@ -94,7 +94,10 @@ class ChosenAgent:
         """
         own = own_agents().get(self.choice)
         if own is not None:
-            return own_agent(own, self.env_id)
+            agent = own_agent(own, self.env_id)
+            if isinstance(agent, OwnAgent):
+                agent.name = self.choice
+            return agent
         if not self.files:
             return make_agent(self.choice, self.env_id, seed=self.seed)
         with tempfile.TemporaryDirectory() as folder:
