@@ -1,0 +1,56 @@
+"""Environments and agents that whoever runs a dashboard offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sarl_core import Environment
+from sarl_core.agents.offers import VARIABLE, Offers
+from sarl_dashboard.state.environments import offers
+from tests.app.screens import errors, html, metrics, open_page, run_through
+
+TASK = """
+import gymnasium
+import numpy as np
+from gymnasium.envs.classic_control import CartPoleEnv
+
+class Crane(CartPoleEnv):
+    feature_names = ("boom", "boom speed", "load angle", "load speed")
+
+gymnasium.register("OfferedCrane-v0", Crane, max_episode_steps=30)
+
+def operator(observations):
+    return (observations[:, 2] > 0).astype(int)
+"""
+CRANE = Environment("offered_task:OfferedCrane-v0", '{"max_episode_steps": 12}')
+
+
+@pytest.fixture
+def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "offered_task.py").write_text(TASK)
+    monkeypatch.syspath_prepend(tmp_path)
+    given = Offers((CRANE,), (("operator", "offered_task:operator"),))
+    monkeypatch.setenv(VARIABLE, given.to_text())
+    offers.cache_clear()
+    yield
+    offers.cache_clear()
+
+
+def test_an_offered_agent_acts_in_an_offered_environment(offered: None) -> None:
+    app = run_through(
+        open_page("replay", env=CRANE.id, agent="operator", rules="none", seed="3"), "replay"
+    )
+    assert not errors(app)
+    assert metrics(app)["Length"] == "12 steps"
+    assert "boom speed" in html(app)
+
+
+def test_nothing_is_imported_that_is_not_offered(tmp_path: Path) -> None:
+    offers.cache_clear()
+    (sentence,) = errors(open_page("replay", env=CRANE.id, agent="novice", rules="none"))
+    assert f"start it with `sarl app --env {CRANE.id}`" in sentence
+    app = open_page("replay", env="CartPole-v1", agent="offered_task:operator", rules="none")
+    assert app.selectbox(key="agent").value == "novice"
