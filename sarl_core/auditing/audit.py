@@ -75,7 +75,6 @@ class Audit:
         looked_at: Every which step was looked at for near misses; 1 if all were.
         freedom: What a shield leaves an agent to choose from, mean over the steps, 0 to 1.
         drift: Whether the log still looks like the demonstrations.
-        left_out: Steps of the file that are none: a number was missing in them.
         notes: What is to be said of how log and rules were matched, as clauses.
     """
 
@@ -91,7 +90,6 @@ class Audit:
     looked_at: int
     freedom: float
     drift: Drift
-    left_out: int = 0
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -232,11 +230,22 @@ class Audit:
         return _PER * self.broken / self.steps
 
     @cached_property
-    def gaps(self) -> int:
-        """Where a number of a step is not one more than the one before it in the episode."""
+    def _jumps(self) -> NDArray[np.int64]:
+        """How many steps the numbers leave out after each step of an episode, (N - 1,)."""
         assert self.log.steps is not None
-        jumps = np.diff(self.log.steps) != 1
-        return int(jumps.sum() - jumps[self.log.episode_starts[1:] - 1].sum())
+        jumps = np.diff(self.log.steps) - 1
+        jumps[self.log.episode_starts[1:] - 1] = 0
+        return np.asarray(jumps)
+
+    @property
+    def gaps(self) -> int:
+        """Where the numbers of the steps of an episode do not count up."""
+        return int((self._jumps != 0).sum())
+
+    @property
+    def missing_steps(self) -> int:
+        """Steps that the numbers leave out, as those in which a value was missing."""
+        return int(self._jumps[self._jumps > 0].sum())
 
     @cached_property
     def episodes(self) -> pd.DataFrame:
@@ -327,7 +336,7 @@ class Audit:
             columns[f"executed{end}"] = (
                 executed[:, index]
                 if interval
-                else _words(labels, executed[:, index].astype(np.int64) - dimension.first)
+                else _words(labels, dimension.labels_of(executed[:, index]))
             )
         columns |= {"outside": self.outside, "near": _words(names, self.near)}
         return pd.DataFrame(columns)
@@ -353,7 +362,7 @@ class Audit:
             "freedom": self.freedom,
             "longest_run": self.longest_run,
             "breaks_per_thousand": self.breaks_per_thousand,
-            "left_out": self.left_out,
+            "missing_steps": self.missing_steps,
             "gaps": self.gaps,
             "worst": [
                 {
@@ -385,7 +394,6 @@ def audit(
     *,
     projection: Projection = "centre",
     demonstrations: Demonstrations | None = None,
-    left_out: int = 0,
 ) -> Audit:
     """Hold rules against a log: what somebody did, step by step.
 
@@ -396,7 +404,6 @@ def audit(
         projection: What a shield would have made of a continuous action that breaks a rule.
         demonstrations: What the rules were mined from, to compare distributions with; where not
             given, the log is compared with what the rules say of them: supports and data boxes.
-        left_out: Steps of the log's file that are none, as somebody else counted them.
 
     Returns:
         The audit. A million steps of eight features and fifty rules take a few seconds.
@@ -446,7 +453,6 @@ def audit(
         looked_at=every,
         freedom=float(shield.freedom(matched.observations, decision.rules).mean()),
         drift=drift,
-        left_out=left_out,
         notes=tuple(dict.fromkeys((*log.notes, *matched.notes))),
     )
 

@@ -24,7 +24,7 @@ MEASURES: dict[str, Callable[[Audit], float]] = {
     "longest_run": lambda audit: float(audit.longest_run),
     "breaks_per_thousand": lambda audit: audit.breaks_per_thousand,
     "drift": lambda audit: float(len(audit.drift.drifted)),
-    "left_out": lambda audit: audit.left_out / (audit.steps + audit.left_out),
+    "missing_steps": lambda audit: audit.missing_steps / (audit.steps + audit.missing_steps),
     "gaps": lambda audit: float(audit.gaps),
     "steps": lambda audit: float(audit.steps),
 }

@@ -55,7 +55,7 @@ def audit(
             show_default=False,
             help="Exit with 3 if this holds, as breaks>0.02 or coverage<50%; may be given several "
             "times. Measures: agreement, breaks, breaks_per_thousand, coverage, drift, freedom, "
-            "gaps, left_out, longest_run, near, outside, steps.",
+            "gaps, longest_run, missing_steps, near, outside, steps.",
         ),
     ] = None,
     compare: Annotated[

@@ -1,12 +1,23 @@
 """Rules held against logs: the counts, near misses, drift, matching by name, and conditions."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from sarl_core import Audit, Demonstrations, InputError, RuleSet, Shield, audit, mine_rules
+from sarl_core import (
+    Audit,
+    Demonstrations,
+    InputError,
+    RuleSet,
+    Shield,
+    audit,
+    load_demonstrations,
+    mine_rules,
+)
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.auditing.guards import guard
 from sarl_core.auditing.near import NEAR, spreads_of
@@ -103,6 +114,7 @@ def test_features_and_labels_are_matched_by_name(
         observations=np.column_stack([demonstrations.observations[:, order], np.zeros(2000)]),
         feature_names=(*tuple(NAMES[at].upper() for at in order), "spare"),
         feature_units=(*tuple(demonstrations.feature_units[at] for at in order), ""),
+        indicators=None,
         actions=3 - demonstrations.actions,
         label_names=(("wait", "lower", "lift", "brake"),),
     )
@@ -228,3 +240,50 @@ def test_continuous_actions_and_several_dimensions(demonstrations: Demonstration
     )
     assert np.array_equal(audit(rules, turned, projection="clip").breaks, held.breaks)
     assert {"done_0", "rule_1", "executed_1"} <= set(held.to_frame())
+
+
+def test_words_and_codes_are_the_rules_own(tmp_path: Path) -> None:
+    """What a table calls heavy is heavy, whichever words stand beside it there."""
+    rng = np.random.default_rng(2)
+
+    def table(modes: list[str], path: str) -> Demonstrations:
+        frame = pd.DataFrame(
+            {
+                "episode": np.repeat(np.arange(6), 50),
+                "wind": rng.choice([-1.0, 1.0], 300) + 0.1 * rng.random(300),
+                "mode": rng.choice(modes, 300),
+            }
+        )
+        heavy = frame["mode"] == "heavy"
+        frame["action"] = np.where(heavy & (frame["wind"] > 0), "brake", "lift")
+        frame.to_csv(tmp_path / path, index=False)
+        return load_demonstrations(tmp_path / path)
+
+    mined = table(["heavy", "light", "empty"], "mined.csv")
+    rules = mine_rules(mined, supp_min=0.01, conf_min=0.99)
+    assert len(rules) > 1
+    for modes in (["heavy", "light"], ["heavy"], ["light", "empty", "heavy"]):
+        held = audit(rules, table(modes, "log.csv"))
+        assert held.broken == 0
+        assert held.coverage == 1
+    with pytest.raises(InputError, match=r"holds the mode 'loaded' in row .* do not know"):
+        audit(rules, table(["heavy", "loaded"], "log.csv"))
+    two = mine_rules(table(["heavy", "light"], "two.csv"), supp_min=0.01, conf_min=0.99)
+    assert audit(two, table(["light"], "log.csv")).broken == 0
+
+    codes = replace(mined, actions=np.where(mined.actions == 0, 90_000, 100), label_names=None)
+    numbered = mine_rules(codes, supp_min=0.01, conf_min=0.99)
+    held = audit(numbered, replace(codes, actions=np.where(codes.actions == 100, 90_000, 100)))
+    assert held.broken == 300
+    assert set(held.to_frame()["executed"]) == {"100", "90000"}
+
+
+def test_gaps_in_the_numbers_of_steps_are_counted(
+    rules: RuleSet, demonstrations: Demonstrations
+) -> None:
+    steps = np.tile(np.arange(100), 20)
+    steps[50:100] += 7
+    steps[150:200] += 1
+    held = audit(rules, replace(demonstrations, steps=steps))
+    assert (held.gaps, held.missing_steps) == (2, 8)
+    assert guard("missing_steps>0").holds(held)

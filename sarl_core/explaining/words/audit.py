@@ -53,12 +53,12 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
         ),
         ("freedom", f"{share_text(audit.freedom)} under a shield with these rules"),
     ]
-    if audit.left_out or audit.gaps:
+    if audit.gaps:
         facts.append(
             (
                 "gaps",
-                f"{counted(audit.left_out, 'step')} left out, in which a number is missing; "
-                f"{counted(audit.gaps, 'jump')} in the numbers of the steps",
+                f"{counted(audit.gaps, 'jump')} in the numbers of the steps, which leave out "
+                f"{counted(audit.missing_steps, 'step')}",
             )
         )
     return facts
