@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.columns import Guess, listed, unclear_columns
+from sarl_core.demonstrations.formats.mapping.roles import settled_by
 from sarl_core.demonstrations.formats.vocabulary import plain
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
@@ -52,8 +53,8 @@ def settle(guess: Guess, values: Values, words: Collection[str] = ()) -> Guess:
     guess = guess.without(_next_states(guess, values, together))
     if not guess.columns.observations:
         raise InputError(
-            f"there is no observation column beside {listed(guess.unused)}, which are none; call "
-            "them 'obs_' and a name if they are, or map the columns"
+            f"there is no observation column beside {listed(guess.unused)}, which are none; "
+            f"{settled_by(next(iter(guess.unused)), 'feature')}"
         )
     return guess
 
@@ -146,12 +147,15 @@ def _doubtful_roles(guess: Guess, values: Values) -> Guess:
     columns = guess.columns
     for role in ("episode", "step"):
         name = getattr(columns, role)
-        if name is None or not vocabulary.DOUBTFUL_ROLES.fullmatch(plain(name)):
+        if name is None or name in guess.roles:
+            continue
+        if not vocabulary.DOUBTFUL_ROLES.fullmatch(plain(name)):
             continue
         held = values[name]
         if role == "episode":
             if not is_whole(held) or 1 + np.count_nonzero(np.diff(held)) != len(np.unique(held)):
-                raise unclear_columns((name,), tuple(values), "whether it numbers the episodes")
+                what = "whether it numbers the episodes"
+                raise unclear_columns((name,), tuple(values), what, ("episode", "feature"))
             continue
         others = replace(columns, step=None)
         together = same_episode(replace(guess, columns=others), values)
@@ -162,7 +166,8 @@ def _doubtful_roles(guess: Guess, values: Values) -> Guess:
         if guess.prefixed and is_whole(held):
             continue
         if not rising:
-            raise unclear_columns((name,), tuple(values), "whether it counts the steps")
+            what = "whether it counts the steps"
+            raise unclear_columns((name,), tuple(values), what, ("step", "feature"))
         if not is_whole(held):
             guess = replace(
                 guess,
@@ -178,6 +183,8 @@ def _require_action(guess: Guess, values: Values) -> None:
     if [plain(name) for name in columns.actions] != ["a"] or guess.prefixed:
         return
     (letter,) = columns.actions
+    if letter in guess.roles:
+        return
     labels = _few_labels(values[letter])
     rivals = [
         name
@@ -187,14 +194,14 @@ def _require_action(guess: Guess, values: Values) -> None:
     ]
     if rivals:
         raise InputError(
-            f"it is unclear which column is the action, {letter!r} or {listed(rivals)}; call it "
-            "'action', or map the columns"
+            f"it is unclear which column is the action, {letter!r} or {listed(rivals)}; "
+            f"{settled_by(rivals[0], 'action')}"
         )
     roles = columns.reward or columns.terminated or columns.truncated or columns.last
     if not (labels or roles or all(map(vocabulary.is_state_word, columns.observations))):
         raise InputError(
-            f"it is unclear whether the column {letter!r} is the action or a feature; call the "
-            "action 'action', or map the columns"
+            f"it is unclear whether the column {letter!r} is the action or a feature; "
+            f"{settled_by(letter, 'action', 'feature')}"
         )
 
 
@@ -238,14 +245,15 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
         if written or follows.get(name) == base:
             reasons[name] = f"it holds the next {base!r}"
     for name, base in follows.items():
+        if name in guess.roles or base in guess.roles:
+            continue
         if name in reasons or base in reasons or vocabulary.says_before(base):
             continue
         if vocabulary.says_before(name) or name in vocabulary.next_states(features):
             continue
         raise InputError(
             f"the column {name!r} holds in each row what {base!r} holds in the next one, and a "
-            f"state does not know the next; take {name!r} out, call it 'next_{base}', or call "
-            f"{base!r} 'previous_{name}' if it is the earlier one, or map the columns"
+            f"state does not know the next; {settled_by(name, 'ignore', 'feature')}"
         )
     return reasons
 

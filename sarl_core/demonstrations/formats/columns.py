@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 
 from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
+from sarl_core.demonstrations.formats.mapping.roles import (
+    ROLE_WORDS,
+    Roles,
+    require_known,
+    settled_by,
+)
 from sarl_core.demonstrations.formats.vocabulary import (
     ACTIONS,
     OBSERVATIONS,
@@ -20,17 +25,8 @@ from sarl_core.demonstrations.formats.vocabulary import (
 from sarl_core.errors import InputError, quoted
 
 SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last")
-USE_WORDS = MappingProxyType(
-    {
-        "episode": "episode number",
-        "step": "step number",
-        "terminated": "end of an episode (by itself)",
-        "truncated": "end of an episode (by a limit)",
-        "first": "beginning of an episode",
-        "last": "end of an episode",
-    }
-)
 _BY_NAME = "its name says so"
+_BY_PERSON = "as it was mapped"
 _NO_OBSERVATION = "the features' names begin with a word for observations, and its own does not"
 _NUMBERED = re.compile(r"([^\d]*?)[ _.\-\[(]?(\d{1,9})[\])]?")
 
@@ -113,6 +109,7 @@ class Guess:
         unused: Columns that are nothing of these, and why.
         unclear: Columns that may be features or something else.
         prefixed: Whether the features' names begin with a word for observations.
+        roles: What a person said of some of the columns, which no value proves wrong.
     """
 
     columns: ColumnMap
@@ -120,6 +117,7 @@ class Guess:
     unused: Mapping[str, str]
     unclear: tuple[str, ...] = ()
     prefixed: bool = False
+    roles: Roles = field(default_factory=dict)
 
     def uses(self, names: Sequence[str]) -> tuple[ColumnUse, ...]:
         """What each of a table's columns was taken for.
@@ -136,7 +134,7 @@ class Guess:
         return tuple(
             ColumnUse(
                 name,
-                USE_WORDS.get(roles.get(name, ""), roles.get(name, "not used")),
+                ROLE_WORDS[roles.get(name, "ignore")],
                 self.reasons.get(name) or self.unused.get(name, ""),
             )
             for name in names
@@ -178,6 +176,7 @@ class Guess:
         Returns:
             The new guess.
         """
+        dropped = {name: why for name, why in dropped.items() if name not in self.roles}
         observations = tuple(name for name in self.columns.observations if name not in dropped)
         return replace(
             self,
@@ -199,45 +198,71 @@ def guess_columns(names: Sequence[str]) -> ColumnMap:
     return guess_roles(names).columns
 
 
-def guess_roles(names: Sequence[str]) -> Guess:
+def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
     """The likeliest roles of a table's columns, and why.
 
     Args:
         names: The columns.
+        roles: What a person said of some of them; the others are guessed.
 
     Returns:
         The guess; what the columns hold may prove it wrong.
+
+    Raises:
+        InputError: If what was said does not fit the table.
     """
-    actions = _actions(names)
+    roles = roles or {}
+    require_known(roles, names)
+    said = {role: [name for name in names if _role(roles, name) == role] for role in ROLE_WORDS}
+    free = [name for name in names if name not in roles]
+    actions = tuple(said["action"]) or _actions(free)
     reasons = dict.fromkeys(actions, _BY_NAME)
-    roles = _singles(names, actions)
-    reasons |= dict.fromkeys(roles.values(), _BY_NAME)
-    taken = {*actions, *roles.values()}
+    singles = {role: said[role][0] for role in SINGLES if said[role]}
+    singles |= _singles([name for name in free if name not in actions], singles)
+    reasons |= dict.fromkeys(singles.values(), _BY_NAME)
+    taken = {*actions, *singles.values(), *roles}
     unused = {
         name: why
         for name in names
         if name not in taken and (why := _why_unused(name, names)) is not None
     }
     left = [name for name in names if name not in taken and name not in unused]
-    plainly = [name for name in left if stripped(name, PLAIN_OBSERVATIONS) is not None]
-    prefixed = plainly if plainly != [name for name in plainly if _bare(name)] else []
-    if not prefixed:
-        # "state" beside "pressure" is a feature, and no word that all features begin with.
-        common = [name for name in left if stripped(name, OBSERVATIONS) is not None]
-        alone = len(common) == 1 and plainly == [] and not _bare(common[0])
-        prefixed = common if len(common) == len(left) and not alone else []
+    prefixed = _prefixed(left)
     if prefixed:
         reasons |= dict.fromkeys(prefixed, "its name begins with a word for observations")
         unused |= {name: _NO_OBSERVATION for name in left if name not in prefixed}
-        features, unclear = prefixed, []
+        unclear = []
     else:
         unclear = [name for name in left if _unclear(name)]
-        features = [name for name in left if name not in unclear]
-        reasons |= dict.fromkeys(features, "no other use fits its name")
+        reasons |= dict.fromkeys(
+            (name for name in left if name not in unclear), "no other use fits its name"
+        )
+    features = [
+        name
+        for name in names
+        if name in said["feature"] or (name in (prefixed or left) and name not in unclear)
+    ]
     columns = ColumnMap.of_roles(
-        _by_number(tuple(features), OBSERVATIONS), _by_number(actions, ACTIONS), roles
+        _by_number(tuple(features), OBSERVATIONS), _by_number(actions, ACTIONS), singles
     )
-    return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed))
+    reasons |= dict.fromkeys(roles, _BY_PERSON)
+    unused |= dict.fromkeys((*said["ignore"], *said["time"]), _BY_PERSON)
+    return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed), roles)
+
+
+def _role(roles: Roles, name: str) -> str | None:
+    return roles[name].role if name in roles else None
+
+
+def _prefixed(names: Sequence[str]) -> list[str]:
+    """The columns that a word for observations tells from the others; none if none does."""
+    plainly = [name for name in names if stripped(name, PLAIN_OBSERVATIONS) is not None]
+    if plainly != [name for name in plainly if _bare(name)]:
+        return plainly
+    # "state" beside "pressure" is a feature, and no word that all features begin with.
+    common = [name for name in names if stripped(name, OBSERVATIONS) is not None]
+    alone = len(common) == 1 and plainly == [] and not _bare(common[0])
+    return common if len(common) == len(names) and not alone else []
 
 
 def require_clear(guess: Guess, names: Sequence[str], *, actions: bool = True) -> None:
@@ -254,19 +279,21 @@ def require_clear(guess: Guess, names: Sequence[str], *, actions: bool = True) -
     columns = guess.columns
     if actions and not columns.actions:
         raise InputError(
-            f"there is no action column among {listed(names)}; name it 'action', or map the columns"
+            f"there is no action column among {listed(names)}; "
+            f"{settled_by(_likeliest_action(guess, names), 'action')}"
         )
     if not columns.observations and not guess.unclear:
-        raise InputError(
-            f"there is no observation column among {listed(names)}; call them 'obs_' and a name, "
-            "or map the columns"
-        )
+        unused = next((name for name in names if name in guess.unused), None)
+        cure = settled_by(unused, "feature") if unused is not None else "add what was observed"
+        raise InputError(f"there is no observation column among {listed(names)}; {cure}")
     if guess.unclear:
         raise unclear_columns(guess.unclear, names)
-    if columns.reward is not None and plain(columns.reward) == "r" and not _textbook(guess):
+    reward = columns.reward
+    lettered = reward is not None and plain(reward) == "r" and reward not in guess.roles
+    if reward is not None and lettered and not _textbook(guess):
         raise InputError(
-            f"it is unclear whether the column {columns.reward!r} is the reward or a feature; call "
-            "it 'reward', or give the feature its full name"
+            f"it is unclear whether the column {reward!r} is the reward or a feature; "
+            f"{settled_by(reward, 'reward', 'feature')}"
         )
     if guess.prefixed:
         _refuse_gap(columns.observations, OBSERVATIONS)
@@ -274,7 +301,10 @@ def require_clear(guess: Guess, names: Sequence[str], *, actions: bool = True) -
 
 
 def unclear_columns(
-    columns: Sequence[str], names: Sequence[str], what: str = "whether it is a feature"
+    columns: Sequence[str],
+    names: Sequence[str],
+    what: str = "whether it is a feature",
+    roles: Sequence[str] = ("feature", "ignore"),
 ) -> InputError:
     """The error for columns that may be features or not.
 
@@ -282,20 +312,17 @@ def unclear_columns(
         columns: One or more.
         names: All columns.
         what: Is unclear of one.
+        roles: That it may have.
 
     Returns:
         An error that names them and says what to do.
     """
-    one = len(columns) == 1
     sentence = (
         f"it is unclear of the column {columns[0]!r} {what}"
-        if one
+        if len(columns) == 1
         else f"it is unclear whether the columns {listed(columns)} are features"
     )
-    return InputError(
-        f"{sentence}, among {listed(names)}; rename one that is a feature (by another word, or "
-        "call every feature 'obs_' and a name), take out one that is none, or map the columns"
-    )
+    return InputError(f"{sentence}, among {listed(names)}; {settled_by(columns[0], *roles)}")
 
 
 def guess_notes(guess: Guess) -> tuple[str, ...]:
@@ -310,19 +337,22 @@ def guess_notes(guess: Guess) -> tuple[str, ...]:
     """
     notes = []
     columns = guess.columns
-    if not guess.prefixed:
-        one = len(columns.observations) == 1
+    guessed = [name for name in columns.observations if name not in guess.roles]
+    if guessed and not guess.prefixed:
+        one = len(guessed) == 1
         notes.append(
-            f"the column{'' if one else 's'} {listed(columns.observations)} "
+            f"the column{'' if one else 's'} {listed(guessed)} "
             f"{'was' if one else 'were'} taken as observations"
         )
     letters = [name for name in (*columns.actions, columns.reward) if name and len(name) == 1]
     for name in letters:
+        if name in guess.roles:
+            continue
         what = "reward" if name == columns.reward else "action"
         notes.append(f"the column {name!r} was taken as the {what}")
     by_reason: dict[str, list[str]] = {}
     for name, why in guess.unused.items():
-        if not vocabulary.ROW_NUMBERS.fullmatch(plain(name)):
+        if name not in guess.roles and not vocabulary.ROW_NUMBERS.fullmatch(plain(name)):
             by_reason.setdefault(why, []).append(name)
     for why, left in by_reason.items():
         one = len(left) == 1
@@ -395,11 +425,13 @@ def _actions(names: Sequence[str]) -> tuple[str, ...]:
     return several or ((alone,) if alone is not None else ())
 
 
-def _singles(names: Sequence[str], actions: Sequence[str]) -> dict[str, str]:
-    """The first column for each role; another one for the same role is no second."""
+def _singles(names: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
+    """The first column for each role of which nothing was said; another one is no second."""
     by_role: dict[str, str] = {}
     for role, patterns in vocabulary.ROLES.items():
-        free = [name for name in names if name not in actions and name not in by_role.values()]
+        if role in said:
+            continue
+        free = [name for name in names if name not in by_role.values()]
         name = vocabulary.first_of(free, patterns)
         if name is not None:
             by_role[role] = name
@@ -418,11 +450,22 @@ def _why_unused(name: str, names: Sequence[str]) -> str | None:
     roles = (role for role, all_of in vocabulary.ROLES.items() for one in all_of if _is(one, word))
     role = next(roles, None)
     if role is not None and len(word) > 1:
-        return f"another column is the {USE_WORDS.get(role, role)}"
+        return f"another column is the {ROLE_WORDS[role]}"
     follows = vocabulary.next_states(names).get(name)
     if follows is not None and stripped(name, PLAIN_OBSERVATIONS) is None:
         return f"it holds the next {follows!r}"
     return None
+
+
+def _likeliest_action(guess: Guess, names: Sequence[str]) -> str:
+    """The column to name in a sentence where no name says that it is the action."""
+    others = [name for name in names if name not in guess.columns.singles.values()]
+    likely = [
+        name
+        for name in others
+        if vocabulary.is_perhaps_action(name) or vocabulary.CONTROLS.fullmatch(plain(name))
+    ]
+    return (likely or others or list(names))[-1]
 
 
 def _is(pattern: str, word: str) -> bool:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from sarl_core.archives import Promise, array_of, arrays_in, opened, promise_of
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import ColumnUse
-from sarl_core.demonstrations.formats.columns import USE_WORDS, listed
+from sarl_core.demonstrations.formats.columns import listed
+from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
     Metadata,
@@ -45,13 +46,13 @@ ARRAY_KEYS = {
 _USES = {
     "observations": "features",
     "actions": "actions",
-    "episodes": USE_WORDS["episode"],
-    "steps": USE_WORDS["step"],
+    "episodes": ROLE_WORDS["episode"],
+    "steps": ROLE_WORDS["step"],
     "rewards": "reward",
-    "terminated": USE_WORDS["terminated"],
-    "truncated": USE_WORDS["truncated"],
+    "terminated": ROLE_WORDS["terminated"],
+    "truncated": ROLE_WORDS["truncated"],
     "indices": "rows at which episodes begin",
-    "starts": USE_WORDS["first"],
+    "starts": ROLE_WORDS["first"],
 }
 
 

@@ -1,0 +1,286 @@
+"""What a person says of columns: on the command line, in a file, on the page or in Python."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, cast, get_args
+
+from msgspec import Struct
+
+from sarl_core.decimals import decimal_text
+from sarl_core.documents import MisfitError, Number, conformed, read_object
+from sarl_core.errors import InputError, quoted
+from sarl_core.files import whole_file
+
+RoleName = Literal[
+    "feature",
+    "action",
+    "episode",
+    "step",
+    "reward",
+    "terminated",
+    "truncated",
+    "first",
+    "last",
+    "time",
+    "ignore",
+]
+ROLE_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        "feature": "feature",
+        "action": "action",
+        "episode": "episode number",
+        "step": "step number",
+        "reward": "reward",
+        "terminated": "end of an episode (by itself)",
+        "truncated": "end of an episode (by a limit)",
+        "first": "beginning of an episode",
+        "last": "end of an episode",
+        "time": "not used",
+        "ignore": "not used",
+    }
+)
+ActionKind = Literal["labels", "continuous"]
+UNCLEAR = "unclear"
+"""What stands in a suggestion where two readings are possible."""
+TOGETHER = "+"
+"""Between columns that are one action together."""
+_GRAMMAR = (
+    "write NAME=ROLE with one of the roles "
+    f"{', '.join(get_args(RoleName))}; a feature may have a unit (speed=feature:m/s), and an "
+    "action may be labels or continuous with or without bounds (throttle=action:continuous:0:100)"
+)
+_FORMAT, _VERSION = "sarl-columns", 1
+
+
+@dataclass(frozen=True)
+class ColumnRole:
+    """What one column is.
+
+    Attributes:
+        role: What it holds; a time and what is to be ignored are not read.
+        unit: Of a feature, "" where there is none.
+        kind: Whether an action is labels or an amount; None to go by its values.
+        low: Lower bound of a continuous action; None to go by its values.
+        high: Upper bound, likewise.
+
+    Raises:
+        InputError: If that does not go together.
+    """
+
+    role: RoleName
+    unit: str = ""
+    kind: ActionKind | None = None
+    low: float | None = None
+    high: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit and self.role != "feature":
+            raise InputError(f"a column that is {self.role!r} has no unit here; leave the unit out")
+        if (self.kind is not None or self.low is not None) and self.role != "action":
+            raise InputError(
+                f"a column that is {self.role!r} is neither labels nor continuous; only an action "
+                "is, so leave that out"
+            )
+        if (self.low is None) != (self.high is None):
+            raise InputError("an action has one bound; give both, the least and the greatest")
+        if self.low is None or self.high is None:
+            return
+        if self.kind != "continuous":
+            raise InputError("only a continuous action has bounds; write continuous before them")
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            raise InputError(
+                f"the bounds of an action must be two numbers, the lower one first, not "
+                f"{self.low:g} and {self.high:g}"
+            )
+
+    def __str__(self) -> str:
+        """As it is written after ``--column NAME=``."""
+        bounds = [decimal_text(one) for one in (self.low, self.high) if one is not None]
+        return ":".join([self.role, *filter(None, (self.unit, self.kind)), *bounds])
+
+
+Roles = Mapping[str, ColumnRole]
+
+
+def role_from_text(text: str) -> ColumnRole:
+    """Read what ``--column NAME=`` is followed by.
+
+    Args:
+        text: As "episode", "feature:m/s", "action:labels", "action:continuous:0:100".
+
+    Returns:
+        The role.
+
+    Raises:
+        InputError: If it is none.
+    """
+    role, *more = text.strip().split(":")
+    role = role.strip().lower()
+    if role not in ROLE_WORDS:
+        raise InputError(f"{quoted(role)} is no role of a column; {_GRAMMAR}")
+    if role == "feature":
+        return ColumnRole("feature", unit=":".join(more).strip())
+    fits = not more or (role == "action" and len(more) in (1, 3))
+    kind = more[0].strip().lower() if more else None
+    if not fits or kind not in (None, *get_args(ActionKind)):
+        raise InputError(f"{quoted(text)} is no role of a column; {_GRAMMAR}")
+    try:
+        bounds = [float(bound) for bound in more[1:]]
+    except ValueError:
+        raise InputError(f"{quoted(text)} has bounds that are no numbers; {_GRAMMAR}") from None
+    return ColumnRole(cast("RoleName", role), "", cast("ActionKind | None", kind), *bounds)
+
+
+def roles_from_options(options: Iterable[str]) -> dict[str, ColumnRole]:
+    """Read the options ``--column``.
+
+    Args:
+        options: Each as "NAME=ROLE".
+
+    Returns:
+        What is said of each column.
+
+    Raises:
+        InputError: If one is something else, or two speak of one column.
+    """
+    roles: dict[str, ColumnRole] = {}
+    for option in options:
+        name, sign, text = option.rpartition("=")
+        if not sign or not name:
+            raise InputError(f"--column {quoted(option)} has no name or no role; {_GRAMMAR}")
+        if name in roles:
+            raise InputError(f"--column says twice what {quoted(name)} is; say it once")
+        roles[name] = role_from_text(text)
+    return roles
+
+
+def as_roles(given: Mapping[str, ColumnRole | str]) -> dict[str, ColumnRole]:
+    """Roles of which some are written as after ``--column NAME=``."""
+    return {
+        name: role_from_text(role) if isinstance(role, str) else role
+        for name, role in given.items()
+    }
+
+
+class _Role(Struct, forbid_unknown_fields=True):
+    role: Literal[RoleName, "unclear"]
+    unit: str = ""
+    kind: ActionKind | None = None
+    low: Number | None = None
+    high: Number | None = None
+    why: str = ""
+
+
+class _File(Struct, forbid_unknown_fields=True):
+    format: Literal["sarl-columns"]
+    version: Literal[1]
+    columns: dict[str, Any]
+
+
+def load_roles(path: Path) -> dict[str, ColumnRole]:
+    """Read a file that says what columns are.
+
+    Args:
+        path: JSON, as `save_roles` writes it.
+
+    Returns:
+        What is said of each column.
+
+    Raises:
+        InputError: If it is no such file, or leaves open what a column is.
+    """
+    advice = "write one with `check FILE --suggest-columns` and edit it"
+    roles: dict[str, ColumnRole] = {}
+    try:
+        for name, value in conformed(read_object(path, advice), _File).columns.items():
+            try:
+                said = conformed({"role": value} if isinstance(value, str) else value, _Role)
+                if said.role == UNCLEAR:
+                    raise InputError(
+                        "what it is is left open; write one of the roles "
+                        f"{', '.join(get_args(RoleName))}"
+                    )
+                roles[name] = ColumnRole(
+                    cast("RoleName", said.role), said.unit, said.kind, said.low, said.high
+                )
+            except (InputError, MisfitError) as error:
+                raise MisfitError(f"of the column {quoted(name)}: {error}") from error
+    except MisfitError as error:
+        raise InputError(f"{path}: {error}; {advice}") from error
+    return roles
+
+
+def save_roles(
+    path: Path, roles: Mapping[str, ColumnRole | None], reasons: Mapping[str, str]
+) -> None:
+    """Write a file that says what columns are, for a person to edit.
+
+    Args:
+        path: Where to.
+        roles: For each column of a table, None where two readings are possible.
+        reasons: Why, in words; nobody reads them again.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    columns = {
+        name: {"role": UNCLEAR}
+        if role is None
+        else {key: value for key, value in vars(role).items() if value not in (None, "")}
+        for name, role in roles.items()
+    }
+    for name, entry in columns.items():
+        if reasons.get(name):
+            entry["why"] = reasons[name]
+    document = {"format": _FORMAT, "version": _VERSION, "columns": columns}
+    with whole_file(path) as unfinished:
+        unfinished.write_text(
+            json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
+
+
+def require_known(roles: Roles, names: Sequence[str]) -> None:
+    """Refuse what is said of a column that a table does not have, or twice of one role.
+
+    Args:
+        roles: What was said.
+        names: The columns of the table.
+
+    Raises:
+        InputError: With the name.
+    """
+    missing = next((name for name in roles if name not in names), None)
+    if missing is not None:
+        listed = ", ".join(map(quoted, names[:12])) + (", …" if len(names) > 12 else "")
+        raise InputError(f"there is no column {quoted(missing)} among {listed}; name one of those")
+    single: dict[str, str] = {}
+    for name, one in roles.items():
+        if one.role in ("feature", "action", "time", "ignore"):
+            continue
+        if one.role in single:
+            raise InputError(
+                f"{quoted(single[one.role])} and {quoted(name)} are both said to be the "
+                f"{ROLE_WORDS[one.role]}; choose one"
+            )
+        single[one.role] = name
+
+
+def settled_by(name: str, *roles: str) -> str:
+    """What to do where it is unclear what a column is.
+
+    Args:
+        name: The column.
+        roles: That it may have.
+
+    Returns:
+        The end of a sentence.
+    """
+    options = " or ".join(f"--column {shlex.quote(f'{name}={role}')}" for role in roles)
+    return f"say which with {options} (on the page Demonstrations: in the form)"
