@@ -13,6 +13,7 @@ from sarl_core.cli.inputs import read_agent, read_demonstrations
 from sarl_core.cli.options import (
     AgentName,
     ChoiceName,
+    Columns,
     Divider,
     EnvOfFile,
     File,
@@ -22,6 +23,7 @@ from sarl_core.cli.options import (
     ProjectionName,
     Seed,
     out_option,
+    with_columns,
     with_played_environment,
 )
 from sarl_core.errors import InputError
@@ -39,6 +41,7 @@ _NOBODY = "none"
 
 
 @with_played_environment
+@with_columns
 def aggregate(
     context: typer.Context,
     file: File,
@@ -49,6 +52,7 @@ def aggregate(
             "states that need a demonstration (.csv)."
         ),
     ],
+    columns: Columns,
     max_rules: Annotated[
         int, typer.Option("--max-rules", help="Most rules of each action dimension.")
     ] = 48,
@@ -127,7 +131,7 @@ def aggregate(
             max_steps=max_steps,
             choose=choose,
         )
-        start = read_demonstrations(file, env)
+        start = read_demonstrations(file, env, columns)
         environment = env or recorded_environment(start)
         agents = _agents(agent, expert, environment, normalise)
         read = start.notes

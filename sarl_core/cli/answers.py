@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from sarl_core.cli.evidence_answers import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+    from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview
     from sarl_core.mining.rule_set import RuleSet
     from sarl_core.mining.validation.cross_fitting import Judged
     from sarl_core.rendering.replay import Replay
@@ -169,6 +170,29 @@ def print_demonstrations(document: dict[str, Any]) -> None:
     print_oddities(document)
     if not document["warnings"]:
         terminal.print_lines(["No warnings."])
+
+
+def print_suggestion(previews: Sequence[ColumnPreview], out: Path) -> None:
+    """Print what the columns of a table seem to be.
+
+    Args:
+        previews: Of the columns.
+        out: The file that says so.
+    """
+    terminal.print_table(
+        ("column", "holds", "first values", "role", "why"),
+        [
+            (
+                one.name,
+                one.holds,
+                ", ".join(one.first),
+                "unclear" if one.role is None else str(one.role),
+                one.why,
+            )
+            for one in previews
+        ],
+    )
+    terminal.print_lines([f"Wrote {out}: edit it, then give it to --columns."])
 
 
 def _print_actions(actions: list[dict[str, Any]]) -> None:

@@ -12,12 +12,13 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import Json, ProjectionName, out_option
+from sarl_core.cli.options import Columns, Json, ProjectionName, out_option, with_columns
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.auditing.audit import Audit
     from sarl_core.auditing.comparison import LogComparison
+    from sarl_core.auditing.growing import GrowingLog
     from sarl_core.auditing.guards import GuardCondition
     from sarl_core.demonstrations.dataset import Demonstrations
 
@@ -27,6 +28,7 @@ _LOOK_SECONDS = 1.0
 _REST = 3  # times as long as reading took
 
 
+@with_columns
 def audit(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
@@ -39,6 +41,7 @@ def audit(
             show_default=False,
         ),
     ],
+    columns: Columns,
     out: Annotated[
         Path | None,
         out_option(
@@ -102,13 +105,15 @@ def audit(
 
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
-        mined_from = None if demonstrations is None else read_demonstrations(demonstrations, None)
+        mined_from = (
+            None if demonstrations is None else read_demonstrations(demonstrations, None, columns)
+        )
 
         def hold(path: Path, steps: Demonstrations | None = None) -> Audit:
             try:
                 return against(
                     rule_set,
-                    read_demonstrations(path, None) if steps is None else steps,
+                    read_demonstrations(path, None, columns) if steps is None else steps,
                     projection=projection,
                     demonstrations=mined_from,
                 )
@@ -117,7 +122,9 @@ def audit(
 
         rotated: InputError | None = None
         if follow:
-            held, rotated = _followed(log, partial(hold, log), guards)
+            from sarl_core.auditing.growing import GrowingLog
+
+            held, rotated = _followed(GrowingLog(log, columns), partial(hold, log), guards)
         else:
             held = hold(log)
         comparison = None if compare is None else LogComparison(held, hold(compare))
@@ -138,13 +145,12 @@ def audit(
 
 
 def _followed(
-    log: Path, hold: Callable[[Demonstrations], Audit], guards: list[GuardCondition]
+    growing: GrowingLog, hold: Callable[[Demonstrations], Audit], guards: list[GuardCondition]
 ) -> tuple[Audit, InputError | None]:
     """Audit a log again and again while it grows, until Ctrl-C or until it is rotated."""
-    from sarl_core.auditing.growing import GrowingLog, RotatedError
+    from sarl_core.auditing.growing import RotatedError
     from sarl_core.mining.language import share_text
 
-    growing = GrowingLog(log)
     held: Audit | None = None
     try:
         while True:

@@ -11,6 +11,7 @@ from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
 from sarl_core.cli.options import (
     AgentName,
+    Columns,
     Env,
     EnvOfFile,
     File,
@@ -19,6 +20,7 @@ from sarl_core.cli.options import (
     Seed,
     Stochastic,
     out_option,
+    with_columns,
     with_environment,
     with_played_environment,
 )
@@ -70,7 +72,22 @@ def record(
 
 
 @with_environment
-def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
+@with_columns
+def check(
+    file: File,
+    columns: Columns,
+    env: EnvOfFile = None,
+    suggest: Annotated[
+        Path | None,
+        typer.Option(
+            "--suggest-columns",
+            metavar="COLUMNS.json",
+            show_default=False,
+            help="Only write what each column seems to be, for you to edit and give to --columns.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
     """Read and check demonstrations, and print what is in them.
 
     A file and what is read from it may take 1 GiB of memory, here and in every other command; the
@@ -78,7 +95,26 @@ def check(file: File, env: EnvOfFile = None, as_json: Json = False) -> None:
 
     Example: `python -m sarl_core check data/demonstrations/lunar_lander.parquet`
     """
-    _tell_demonstrations(read_demonstrations(file, env), file, as_json)
+    if suggest is not None:
+        _suggest_columns(file, columns, suggest, as_json)
+        return
+    _tell_demonstrations(read_demonstrations(file, env, columns), file, as_json)
+
+
+def _suggest_columns(file: Path, columns: Columns, out: Path, as_json: bool) -> None:
+    terminal.check_output(out, (".json",))
+    from sarl_core.cli.answers import print_suggestion
+    from sarl_core.demonstrations.formats import preview_columns
+    from sarl_core.demonstrations.formats.mapping.roles import save_roles
+
+    previews = preview_columns(file, columns=columns)
+    save_roles(
+        out, {one.name: one.role for one in previews}, {one.name: one.why for one in previews}
+    )
+    if as_json:
+        terminal.print_json({"out": str(out), "columns": [one.document for one in previews]})
+    else:
+        print_suggestion(previews, out)
 
 
 def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:

@@ -9,14 +9,16 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import Json
+from sarl_core.cli.options import Columns, Json, with_columns
 
 
+@with_columns
 def diff(
     first: Annotated[Path, typer.Argument(metavar="A.json", show_default=False, help="Rules.")],
     second: Annotated[
         Path, typer.Argument(metavar="B.json", show_default=False, help="Other rules.")
     ],
+    columns: Columns,
     demonstrations: Annotated[
         Path | None,
         typer.Option(
@@ -49,7 +51,7 @@ def diff(
                 "the same every time; --demonstrations takes those of a file."
             )
         else:
-            recorded = read_demonstrations(demonstrations, None)
+            recorded = read_demonstrations(demonstrations, None, columns)
             one, more = rules_for(one, recorded, called="the states")
             other, notes = comparable(one, other)[0], (*recorded.notes, *notes, *more)
             states = recorded.observations

@@ -10,11 +10,13 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
 from sarl_core.cli.options import (
+    Columns,
     EnvOfFile,
     Json,
     OnInvalidName,
     ProjectionName,
     out_option,
+    with_columns,
     with_environment,
 )
 from sarl_core.errors import InputError
@@ -28,10 +30,12 @@ _MOST_THRESHOLDS = 5
 
 
 @with_environment
+@with_columns
 def export(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rule file.", show_default=False)
     ],
+    columns: Columns,
     out: Annotated[
         Path,
         out_option(
@@ -82,7 +86,9 @@ def export(
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
-        given = None if demonstrations is None else read_demonstrations(demonstrations, env)
+        given = (
+            None if demonstrations is None else read_demonstrations(demonstrations, env, columns)
+        )
         vectors, prepared = export_rules(
             rule_set,
             out,

@@ -12,6 +12,7 @@ from sarl_core.errors import InputError
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.demonstrations.formats.mapping.roles import Roles
     from sarl_core.shielding.shield import Shield
 
 
@@ -49,12 +50,15 @@ def read_agent(
     return made
 
 
-def read_demonstrations(file: Path, env_id: EnvironmentOrId | None) -> Demonstrations:
+def read_demonstrations(
+    file: Path, env_id: EnvironmentOrId | None, columns: Roles
+) -> Demonstrations:
     """Read a file of demonstrations.
 
     Args:
         file: As the argument names it.
         env_id: Of the option ``--env``, or None.
+        columns: What was said of columns with ``--columns`` and ``--column``.
 
     Returns:
         What is in it.
@@ -64,7 +68,7 @@ def read_demonstrations(file: Path, env_id: EnvironmentOrId | None) -> Demonstra
     """
     from sarl_core.demonstrations.formats import load_demonstrations
 
-    return load_demonstrations(file, env_id=env_id)
+    return load_demonstrations(file, env_id=env_id, columns=columns)
 
 
 def read_shield(

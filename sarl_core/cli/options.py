@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -14,6 +14,8 @@ from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
 
 File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
+# Commands that read demonstrations have a parameter `columns` and are `with_columns`.
+Columns = Mapping[str, Any]  # of roles
 # Commands with an option `--env` are `with_environment`.
 EnvOfFile = Annotated[
     Environment | None,
@@ -163,6 +165,29 @@ Cost = Annotated[
         "the observation, or module:name, as --failure takes it.",
     ),
 ]
+_ColumnsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--columns",
+        metavar="COLUMNS.json",
+        show_default=False,
+        help="Which column of the file is what, as `check FILE --suggest-columns` writes "
+        "it for you to edit.",
+    ),
+]
+_ColumnRoles = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--column",
+        metavar="NAME=ROLE",
+        show_default=False,
+        help="What one column of the file is; the others are guessed. ROLE is feature, "
+        "action, episode, step, reward, terminated, truncated, first, last, time or ignore; with a "
+        "unit: speed=feature:m/s; an amount in whole numbers: throttle=action:continuous:0:100 "
+        "(bounds may be left out); numbers that are choices: gear=action:labels. May be given "
+        "several times.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
@@ -237,3 +262,32 @@ def with_environment(command: Callable[..., None], *, played: bool = False) -> C
 
 with_played_environment = partial(with_environment, played=True)
 """The same of a command that plays episodes: what a failure is in them, and what a step costs."""
+
+
+def with_columns(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command that reads demonstrations take what a person says of their columns.
+
+    Args:
+        command: With a parameter `columns`, the roles that were said.
+
+    Returns:
+        The command as Typer reads it: with ``--columns`` and ``--column`` in its place.
+    """
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        one.replace(kind=keyword)
+        for one in inspect.signature(command, eval_str=True).parameters.values()
+        if one.name != "columns"
+    ]
+    for name, annotation in (("columns_file", _ColumnsFile), ("column", _ColumnRoles)):
+        parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
+
+    @wraps(command)
+    def run(*, columns_file: Path | None, column: list[str] | None, **others: Any) -> None:
+        from sarl_core.demonstrations.formats.mapping.roles import load_roles, roles_from_options
+
+        columns = {} if columns_file is None else load_roles(columns_file)
+        command(columns=columns | roles_from_options(column or ()), **others)
+
+    vars(run)["__signature__"] = inspect.Signature(parameters)
+    return run

@@ -10,7 +10,15 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_agent, read_demonstrations
-from sarl_core.cli.options import Json, MaxSteps, Normalise, out_option, with_played_environment
+from sarl_core.cli.options import (
+    Columns,
+    Json,
+    MaxSteps,
+    Normalise,
+    out_option,
+    with_columns,
+    with_played_environment,
+)
 from sarl_core.environments.environment import Environment, EnvironmentOrId
 
 if TYPE_CHECKING:
@@ -21,10 +29,12 @@ _IN_FULL, _FRAMES, _SEED, _EPISODES = 60, 3, 100_000, 12
 
 
 @with_played_environment
+@with_columns
 def report(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
     ],
+    columns: Columns,
     demonstrations: Annotated[
         Path,
         typer.Option(
@@ -91,6 +101,7 @@ def report(
     """
     terminal.check_output(out, (".html",))
     with terminal.working("Making the report") as advance:
+        from sarl_core.demonstrations.formats.mapping.roles import as_options
         from sarl_core.explaining.report.comparison import read_results
         from sarl_core.explaining.report.provenance import command_line, mining_command
         from sarl_core.explaining.report.report import make_report
@@ -98,11 +109,12 @@ def report(
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
-        given = read_demonstrations(demonstrations, env)
+        given = read_demonstrations(demonstrations, env, columns)
         card = read_card(rules)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
             "--demonstrations": demonstrations,
+            "--column": as_options(columns),
             "--comparison": comparison,
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
@@ -114,7 +126,7 @@ def report(
             "--max-steps": max_steps,
             "--out": out,
         }
-        mined = mining_command(rule_set, rules, demonstrations, given, env=env)
+        mined = mining_command(rule_set, rules, demonstrations, given, env=env, columns=columns)
         document = make_report(
             rule_set,
             given,

@@ -10,20 +10,24 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
 from sarl_core.cli.options import (
+    Columns,
     Divider,
     EnvOfFile,
     File,
     Json,
     out_option,
+    with_columns,
     with_environment,
 )
 from sarl_core.errors import InputError
 
 
 @with_environment
+@with_columns
 def mine(
     file: File,
     out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
+    columns: Columns,
     support: Annotated[
         float | None,
         typer.Option(
@@ -132,7 +136,7 @@ def mine(
         if setting is not None:
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
-        demonstrations = read_demonstrations(file, env)
+        demonstrations = read_demonstrations(file, env, columns)
         oddities = describe_oddities(demonstrations)
         tried = split = None
         if hold_out is not None:
@@ -169,9 +173,11 @@ def mine(
 
 
 @with_environment
+@with_columns
 def landscape(
     file: File,
     out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],
+    columns: Columns,
     env: EnvOfFile = None,
     divider: Divider = 2,
     supports: Annotated[
@@ -208,7 +214,7 @@ def landscape(
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        recorded = read_demonstrations(file, env)
+        recorded = read_demonstrations(file, env, columns)
         trees = grow_policy_trees(recorded, divider=divider)
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]

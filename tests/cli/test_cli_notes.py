@@ -1,11 +1,13 @@
-"""Every command tells how features were matched, and which episodes were cut off."""
+"""Every command tells how columns and features were matched, and which episodes were cut off."""
 
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sarl_core import RuleSet
+from sarl_core.cli.app import main
 from tests.cli.conftest import CART
 
 BY_NAME = "were put into the order of"
@@ -89,3 +91,58 @@ def test_a_search_for_gaps_and_the_pictures_of_a_report_may_be_cut(run, turned, 
     out = ("--max-steps", "6", "--out", str(tmp_path / "report.html"))
     notes = told(run, *report, *out)
     assert any(note.startswith("all 2 episodes were cut off after 6 steps") for note in notes)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A log in which two columns may be the action, and one may be a feature."""
+    random = np.random.default_rng(2)
+    speed, a = random.uniform(0, 30, (2, 300)).round(2)
+    rows = zip(speed, a, (speed > 20).astype(int), random.integers(0, 3, 300), strict=True)
+    lines = [f"{v},{a},{brake},{lane},{i // 30}" for i, (v, a, brake, lane) in enumerate(rows)]
+    path = tmp_path_factory.mktemp("log") / "drive.csv"
+    path.write_text("\n".join(["v,a,brake,lane_id,run", *lines]))
+    return path
+
+
+SAID = ("--column", "brake=action", "--column", "lane_id=ignore", "--column", "v=feature:m/s")
+MINE = ("--support", "0.1", "--confidence", "0.9")
+
+
+def test_options_and_file_say_the_same_in_every_command(run, capsys, log, tmp_path):
+    assert main(["mine", str(log), *MINE, "--out", str(tmp_path / "no.json")]) == 2
+    assert "--column lane_id=feature" in capsys.readouterr().err
+    columns, rules = tmp_path / "columns.json", tmp_path / "rules.json"
+    assert "unclear" in run("check", log, "--suggest-columns", columns)
+    suggested = json.loads(columns.read_text())
+    assert suggested["columns"]["run"]["role"] == "episode"
+    run("check", log, *SAID, "--suggest-columns", columns)
+    by_file = ("--columns", columns)
+    run("mine", log, *by_file, *MINE, "--out", rules)
+    assert json.loads(rules.read_text())["features"][0]["unit"] == "m/s"
+    again = tmp_path / "again.json"
+    run("mine", log, *SAID, *MINE, "--out", again)
+    one, other = (json.loads(path.read_text()) for path in (rules, again))
+    assert one["rules"] == other["rules"]
+    states = ("--demonstrations", log)
+    run("landscape", log, *by_file, "--out", tmp_path / "landscape.csv")
+    run("diff", rules, again, *states, *by_file)
+    run("export", rules, *states, *by_file, "--rounded", "--out", tmp_path / "shield.py")
+    page = tmp_path / "report.html"
+    run("report", rules, *states, *by_file, "--frames", "0", "--out", page)
+    assert "--column brake=action:labels" in page.read_text()
+
+
+def test_an_option_goes_before_the_file(run, log, tmp_path):
+    columns = tmp_path / "columns.json"
+    run("check", log, *SAID, "--suggest-columns", columns)
+    document = json.loads(run("check", log, "--columns", columns, "--column", "a=ignore", "--json"))
+    assert [feature["name"] for feature in document["features"]] == ["v"]
+
+
+@pytest.mark.parametrize(
+    ("option", "sentence"), [("brake", "has no name or no role"), ("=action", "has no name")]
+)
+def test_an_option_without_both_sides_is_refused(capsys, log, option, sentence):
+    assert main(["check", str(log), "--column", option]) == 2
+    assert sentence in capsys.readouterr().err

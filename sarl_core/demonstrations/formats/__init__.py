@@ -2,8 +2,10 @@
 
 from sarl_core.demonstrations.formats.columns import ColumnMap, guess_columns
 from sarl_core.demonstrations.formats.kinds import EXTENSIONS, WRITTEN
+from sarl_core.demonstrations.formats.mapping.roles import ColumnRole, load_roles
 from sarl_core.demonstrations.formats.registry import (
     load_demonstrations,
+    preview_columns,
     read_demonstrations,
     read_files,
     save_demonstrations,
@@ -14,8 +16,11 @@ __all__ = [
     "EXTENSIONS",
     "WRITTEN",
     "ColumnMap",
+    "ColumnRole",
     "guess_columns",
     "load_demonstrations",
+    "load_roles",
+    "preview_columns",
     "read_demonstrations",
     "read_files",
     "save_demonstrations",

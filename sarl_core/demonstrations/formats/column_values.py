@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.formats import vocabulary
-from sarl_core.demonstrations.formats.columns import Guess, listed, unclear_columns
+from sarl_core.demonstrations.formats.columns import (
+    Guess,
+    UnclearColumnsError,
+    listed,
+    unclear_columns,
+)
 from sarl_core.demonstrations.formats.mapping.roles import settled_by
 from sarl_core.demonstrations.formats.vocabulary import plain
 from sarl_core.demonstrations.requirements import (
@@ -193,15 +198,17 @@ def _require_action(guess: Guess, values: Values) -> None:
         or (not labels and _few_labels(values[name]) and len(np.unique(values[name])) > 1)
     ]
     if rivals:
-        raise InputError(
+        raise UnclearColumnsError(
+            (letter, *rivals),
             f"it is unclear which column is the action, {letter!r} or {listed(rivals)}; "
-            f"{settled_by(rivals[0], 'action')}"
+            f"{settled_by((letter, *rivals), 'action')}",
         )
     roles = columns.reward or columns.terminated or columns.truncated or columns.last
     if not (labels or roles or all(map(vocabulary.is_state_word, columns.observations))):
-        raise InputError(
+        raise UnclearColumnsError(
+            (letter,),
             f"it is unclear whether the column {letter!r} is the action or a feature; "
-            f"{settled_by(letter, 'action', 'feature')}"
+            f"{settled_by(letter, 'action', 'feature')}",
         )
 
 
@@ -251,9 +258,10 @@ def _next_states(guess: Guess, values: Values, together: NDArray[np.bool_]) -> d
             continue
         if vocabulary.says_before(name) or name in vocabulary.next_states(features):
             continue
-        raise InputError(
+        raise UnclearColumnsError(
+            (name,),
             f"the column {name!r} holds in each row what {base!r} holds in the next one, and a "
-            f"state does not know the next; {settled_by(name, 'ignore', 'feature')}"
+            f"state does not know the next; {settled_by(name, 'ignore', 'feature')}",
         )
     return reasons
 

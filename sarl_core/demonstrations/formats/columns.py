@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.mapping.roles import (
     ROLE_WORDS,
+    ColumnRole,
     Roles,
+    as_roles,
     require_known,
     settled_by,
 )
@@ -22,7 +24,7 @@ from sarl_core.demonstrations.formats.vocabulary import (
     plain,
     stripped,
 )
-from sarl_core.errors import InputError, quoted
+from sarl_core.errors import InputError, quoted, require
 
 SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last")
 _BY_NAME = "its name says so"
@@ -87,6 +89,21 @@ class ColumnMap:
             last=singles.get("last"),
         )
 
+    def only(self, names: Collection[str]) -> ColumnMap:
+        """The same map of fewer columns.
+
+        Args:
+            names: The columns that stay, as far as they are used.
+
+        Returns:
+            A map in which observations or actions may be empty.
+        """
+        return ColumnMap.of_roles(
+            [name for name in self.observations if name in names],
+            [name for name in self.actions if name in names],
+            {role: name for role, name in self.singles.items() if name in names},
+        )
+
     @property
     def singles(self) -> dict[str, str]:
         """The columns that are neither observations nor actions, by what they hold."""
@@ -97,6 +114,46 @@ class ColumnMap:
     def used(self) -> tuple[str, ...]:
         """Every column that is named, observations first."""
         return (*self.observations, *self.actions, *self.singles.values())
+
+
+class UnclearColumnsError(InputError):
+    """Two readings of some columns are possible.
+
+    Args:
+        columns: Which.
+        message: The sentence.
+    """
+
+    def __init__(self, columns: Sequence[str], message: str) -> None:
+        super().__init__(message)
+        self.columns = tuple(columns)
+
+
+Columns = ColumnMap | Mapping[str, ColumnRole | str]
+"""What a person says of columns: a map of all that are read, or the roles of some."""
+
+
+def stated(columns: Columns | None) -> ColumnMap | Roles | None:
+    """What a person says of columns, checked.
+
+    Args:
+        columns: As it was given.
+
+    Returns:
+        The map, or what the columns' roles are; None where nothing is said.
+
+    Raises:
+        InputError: If it is neither, or a role is none.
+    """
+    if columns is None or isinstance(columns, ColumnMap):
+        return columns
+    must = "the map of columns must be a ColumnMap or a dict of roles"
+    advice = "give one, as {'brake': 'action', 'speed': 'feature:m/s'}"
+    require(columns, Mapping, must, advice)
+    for name, role in columns.items():
+        require(name, str, must, advice)
+        require(role, (str, ColumnRole), must, advice)
+    return as_roles(columns) or None
 
 
 @dataclass(frozen=True)
@@ -304,15 +361,15 @@ def unclear_columns(
     columns: Sequence[str],
     names: Sequence[str],
     what: str = "whether it is a feature",
-    roles: Sequence[str] = ("feature", "ignore"),
-) -> InputError:
+    roles: Sequence[str] = (),
+) -> UnclearColumnsError:
     """The error for columns that may be features or not.
 
     Args:
         columns: One or more.
         names: All columns.
         what: Is unclear of one.
-        roles: That it may have.
+        roles: That it may have; () for what its name suggests.
 
     Returns:
         An error that names them and says what to do.
@@ -322,7 +379,9 @@ def unclear_columns(
         if len(columns) == 1
         else f"it is unclear whether the columns {listed(columns)} are features"
     )
-    return InputError(f"{sentence}, among {listed(names)}; {settled_by(columns[0], *roles)}")
+    acted = vocabulary.ends_as_action(columns[0]) or stripped(columns[0], ACTIONS) is not None
+    cure = settled_by(columns[0], *(roles or (("feature", "ignore"), ("action", "feature"))[acted]))
+    return UnclearColumnsError(columns, f"{sentence}, among {listed(names)}; {cure}")
 
 
 def guess_notes(guess: Guess) -> tuple[str, ...]:
@@ -422,7 +481,10 @@ def _actions(names: Sequence[str]) -> tuple[str, ...]:
     several = tuple(name for name in names if stripped(name, ACTIONS) is not None) or tuple(
         name for name in names if re.fullmatch(r"a[ _]?\d+", name.strip(), re.I)
     )
-    return several or ((alone,) if alone is not None else ())
+    named = tuple(name for name in names if vocabulary.ends_as_action(name))
+    if several or (named and len(named) == 1):
+        return several or named
+    return (alone,) if alone is not None and not named else ()
 
 
 def _singles(names: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
@@ -477,6 +539,7 @@ def _unclear(name: str) -> bool:
     return (
         vocabulary.UNCLEAR.fullmatch(plain(name)) is not None
         or stripped(name, ACTIONS) is not None
+        or vocabulary.ends_as_action(name)
         or vocabulary.only_next(name)
     )
 

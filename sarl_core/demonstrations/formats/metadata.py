@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from msgspec import Struct
@@ -37,6 +38,7 @@ class Metadata:
         action_high: Upper bounds.
         bounds_from: Where those come from.
         notes: Sentences on how the data was read.
+        column_units: Units of a table's columns, as far as they are known.
     """
 
     env_id: str = ""
@@ -51,6 +53,7 @@ class Metadata:
     action_high: tuple[float, ...] = ()
     bounds_from: Literal["action space", "demonstrated values"] | None = None
     notes: tuple[str, ...] = ()
+    column_units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def is_discrete(self) -> bool | None:

@@ -28,6 +28,7 @@ from sarl_core.demonstrations.formats.columns import (
     require_clear,
 )
 from sarl_core.demonstrations.formats.csv_file import CsvTable, open_csv
+from sarl_core.demonstrations.formats.mapping.roles import settled_by
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.recording import Recording
@@ -44,8 +45,9 @@ from sarl_core.demonstrations.formats.tables import (
     observation_block,
     require_filled,
     require_numbers,
+    units_of,
 )
-from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action
+from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action, plain
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
 
@@ -191,6 +193,7 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         feature_names=block.names,
         indicators=block.indicators,
         action_words=label_words(taken.read, dimensions),
+        feature_units=units_of(block.columns, {}, table.metadata.column_units),
         action_names=action_names(dimensions) if others.named else None,
         **fields,
         guess_labels=done.ndim == 1,
@@ -329,12 +332,15 @@ def _own_actions(table: CsvTable, partner: str) -> tuple[str, ...]:
     """Columns of a file of observations that hold actions."""
     if not table.named:
         return ()
-    actions = guess_roles(table.names).columns.actions
+    columns = guess_roles(table.names).columns
+    actions = columns.actions
     doubtful = [name for name in table.names if is_perhaps_action(name)]
-    if doubtful and (not actions or set(actions) <= set(doubtful)):
+    # Numbers of episodes, or rewards, make it complete with an action.
+    complete = bool(columns.singles) and [plain(name) for name in actions] != ["a"]
+    if doubtful and (not actions or (set(actions) <= set(doubtful) and not complete)):
         raise InputError(
             f"it is unclear whether {listed(doubtful)} is its action or {partner!r} beside it "
-            "holds the actions; call it 'action' if it is, or 'obs_' and a name"
+            f"holds the actions; {settled_by(doubtful[0], 'action', 'feature')}"
         )
     return actions
 

@@ -46,6 +46,7 @@ class Recording:
         observation_columns: What the d columns are called in messages.
         action_columns: What the m columns are called in messages.
         feature_names: d names, None where the file has none.
+        feature_units: d units, None where the file has none.
         indicators: What each of the d says of a column of words, or None; () where none does.
         action_words: What the numbers of each of the m stand for, () where they are numbers.
         action_names: m names, None where the file has none.
@@ -68,6 +69,7 @@ class Recording:
     observation_columns: tuple[str, ...]
     action_columns: tuple[str, ...]
     feature_names: tuple[str, ...] | None = None
+    feature_units: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
     indicators: tuple[Indicator | None, ...] = ()
     action_words: tuple[tuple[str, ...], ...] = ()
@@ -208,6 +210,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
             observations=recording.observations[:, features.places],
             observation_columns=features.put(recording.observation_columns),
             feature_names=described.feature_names,
+            feature_units=recording.feature_units and features.put(recording.feature_units),
             indicators=features.put(recording.indicators),
             metadata=replace(metadata, features=features.put(metadata.features)),
         )
@@ -337,9 +340,10 @@ def _many_labels_note(columns: NDArray[Any], names: Sequence[str]) -> str | None
     for name, column in zip(names, columns, strict=True):
         different = len(np.unique(column))
         if different > FEW_VALUES:
+            say = "write it with a decimal point (26.0), or map it as a continuous action"
             return (
                 f"{name} holds {different:,} different whole numbers and was taken as so many "
-                "labels; if it is an amount, as a percentage, write it with a decimal point (26.0)"
+                f"labels; if it is an amount, as a percentage, {say}"
             )
     return None
 
@@ -355,10 +359,11 @@ def _features(recording: Recording, described: EnvironmentDescription | None) ->
     indicators = recording.indicators or None
     if described is not None and (names is None or only_counts(names)):
         names = described.feature_names
+    units = recording.feature_units
     if described is not None and names == described.feature_names:
-        units = described.feature_units
-        return {"feature_names": names, "feature_units": units, "indicators": indicators}
-    return {"feature_names": names, "feature_units": None, "indicators": indicators}
+        own = units or ("",) * len(described.feature_units)
+        units = tuple(one or two for one, two in zip(own, described.feature_units, strict=True))
+    return {"feature_names": names, "feature_units": units, "indicators": indicators}
 
 
 def _action_names(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.formats.columns import ColumnMap
+from sarl_core.demonstrations.formats.columns import ColumnMap, Columns, stated
 from sarl_core.demonstrations.formats.hubs.hub import OpenedTable, open_hub
 from sarl_core.demonstrations.formats.hubs.minari import MAIN_FILE, METADATA
 from sarl_core.demonstrations.formats.kinds import (
@@ -19,6 +20,8 @@ from sarl_core.demonstrations.formats.kinds import (
     format_of,
     unpacked,
 )
+from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview, previewed
+from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.naming import naming, naming_both
 from sarl_core.demonstrations.formats.pair import (
     alone_note,
@@ -39,7 +42,7 @@ from sarl_core.demonstrations.formats.sets.file_set import (
     files_in_folder,
 )
 from sarl_core.demonstrations.formats.sets.table_set import open_tables
-from sarl_core.demonstrations.formats.tables import recording_from_table
+from sarl_core.demonstrations.formats.tables import Table, recording_from_table
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require
@@ -47,6 +50,7 @@ from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 
 Content = bytes | bytearray | memoryview | BinaryIO
+Source = str | Path | Content | list[tuple[Content, str]]
 _PATTERN = frozenset("*?[")
 
 
@@ -54,7 +58,7 @@ def load_demonstrations(
     path: str | Path | Sequence[str | Path],
     *,
     env_id: EnvironmentOrId | None = None,
-    columns: ColumnMap | None = None,
+    columns: Columns | None = None,
 ) -> Demonstrations:
     """Load demonstrations from a file, a folder, or several files.
 
@@ -65,7 +69,9 @@ def load_demonstrations(
             columns; several such tables; or a pattern as `runs/*.csv` that names them. Where no
             column numbers the episodes, each of several files is one.
         env_id: Environment to take spaces, names and bounds from where the file has none.
-        columns: Which columns of a table hold what; None to go by their names.
+        columns: Which columns of a table hold what: a `ColumnMap` of all that are read, or the
+            roles of some, as `{"brake": "action", "speed": "feature:m/s"}`; the others, and None,
+            go by their names.
 
     Returns:
         The demonstrations; their `notes` say what had to be guessed.
@@ -73,9 +79,7 @@ def load_demonstrations(
     Raises:
         InputError: If the file cannot be used: one sentence with file, column and first row.
     """
-    if columns is not None:
-        must = "the map of columns must be a ColumnMap"
-        require(columns, ColumnMap, must, "make one, of sarl_core.demonstrations.formats")
+    columns = stated(columns)
     description = describe_environment(env_id) if env_id else None
     if isinstance(path, Sequence) and not isinstance(path, str):
         paths = [as_path(one) for one in path]
@@ -115,7 +119,7 @@ def read_demonstrations(
     name: str,
     *,
     env_id: EnvironmentOrId | None = None,
-    columns: ColumnMap | None = None,
+    columns: Columns | None = None,
     companion: tuple[Content, str] | None = None,
 ) -> Demonstrations:
     """Read demonstrations from what was uploaded.
@@ -133,6 +137,7 @@ def read_demonstrations(
     Raises:
         InputError: As `load_demonstrations`.
     """
+    columns = stated(columns)
     description = describe_environment(env_id) if env_id else None
     with naming(name):
         content = _bytes(data)
@@ -142,9 +147,8 @@ def read_demonstrations(
     with naming(other_name):
         other_content = _bytes(other)
     if columns is not None:
-        raise InputError(
-            f"{name}: columns are mapped in one table, not in a pair of files; give one of the two"
-        )
+        with naming(name):
+            raise _no_pair_mapped()
     if holds_actions(name) and not holds_actions(other_name):
         return _read_pair((other_content, content), (other_name, name), description)
     return _read_pair((content, other_content), (name, other_name), description)
@@ -178,7 +182,7 @@ def read_files(
     files: Sequence[tuple[Content, str]],
     *,
     env_id: EnvironmentOrId | None = None,
-    columns: ColumnMap | None = None,
+    columns: Columns | None = None,
 ) -> Demonstrations:
     """Read demonstrations from files that were uploaded together.
 
@@ -194,6 +198,7 @@ def read_files(
     Raises:
         InputError: As `load_demonstrations`.
     """
+    columns = stated(columns)
     first, *others = files
     if not others:
         return read_demonstrations(*first, env_id=env_id, columns=columns)
@@ -204,9 +209,7 @@ def read_files(
         return _read_set(_given(files), description, columns)
 
 
-def table_columns(
-    source: str | Path | Content | list[tuple[Content, str]], name: str | None = None
-) -> tuple[str, ...]:
+def table_columns(source: Source, name: str | None = None) -> tuple[str, ...]:
     """Columns of a tabular file, or of several, for a person to map.
 
     Args:
@@ -220,28 +223,52 @@ def table_columns(
     Raises:
         InputError: If the file cannot be opened.
     """
+    with _opened_table(source, name) as table:
+        return table.names if table is not None else ()
+
+
+def preview_columns(
+    source: Source, name: str | None = None, *, columns: Roles | None = None
+) -> tuple[ColumnPreview, ...]:
+    """What the columns of a tabular file, or of several, hold and seem to be, to be mapped.
+
+    Args:
+        source: As of `table_columns`.
+        name: Likewise.
+        columns: What was said of some of them already.
+
+    Returns:
+        One entry a column; () for what has no columns (.npz).
+
+    Raises:
+        InputError: If the file cannot be opened, or what was said does not fit it.
+    """
+    with _opened_table(source, name) as table:
+        return previewed(table, columns or {}) if table is not None else ()
+
+
+@contextmanager
+def _opened_table(source: Source, name: str | None) -> Iterator[Table | None]:
+    """The table in what `table_columns` takes; errors in it begin with the file's name."""
     if isinstance(source, list):
         if len(source) > 1:
-            return () if _are_pair([each for _, each in source]) else _columns(_given(source))
+            yield None if _are_pair([each for _, each in source]) else _table_of(_given(source))
+            return
         ((source, name),) = source
-    if isinstance(source, (str, Path)):
-        path = Path(source)
-        name = name or str(path)
-        with naming(name):
-            files = _files_of(path)
-            if files is not None:
-                return _columns(files)
-            content = _content(path)
-    else:
-        name = name or "the file"
-        with naming(name):
-            content = _bytes(source)
+    on_disk = Path(source) if isinstance(source, (str, Path)) else None
+    name = name or str(on_disk or "the file")
     with naming(name):
+        files = None if on_disk is None else _files_of(on_disk)
+        if files is not None:
+            yield _table_of(files)
+            return
+        content = _content(Path(source)) if isinstance(source, (str, Path)) else _bytes(source)
         if extension_of(name) == ZIP:
-            return _columns(files_in_archive(unpacked(content, name), name))
+            yield _table_of(files_in_archive(unpacked(content, name), name))
+            return
         form = format_of(name)
         content = unpacked(content, name)
-        return form.open_table(content).names if form.open_table is not None else ()
+        yield form.open_table(content) if form.open_table is not None else None
 
 
 def _named_by(path: Path) -> list[Path]:
@@ -303,16 +330,18 @@ def _opened_set(files: FileSet) -> Recording | OpenedTable:
     return OpenedTable(table, notes=notes)
 
 
-def _columns(files: FileSet) -> tuple[str, ...]:
+def _table_of(files: FileSet) -> Table | None:
     opened = _opened_set(files)
-    return opened.table.names if isinstance(opened, OpenedTable) else ()
+    return opened.table if isinstance(opened, OpenedTable) else None
 
 
 def _read_set(
-    files: FileSet, description: EnvironmentDescription | None, columns: ColumnMap | None
+    files: FileSet, description: EnvironmentDescription | None, columns: ColumnMap | Roles | None
 ) -> Demonstrations:
     pair = pair_among(files.sizes)
-    if pair is not None and columns is None:
+    if pair is not None:
+        if columns is not None:
+            raise _no_pair_mapped()
         contents = files.contents(pair)
         return _read_pair((contents[pair[0]], contents[pair[1]]), pair, description)
     opened = _opened_set(files)
@@ -332,7 +361,7 @@ def _read_named(
     content: memoryview,
     name: str,
     description: EnvironmentDescription | None,
-    columns: ColumnMap | None,
+    columns: ColumnMap | Roles | None,
 ) -> Demonstrations:
     with naming(name):
         return _read(content, name, description, columns)
@@ -342,7 +371,7 @@ def _read(
     content: memoryview,
     name: str,
     description: EnvironmentDescription | None,
-    columns: ColumnMap | None,
+    columns: ColumnMap | Roles | None,
 ) -> Demonstrations:
     if extension_of(name) == ZIP:
         return _read_set(files_in_archive(unpacked(content, name), name), description, columns)
@@ -383,6 +412,12 @@ def _read_pair(
         recording = read_pair(*contents, names)
         with naming(f"{names[0]} with {names[1]}"):
             return _noted(to_demonstrations(recording, description), pair_note(names))
+
+
+def _no_pair_mapped() -> InputError:
+    return InputError(
+        "columns are mapped in one table, not in a pair of files; give one of the two"
+    )
 
 
 def _noted(demonstrations: Demonstrations, note: str) -> Demonstrations:

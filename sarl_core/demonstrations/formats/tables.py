@@ -25,6 +25,11 @@ from sarl_core.demonstrations.formats.columns import (
     require_clear,
     unclear_columns,
 )
+from sarl_core.demonstrations.formats.mapping.action_roles import (
+    stated_actions,
+    with_stated_actions,
+)
+from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
@@ -110,13 +115,13 @@ def check_names(names: Sequence[str]) -> None:
 
 
 def recording_from_table(
-    table: Table, columns: ColumnMap | None, description: EnvironmentDescription | None
+    table: Table, columns: ColumnMap | Roles | None, description: EnvironmentDescription | None
 ) -> Recording:
     """Read the columns of a table that are needed.
 
     Args:
         table: The opened file.
-        columns: Which columns hold what; None to go by their names.
+        columns: Which columns hold what, or what some of them are; None to go by their names.
         description: The environment, if known; it tells a table without names apart.
 
     Returns:
@@ -128,8 +133,11 @@ def recording_from_table(
     metadata = table.metadata
     guessed = False
     notes: tuple[str, ...] = ()
-    if columns is not None:
+    if isinstance(columns, ColumnMap):
         guess = given(columns, "as it was mapped")
+        metadata = _without_names(metadata)
+    elif columns is not None:
+        guess, guessed = guess_roles(table.names, columns), True
         metadata = _without_names(metadata)
     elif metadata.features and metadata.action_names:
         guess = given(_own_columns(table.names, metadata), "the file itself says so")
@@ -137,6 +145,7 @@ def recording_from_table(
         guess, notes = _unnamed(table.names, description)
     else:
         guess, guessed = guess_roles(table.names), True
+    if guessed:
         if guess.unclear:
             guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
         require_clear(guess, table.names)
@@ -156,20 +165,22 @@ def recording_from_table(
     called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
     block = observation_block(read, chosen.observations, called)
     coarse = coarse_notes(table, block, rows)
+    actions = stated_actions(read, chosen.actions, guess.roles, rows)
     return Recording(
         observations=block.values,
-        actions=action_block(read, chosen.actions),
+        actions=action_block(actions, chosen.actions),
         observation_columns=tuple(f"column {name!r}" for name in block.columns),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
         feature_names=block.names,
+        feature_units=units_of(block.columns, guess.roles, table.metadata.column_units),
         indicators=block.indicators,
-        action_words=label_words(read, chosen.actions),
+        action_words=label_words(actions, chosen.actions),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
         **fields,
         rows=rows,
-        guess_labels=not _is_vector(chosen.actions),
+        guess_labels=actions is read and not _is_vector(chosen.actions),
         names={role: f"column {name!r}" for role, name in chosen.singles.items()},
-        metadata=metadata,
+        metadata=with_stated_actions(metadata, chosen.actions, guess.roles),
         notes=(*notes, *marked, *dropped, *coarse),
         columns=guess.uses(table.names),
     )
@@ -249,6 +260,25 @@ def names_of_features(guess: Guess, named: bool) -> tuple[str, ...] | None:
     """What the features are called; a word that all names begin with says nothing."""
     columns = guess.columns.observations
     return feature_names(columns) if guess.prefixed or not named else columns
+
+
+def units_of(
+    columns: Sequence[str], roles: Roles, units: Mapping[str, str]
+) -> tuple[str, ...] | None:
+    """The units of features; what says which word a column holds has none.
+
+    Args:
+        columns: Of the features.
+        roles: What a person said of columns.
+        units: What the file says of them.
+
+    Returns:
+        One a column, "" where there is none; None where there is none at all.
+    """
+    known = tuple(
+        (roles[name].unit if name in roles else "") or units.get(name, "") for name in columns
+    )
+    return known if any(known) else None
 
 
 def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:

@@ -133,6 +133,13 @@ def is_perhaps_action(name: str) -> bool:
     )
 
 
+def ends_as_action(name: str) -> bool:
+    """Whether a name says whose action a column holds, as "operator_action"."""
+    return re.fullmatch(r".+_(actions?|acts?)", plain(name)) is not None and not (
+        says_before(name) or only_next(name)
+    )
+
+
 def only_next(name: str) -> bool:
     """Whether a name says "next", be there a column that it follows or not."""
     return bool(_ONLY_NEXT.intersection(_words(name)))

@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
 from sarl_core.environments.environment import Environment
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -103,6 +104,7 @@ def mining_command(
     given: Demonstrations,
     *,
     env: Environment | None = None,
+    columns: Roles | None = None,
 ) -> str | None:
     """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
 
@@ -112,6 +114,7 @@ def mining_command(
         demonstrations: The file of the demonstrations.
         given: The demonstrations.
         env: That was named when they were read, which gives names and bounds; None for none.
+        columns: What was said of their columns.
 
     Returns:
         One line; None for rules from other data, of a budget, tried on episodes kept aside, or
@@ -136,6 +139,7 @@ def mining_command(
             "--lift": threshold_text(limits.lift) if limits.lift else None,
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
+            "--column": as_options(columns or {}),
             **({} if env is None else env.options),
             "--out": rules,
         },

@@ -56,6 +56,7 @@ _GRAMMAR = (
     f"{', '.join(get_args(RoleName))}; a feature may have a unit (speed=feature:m/s), and an "
     "action may be labels or continuous with or without bounds (throttle=action:continuous:0:100)"
 )
+_MOST_OFFERED = 3  # columns of which a sentence says what to do
 _FORMAT, _VERSION = "sarl-columns", 1
 
 
@@ -161,8 +162,23 @@ def roles_from_options(options: Iterable[str]) -> dict[str, ColumnRole]:
     return roles
 
 
+def as_options(roles: Roles) -> list[str]:
+    """Roles as ``--column`` takes them."""
+    return [f"{name}={role}" for name, role in roles.items()]
+
+
 def as_roles(given: Mapping[str, ColumnRole | str]) -> dict[str, ColumnRole]:
-    """Roles of which some are written as after ``--column NAME=``."""
+    """Roles of which some may be written as after ``--column NAME=``.
+
+    Args:
+        given: For each column its role.
+
+    Returns:
+        The same as roles.
+
+    Raises:
+        InputError: If one is none.
+    """
     return {
         name: role_from_text(role) if isinstance(role, str) else role
         for name, role in given.items()
@@ -201,19 +217,26 @@ def load_roles(path: Path) -> dict[str, ColumnRole]:
     try:
         for name, value in conformed(read_object(path, advice), _File).columns.items():
             try:
-                said = conformed({"role": value} if isinstance(value, str) else value, _Role)
+                if isinstance(value, str) and value != UNCLEAR:
+                    roles[name] = role_from_text(value)
+                    continue
+                said = conformed({"role": value} if value == UNCLEAR else value, _Role)
                 if said.role == UNCLEAR:
                     raise InputError(
-                        "what it is is left open; write one of the roles "
+                        "it is left open what it is; write one of the roles "
                         f"{', '.join(get_args(RoleName))}"
                     )
                 roles[name] = ColumnRole(
                     cast("RoleName", said.role), said.unit, said.kind, said.low, said.high
                 )
-            except (InputError, MisfitError) as error:
-                raise MisfitError(f"of the column {quoted(name)}: {error}") from error
+            except MisfitError as error:
+                raise MisfitError(f"of the column {quoted(name)} {error}") from error
+            except InputError as error:
+                raise InputError(f"of the column {quoted(name)}: {error}") from error
     except MisfitError as error:
         raise InputError(f"{path}: {error}; {advice}") from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     return roles
 
 
@@ -272,15 +295,18 @@ def require_known(roles: Roles, names: Sequence[str]) -> None:
         single[one.role] = name
 
 
-def settled_by(name: str, *roles: str) -> str:
+def settled_by(columns: str | Sequence[str], *roles: str) -> str:
     """What to do where it is unclear what a column is.
 
     Args:
-        name: The column.
+        columns: The column, or several of which each may have the role.
         roles: That it may have.
 
     Returns:
         The end of a sentence.
     """
-    options = " or ".join(f"--column {shlex.quote(f'{name}={role}')}" for role in roles)
+    names = [columns] if isinstance(columns, str) else columns[:_MOST_OFFERED]
+    options = " or ".join(
+        f"--column {shlex.quote(f'{name}={role}')}" for name in names for role in roles
+    )
     return f"say which with {options} (on the page Demonstrations: in the form)"

@@ -1,0 +1,180 @@
+"""A table as a person looks at it to say which column is what: first values, kinds and a guess."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.formats.column_values import counters, settle
+from sarl_core.demonstrations.formats.columns import (
+    ColumnMap,
+    Guess,
+    UnclearColumnsError,
+    guess_roles,
+)
+from sarl_core.demonstrations.formats.mapping.roles import ActionKind, ColumnRole, RoleName, Roles
+from sarl_core.demonstrations.requirements import FEW_VALUES, is_whole, without_fraction
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.demonstrations.formats.tables import Table, TableColumn
+
+_FIRST = 4  # values that are shown of a column
+_NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class ColumnPreview:
+    """One column of a table.
+
+    Attributes:
+        name: As the table calls it.
+        holds: What kind of values, in words.
+        first: The first few of them.
+        role: What it seems to be; None where two readings are possible.
+        why: In words.
+    """
+
+    name: str
+    holds: str
+    first: tuple[str, ...]
+    role: ColumnRole | None
+    why: str
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return asdict(self)
+
+
+def previewed(table: Table, roles: Roles) -> tuple[ColumnPreview, ...]:
+    """Look at every column of a table.
+
+    Args:
+        table: The opened file.
+        roles: What a person said of some columns.
+
+    Returns:
+        One entry a column.
+
+    Raises:
+        InputError: If what was said does not fit the table.
+    """
+    guess = guess_roles(table.names, roles)
+    read = _readable(table)
+    values = {name: column.values for name, column in read.items()}
+    words = {name for name, column in read.items() if column.words}
+    guess, unclear = _settled(guess, values, words)
+    previews = []
+    for name in table.names:
+        role = None if name in unclear else _role(guess, name, table)
+        if role == ColumnRole("action") and name in read:
+            role = ColumnRole("action", kind=_action_kind(guess, read[name]))
+        why = unclear.get(name) or guess.reasons.get(name) or guess.unused.get(name, "")
+        holds = _kind(read[name]) if name in read else "neither numbers nor words"
+        first = _first(read[name]) if name in read else ()
+        previews.append(ColumnPreview(name, holds, first, role, why))
+    return tuple(previews)
+
+
+def _readable(table: Table) -> dict[str, TableColumn]:
+    """The columns that can be read at all."""
+    try:
+        return table.read(ColumnMap((), table.names))
+    except InputError:
+        read: dict[str, TableColumn] = {}
+        for name in table.names:
+            try:
+                read |= table.read(ColumnMap((), (name,)))
+            except InputError:
+                continue
+        return read
+
+
+def _settled(guess: Guess, values: dict[str, NDArray[Any]]) -> tuple[Guess, dict[str, str]]:
+    """What the values make of a guess, and why some columns are left open."""
+    counted = counters(
+        {name: values[name] for name in guess.unclear if name in values and name not in words}
+    )
+    unclear = {name: "it may be a feature or not" for name in guess.unclear if name not in counted}
+    guess = replace(guess, unclear=(), unused={**guess.unused, **counted})
+    while True:
+        columns = guess.columns
+        guess = replace(guess, columns=columns.only([n for n in columns.used if n in values]))
+        try:
+            held = {name: values[name] for name in guess.columns.used}
+            return settle(guess, held, words), unclear
+        except UnclearColumnsError as error:
+            unclear |= dict.fromkeys(error.columns, str(error).partition(";")[0])
+            columns = guess.columns
+            others = [name for name in columns.used if name not in error.columns]
+            guess = replace(guess, columns=columns.only(others))
+        except InputError:
+            return guess, unclear
+
+
+def _role(guess: Guess, name: str, table: Table) -> ColumnRole | None:
+    """What a column seems to be, with its unit."""
+    if name in guess.roles:
+        return guess.roles[name]
+    columns = guess.columns
+    if name in columns.observations:
+        return ColumnRole("feature", unit=table.metadata.column_units.get(name, ""))
+    if name in columns.actions:
+        return ColumnRole("action")
+    single: dict[str, RoleName] = {
+        "episode": "episode",
+        "step": "step",
+        "reward": "reward",
+        "terminated": "terminated",
+        "truncated": "truncated",
+        "first": "first",
+        "last": "last",
+    }
+    for role, column in columns.singles.items():
+        if column == name:
+            return ColumnRole(single[role])
+    return ColumnRole("time" if guess.unused.get(name) == "it is a time" else "ignore")
+
+
+def _action_kind(guess: Guess, column: TableColumn) -> ActionKind | None:
+    """How the actions would be read."""
+    values = _present(column)
+    if column.words or values.dtype.kind == "b":
+        return None
+    several = len(guess.columns.actions) > 1
+    few = not several and is_whole(values) and len(np.unique(values)) <= FEW_VALUES
+    return "labels" if values.dtype.kind in "iu" or few else "continuous"
+
+
+def _kind(column: TableColumn) -> str:
+    values = _present(column)
+    if not len(values):
+        return _NOTHING
+    if column.words:
+        return "words"
+    if values.dtype.kind == "b":
+        return "true or false"
+    return "whole numbers" if without_fraction(values).all() else "numbers"
+
+
+def _present(column: TableColumn) -> NDArray[Any]:
+    return column.values if column.missing is None else column.values[~column.missing]
+
+
+def _first(column: TableColumn) -> tuple[str, ...]:
+    values = column.values[:_FIRST]
+    missing = np.zeros(len(values), bool) if column.missing is None else column.missing[:_FIRST]
+    return tuple(
+        "" if none else _text(value, column.words)
+        for value, none in zip(values.tolist(), missing.tolist(), strict=True)
+    )
+
+
+def _text(value: bool | float, words: tuple[str, ...]) -> str:
+    if words:
+        return words[int(value)]
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
