@@ -188,3 +188,22 @@ def test_a_file_of_roles_is_refused_by_what_is_wrong(
         load_roles(path)
     assert str(error.value).startswith(f"{path}: ")
     assert fragment in str(error.value)
+
+
+def test_texts_number_the_episodes_in_the_order_of_the_file():
+    runs = [f"run_{10 - episode}" for episode in EPISODE]
+    read = read_demonstrations(table(run=runs, speed=SPEED, action=BRAKE), "rig.csv")
+    assert read.episodes.tolist() == EPISODE.tolist()
+    assert "'run_10' first" in " ".join(read.notes)
+    scattered = [f"run_{episode % 2}" for episode in EPISODE]
+    sentence = refusal(table(episode=scattered, speed=SPEED, action=BRAKE))
+    assert "comes back" in sentence
+
+
+def test_words_are_labels_and_no_amounts():
+    content = table(speed=SPEED, operator=[("hold", "go")[one] for one in BRAKE], run=EPISODE)
+    read = read_demonstrations(content, "rig.csv", columns={"operator": "action:labels"})
+    assert read.action_dimensions[0].labels == ("go", "hold")
+    assert "holds words" in refusal(content, {"operator": "action:continuous"})
+    (preview,) = [one for one in preview_columns(content, "rig.csv") if one.name == "operator"]
+    assert (preview.holds, set(preview.first)) == ("words", {"hold", "go"})

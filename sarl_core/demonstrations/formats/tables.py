@@ -158,8 +158,7 @@ def recording_from_table(
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
     require_filled(read, rows)
-    require_numbers(read, chosen.singles.values(), rows)
-    single = {role: read[name].values for role, name in chosen.singles.items()}
+    single, numbered = singles_of(read, chosen, rows)
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
     called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
@@ -181,9 +180,37 @@ def recording_from_table(
         guess_labels=actions is read and not _is_vector(chosen.actions),
         names={role: f"column {name!r}" for role, name in chosen.singles.items()},
         metadata=with_stated_actions(metadata, chosen.actions, guess.roles),
-        notes=(*notes, *marked, *dropped, *coarse),
+        notes=(*notes, *numbered, *marked, *dropped, *coarse),
         columns=guess.uses(table.names),
     )
+
+
+def singles_of(
+    read: Mapping[str, TableColumn], columns: ColumnMap, rows: NDArray[np.int64] | None = None
+) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
+    """The values of columns that are neither features nor actions, by what they are.
+
+    Args:
+        read: The columns by name.
+        columns: Which is what.
+        rows: The rows they had in the file, from 0; None if they are those.
+
+    Returns:
+        The values, each of shape (N,), and a note where words became the numbers of episodes.
+
+    Raises:
+        InputError: If one holds words, and is not that of the episodes.
+    """
+    singles = columns.singles
+    episode = singles.get("episode")
+    require_numbers(read, [name for name in singles.values() if name != episode], rows)
+    values = {role: read[name].values for role, name in singles.items()}
+    if episode is None or not read[episode].words:
+        return values, ()
+    _, first, codes = np.unique(values["episode"], return_index=True, return_inverse=True)
+    values["episode"] = np.argsort(np.argsort(first))[codes]  # in the order of the file
+    word = read[episode].words[read[episode].values[0]]
+    return values, (f"the episodes of column {episode!r} are numbered from 0, {word!r} first",)
 
 
 def episode_fields(

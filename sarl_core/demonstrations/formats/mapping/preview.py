@@ -94,7 +94,9 @@ def _readable(table: Table) -> dict[str, TableColumn]:
         return read
 
 
-def _settled(guess: Guess, values: dict[str, NDArray[Any]]) -> tuple[Guess, dict[str, str]]:
+def _settled(
+    guess: Guess, values: dict[str, NDArray[Any]], words: set[str]
+) -> tuple[Guess, dict[str, str]]:
     """What the values make of a guess, and why some columns are left open."""
     counted = counters(
         {name: values[name] for name in guess.unclear if name in values and name not in words}
