@@ -39,3 +39,12 @@ def test_no_id_of_a_rule_is_a_formula(lander_trees: tuple[PolicyTree, ...]) -> N
     harmful = replace(rules, rules=(replace(rules.rules[0], id="=cmd|' /C calc'!A0"),))
     (row,) = csv.DictReader(io.StringIO(rules_to_csv(harmful)))
     assert row["id"].startswith("'=")
+
+
+def test_categories_are_cells_too():
+    words = pd.Series(["=1+1", "'=1+1", "brake", "=1+1"], dtype="category")
+    cells = safe_cells(
+        pd.DataFrame({"word": words, "code": pd.Series([3, 1, 3, 1]).astype("category")})
+    )
+    assert cells["word"].tolist() == ["'=1+1", "'=1+1", "brake", "'=1+1"]
+    assert cells["code"].tolist() == [3, 1, 3, 1]

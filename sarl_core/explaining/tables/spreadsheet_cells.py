@@ -41,7 +41,12 @@ def safe_cells(frame: pd.DataFrame) -> pd.DataFrame:
 
     safe = frame.rename(columns=lambda name: safe_cell(str(name)))
     for name in safe.columns:
-        if not pd.api.types.is_numeric_dtype(safe[name]):
+        kind = safe[name].dtype
+        if isinstance(kind, pd.CategoricalDtype) and all(
+            isinstance(one, str) for one in kind.categories
+        ):
+            safe[name] = safe[name].map(safe_cell)  # each category once
+        elif not pd.api.types.is_numeric_dtype(safe[name]):
             safe[name] = [
                 safe_cell(one) if isinstance(one, str) else one for one in safe[name].tolist()
             ]
