@@ -188,6 +188,35 @@ def safety_facts(
     return [(what, text) for what, text in facts if text]
 
 
+def safety_cells(summary: Mapping[str, float], episodes: int) -> dict[str, str]:
+    """The same in a row of a table.
+
+    Args:
+        summary: What `Episodes.summary` gave, or a file keeps of it.
+        episodes: How many there are.
+
+    Returns:
+        `Failures`, `Failures, 95 %`, `Cost` with its interval, and `Worst tenth`, the mean of
+        their returns; "–" where it is not known, or no failure can be.
+    """
+    rate = rate_in(summary, episodes)
+    if rate is not None and rate.unknown == rate.of:
+        rate = None
+    cost = summary.get("cost") if cost_text(summary) else None
+    between = ""
+    if "cost_low" in summary:
+        between = f" ({_number(summary['cost_low'])} to {_number(summary['cost_high'])})"
+    worst = summary.get("worst_tenth")
+    return {
+        "Failures": "–" if rate is None else at_least_text(rate.rate, rate.unknown),
+        "Failures, 95 %": "–"
+        if rate is None
+        else f"{share_text(rate.low)} to {share_text(rate.high)}",
+        "Cost": "–" if cost is None else f"{_number(cost)}{between}",
+        "Worst tenth": "–" if worst is None else _number(worst),
+    }
+
+
 def _number(value: float) -> str:
     """With as many digits as tell something."""
     size = abs(value)

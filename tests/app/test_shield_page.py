@@ -69,7 +69,7 @@ def test_every_agent_with_every_shield_is_what_the_library_gives() -> None:
         flips = f"{50 * episodes.flips.sum() / episodes.lengths.sum():.2f}"  # 50 steps a second
         assert row["Flips a second"] == ("–" if arm.rules is None else flips)
     assert shown["novice, unfiltered"]["Rules"] == f"{len(unfiltered):,}"
-    assert shown["novice, no shield"]["Crashes"] == "100 %"
+    assert shown["novice, no shield"]["Failures"] == "100 %"
     assert "the typical return of the novice rises" in texts(app)
     for agent in ("novice", "expert"):
         (told,) = (line for line in texts(app).splitlines() if f"return of the {agent} " in line)

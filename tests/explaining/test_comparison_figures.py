@@ -74,13 +74,13 @@ def test_whoever_never_crashes_says_so_where_others_say_how_often(comparison: Co
     comparison = replace(comparison, episodes=(*novices, upright))
     texts = [point.text[0] for point in typical_figure(comparison).data]
     assert [text[text.index("(") :] for text in texts] == [
-        "(100 % crash)",
-        "(100 % crash)",
-        "(0 % crash)",
+        "(100 % fail)",
+        "(100 % fail)",
+        "(0 % fail)",
     ]
     unknown = tuple(replace(found, env_id="Unknown-v0") for found in comparison.episodes)
     for point in typical_figure(replace(comparison, episodes=unknown)).data:
-        assert "crash" not in point.text[0]
+        assert "fail" not in point.text[0]
 
 
 def test_names_are_text_and_not_markup(comparison: Comparison) -> None:

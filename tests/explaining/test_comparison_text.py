@@ -29,14 +29,14 @@ def test_a_rise_a_fall_and_neither(alone: Episodes) -> None:
     assert verdict("novice", "the filtered rules", alone, better) == (
         "With the filtered rules the typical return of the novice rises from 22 to 500 (its mean "
         "from 22 to 500, a difference of 478, 95 % interval 477 to 480), and 0 % instead of 100 % "
-        "of its episodes end in a crash."
+        "of its episodes fail."
     )
     fall = verdict("expert", "the rules", better, alone)
     assert "falls from 500 to 22" in fall
     assert fall.endswith("these rules harm it.")
     assert verdict("novice", "the rules", alone, like).endswith(
         "does not clearly change (22, without them 22; its mean from 22 to 22, a difference of 0, "
-        "95 % interval −1 to 2), and 100 % of its episodes end in a crash, as without."
+        "95 % interval −1 to 2), and 100 % of its episodes fail, as without."
     )
 
 
@@ -50,7 +50,7 @@ def test_harm_among_the_worst_episodes_is_told_as_harm() -> None:
     worse = replace(before, returns=after, terminated=np.isin(np.arange(20), [1, 4, 9, 13, 17]))
     told = verdict("expert", "the unfiltered rules", before, worse)
     assert "falls" in told
-    assert "25 % instead of 0 % of its episodes end in a crash" in told
+    assert "25 % instead of 0 % of its episodes fail" in told
     assert told.endswith("these rules harm it.")
 
 
@@ -60,7 +60,7 @@ def test_more_crashes_alone_are_harm() -> None:
     worse = with_returns(safe, [101.0, 299.0] * 10, 9)
     told = verdict("expert", "the rules", before, worse)
     assert "does not clearly change" in told
-    assert told.endswith("45 % instead of 0 % of its episodes end in a crash: these rules harm it.")
+    assert told.endswith("45 % instead of 0 % of its episodes fail: these rules harm it.")
 
 
 def test_a_typical_return_that_hides_the_change_is_not_the_last_word() -> None:
@@ -82,7 +82,7 @@ def test_few_episodes_are_told_with_a_caution(alone: Episodes) -> None:
 
 def test_where_nothing_crashes_nothing_is_said_of_it(alone: Episodes) -> None:
     safe = with_returns(alone, [500.0] * 8, 0)
-    assert "crash" not in verdict("expert", "the rules", safe, safe)
+    assert "fail" not in verdict("expert", "the rules", safe, safe)
 
 
 def test_every_shield_is_told_the_best_one_first(alone: Episodes) -> None:
@@ -102,12 +102,12 @@ def test_every_shield_is_told_the_best_one_first(alone: Episodes) -> None:
         "the coarse",
     ]
     assert "rises to 305" in parts[1]
-    assert "75 % of its episodes crash" in parts[1]
+    assert "75 % of its episodes fail" in parts[1]
     assert "does not clearly change (22" in parts[2]
     assert "falls to 9" in parts[3]
     assert "these rules harm it" in parts[3]
     assert "harm" not in " ".join(parts[:3])
     safe = with_returns(alone, [500.0] * 8, 0)
     same = verdict_on_all("expert", safe, [("the rules", safe), ("the filtered rules", safe)])
-    assert "crash" not in same
+    assert "fail" not in same
     assert same.endswith("every episode has the same return with them and without).")

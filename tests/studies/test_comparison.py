@@ -115,7 +115,7 @@ def test_who_reaches_the_goal_has_not_crashed_and_nothing_is_said_of_failures(en
     assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
     assert not {"failures", "failure_rate", "cost"} & set(episodes.summary())
     assert "failed" not in episodes.to_dict()["episodes"][0]
-    assert "crash" not in verdict("novice", "the rules", episodes, episodes)
+    assert "fail" not in verdict("novice", "the rules", episodes, episodes)
 
 
 def test_where_failures_are_not_known_none_is_claimed() -> None:
@@ -126,7 +126,7 @@ def test_where_failures_are_not_known_none_is_claimed() -> None:
     assert not failure_known(episodes.env_id)
     assert episodes.failures is None
     assert comparison_row(Arm("a", "novice"), episodes)["crash_rate"] is None
-    assert "crash" not in verdict("novice", "the rules", episodes, episodes)
+    assert "fail" not in verdict("novice", "the rules", episodes, episodes)
 
 
 @pytest.mark.parametrize(

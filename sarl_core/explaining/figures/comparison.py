@@ -163,7 +163,7 @@ def typical_figure(
             x=[typical.iqm],
             y=[row],
             mode="markers+text",
-            text=[f"{typical.iqm:,.1f}{_crashing(episodes)}"],
+            text=[f"{typical.iqm:,.1f}{_failing(episodes)}"],
             textposition="top center",
             cliponaxis=False,
             marker={"color": style.colour, "size": 11, "symbol": style.symbol},
@@ -203,12 +203,12 @@ def typical_figure(
     return figure
 
 
-def _crashing(episodes: Episodes) -> str:
-    """How many episodes crash, beside a number that leaves out the worst ones."""
+def _failing(episodes: Episodes) -> str:
+    """How many episodes fail, beside a number that leaves out the worst ones."""
     rate = episodes.failures
     if rate is None or rate.unknown == rate.of:
         return ""
-    return f" ({at_least_text(rate.rate, rate.unknown)} crash)"
+    return f" ({at_least_text(rate.rate, rate.unknown)} fail)"
 
 
 def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any]:

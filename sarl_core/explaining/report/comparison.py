@@ -28,6 +28,8 @@ _MAX_BYTES = 16 * 2**20
 _MOST_ROWS = 200
 _HEADINGS = (
     "Failures",
+    "Cost",
+    "Worst tenth",
     "Against no shield",
     "Actions changed",
     "Freedom left",
@@ -60,7 +62,10 @@ class Result:
         covered: Share of steps at which a rule applied, None without a shield.
         crashes: Share of episodes that ended in failure, None where unknown.
         crash_ends: Its 95 % interval, None where unknown.
-        cut: Episodes that were cut off before their end; their failures are not among `crashes`.
+        cut: Episodes that were cut off before their end.
+        undecided: Episodes of which it is not known whether they failed; none of `crashes`.
+        cost: What an episode costs on average, with its 95 % interval; None where unknown.
+        worst_tenth: Mean return of the worst tenth of the episodes, None where unknown.
         freedom: What the rules left the agent to choose from, 0 to 1, None where unknown.
         gained: Return with the shield less the return without it on the same seeds, mean and 95 %
             interval; None where both were not run.
@@ -83,6 +88,9 @@ class Result:
     crashes: float | None
     crash_ends: tuple[float, float] | None = None
     cut: int = 0
+    undecided: int = 0
+    cost: MeanInterval | None = None
+    worst_tenth: float | None = None
     freedom: float | None = None
     gained: MeanInterval | None = None
     effect: str = ""
@@ -309,6 +317,11 @@ class _ResultRow(Struct):
     failure_low: Share | None = None
     failure_high: Share | None = None
     cut: Count | None = None
+    undecided: Count | None = None
+    cost: Number | None = None
+    cost_low: Number | None = None
+    cost_high: Number | None = None
+    worst_tenth: Number | None = None
     freedom: Share | None = None
     return_difference: Number | None = None
     difference_low: Number | None = None
@@ -334,6 +347,9 @@ class _ResultRow(Struct):
             crashes=self.failure_rate if self.crash_rate is None else self.crash_rate,
             crash_ends=_both(self.failure_low, self.failure_high),
             cut=self.cut or 0,
+            undecided=(self.cut or 0) if self.undecided is None else self.undecided,
+            cost=_gain(self.cost, self.cost_low, self.cost_high),
+            worst_tenth=self.worst_tenth,
             freedom=None if self.coverage is None else self.freedom,
             gained=_gain(self.return_difference, self.difference_low, self.difference_high),
             effect=self.effect or "",
@@ -360,15 +376,23 @@ def _policy(one: Result) -> str:
 
 def _crashes(one: Result) -> str:
     """The share of failures with its interval."""
-    if cannot_fail(one.env_id):
+    if one.crashes is None and cannot_fail(one.env_id):
         return _NONE
-    if one.crashes is None or one.cut == one.episodes:
+    if one.crashes is None or one.undecided == one.episodes:
         return _NOT_KNOWN
-    share = at_least_text(one.crashes, one.cut)
+    share = at_least_text(one.crashes, one.undecided)
     if one.crash_ends is None:
         return share
     low, high = map(share_text, one.crash_ends)
     return f"{share} ({low} to {high})"
+
+
+def _cost(one: Result) -> str:
+    """The cost with its interval, where it is not the failures themselves."""
+    if one.cost is None or one.cost.mean == one.crashes:
+        return _UNKNOWN
+    low, mean, high = map(number_text, (one.cost.low, one.cost.mean, one.cost.high))
+    return f"{mean} ({low} to {high})"
 
 
 def _gained(one: Result) -> str:
@@ -387,6 +411,8 @@ def _more(one: Result) -> tuple[str, ...]:
 
     return (
         _crashes(one),
+        _cost(one),
+        _UNKNOWN if one.worst_tenth is None else number_text(one.worst_tenth),
         _gained(one),
         share_or_unknown(one.changed),
         share_or_unknown(one.freedom),

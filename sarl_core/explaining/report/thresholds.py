@@ -20,6 +20,8 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import FILTERED, NAMED_SETTINGS, UNFILTERED, Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.rollouts.failures import rate_text
+from sarl_core.rollouts.statistics import Rate
 
 # Fine where the rules change fast: at small supports and high confidences.
 _SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
@@ -124,6 +126,21 @@ class _Reported(Struct):
     failure_low: Share | None = None
     failure_high: Share | None = None
     cut: Count | None = None
+    undecided: Count | None = None
+    worst_tenth: Number | None = None
+    cost: Number | None = None
+    cost_low: Number | None = None
+    cost_high: Number | None = None
+
+    @property
+    def rate(self) -> Rate | None:
+        """Of failures, where all is there that tells it."""
+        low, high = self.failure_low, self.failure_high
+        if self.failures is None or not self.episodes or low is None or high is None:
+            return None
+        unknown = self.undecided if self.undecided is not None else self.cut or 0
+        share = self.failures / self.episodes
+        return Rate(self.failures, self.episodes, share, low, high, unknown)
 
 
 def read_card(rules: Path) -> Mapping[str, Any] | None:
@@ -346,16 +363,15 @@ def _card_facts(card: _RuleSetCard) -> Iterator[tuple[str, str]]:
             + _with(", from {} to {}", reported.min, reported.max)
             + _with(", over {} episodes", reported.episodes),
         )
-    cut = _with(", {} of which were cut off before they could fail", reported.cut)
-    ends = [end and 100 * end for end in (reported.failure_low, reported.failure_high)]
-    failures = _with(
-        f"{{}} of {{}} episodes{cut} (95 % interval {{}} to {{}} %)",
-        reported.failures,
-        reported.episodes,
-        *ends,
-    )
-    if failures:
-        yield "Failures of an agent that follows the rules", failures
+    rate = reported.rate
+    if rate is not None:
+        yield "Failures of an agent that follows the rules", rate_text(rate)
+    if reported.worst_tenth is not None:
+        yield "Mean return of the worst tenth of them", number_text(reported.worst_tenth)
+    cost = _with("{} an episode", reported.cost)
+    if cost and not (rate and reported.cost == rate.rate):
+        between = _with(" (95 % interval {} to {})", reported.cost_low, reported.cost_high)
+        yield "Cost of an agent that follows the rules", cost + between
     if card.reported_on is not None:
         yield "Reported on", card.reported_on
     if card.seed is not None:

@@ -40,8 +40,8 @@ def recorder_columns(
     Returns:
         Column name to one value a row: the seed, the step, for each dimension what the agent
         wanted, what was done and the rule's name, then "Changed", "Outside", "Not checked" (why no
-        rule was asked), "Distance", "Reward" and the features, with their units. Where no
-        threshold was looked at, the distance is NaN.
+        rule was asked), "Distance", "Reward", "Failure" and "Cost" where the steps say so, and the
+        features, with their units. Where no threshold was looked at, the distance is NaN.
     """
     part = steps.take(rows)
     columns: dict[str, list[object]] = {}
@@ -79,6 +79,10 @@ def recorder_columns(
             value if math.isfinite(value) else math.nan for value in part.margin.tolist()
         ]
     columns["Reward"] = part.reward.tolist()
+    if steps.failed.any():
+        columns["Failure"] = part.failed.tolist()
+    if not np.isnan(steps.cost).all():
+        columns["Cost"] = part.cost.tolist()
     for index, feature in enumerate(features):
         title = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         if title in columns:

@@ -29,7 +29,7 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
     Returns:
         As "With the unfiltered rules the typical return of the expert falls from 271 to 242 (its
         mean from 271 to 168, a difference of −103, 95 % interval −186 to −21), and 25 % instead
-        of 0 % of its episodes end in a crash: these rules harm it."
+        of 0 % of its episodes fail: these rules harm it."
     """
     effect = shield_effect(alone, shielded)
     before, after = (rounded_text(episodes.statistics.iqm) for episodes in (alone, shielded))
@@ -95,7 +95,7 @@ def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     notes = [_difference(effect, alone, shielded)]
     if alone.failures is not None and shielded.failures is not None:
         some = alone.failures.count or shielded.failures.count
-        notes += [f"{_share(shielded.failures)} of its episodes crash"] if some else []
+        notes += [f"{_share(shielded.failures)} of its episodes fail"] if some else []
     if effect.effect == "harms":
         notes.append("these rules harm it")
     text = "; ".join(notes)
@@ -116,9 +116,8 @@ def _crashes(effect: ShieldEffect, alone: Episodes, shielded: Episodes) -> str:
     before, after = _share(alone.failures), _share(shielded.failures)
     if alone.failures.rate == shielded.failures.rate:
         none = not alone.failures.count
-        return "" if none else f", and {after} of its episodes end in a crash, as without"
+        return "" if none else f", and {after} of its episodes fail, as without"
     chance = "" if effect.failure_p < ERROR_RATE else ", which alone may still be chance"
     return (
-        f", and {after} instead of {before} of its episodes end in a crash"
-        f"{'' if effect.too_few else chance}"
+        f", and {after} instead of {before} of its episodes fail{'' if effect.too_few else chance}"
     )

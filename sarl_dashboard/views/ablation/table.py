@@ -19,9 +19,11 @@ from sarl_core.explaining.figures.ablation import (
 )
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.mining.language import sentence
+from sarl_core.rollouts.failures import rate_text
 from sarl_core.studies.ablation import Ablation
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.safety import safety_metrics
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
 from sarl_dashboard.text import escaped
@@ -41,16 +43,17 @@ def show(ablation: Ablation, choice: AblationChoice, *, at_work: bool) -> None:
     """
     why = no_failures_text(ablation.base.env_id)
     notes_notice(note for note in ablation.remarks if note not in ablation.base.notes)
-    with st.grid(4, min_column_width=150):
+    with st.grid(6, min_column_width=150):
         st.metric("Return, all rules", f"{ablation.base.returns.mean():,.1f}", border=True)
+        failures = ablation.base.failures
         st.metric(
             "Failures, all rules",
-            f"{ablation.base_failures:,} of {len(ablation.base):,}"
-            if ablation.failures_known
-            else "–",
+            "–" if failures is None else f"{failures.count:,} of {failures.of:,}",
             border=True,
-            help=None if ablation.failures_known else f"{why[0].upper()}{why[1:]}.",
+            help=f"{why[0].upper()}{why[1:]}." if failures is None else rate_text(failures),
         )
+        for label, value, hint in safety_metrics(ablation.base)[1:]:
+            st.metric(f"{label}, all rules", value, border=True, help=hint)
         st.metric("Rules taken out", f"{len(ablation.rules):,}", border=True)
         st.metric(
             "Episodes run for it",

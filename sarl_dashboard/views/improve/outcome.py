@@ -8,7 +8,6 @@ from functools import partial
 
 import streamlit as st
 
-from sarl_core.environments.failures import no_failures_text
 from sarl_core.explaining.figures.aggregation import (
     RoundPoint,
     points_of,
@@ -17,11 +16,11 @@ from sarl_core.explaining.figures.aggregation import (
 from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.improving.aggregation import Aggregation
 from sarl_core.improving.aggregation_files import aggregation_card
-from sarl_core.mining.language import at_least_text, counted, share_text
+from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import rules_to_json
-from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import as_file, download
+from sarl_dashboard.components.safety import safety_metrics
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.state.data import (
@@ -117,7 +116,7 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
                 "Mean of the middle half of the episodes (IQM), 95 % interval "
                 f"{spread.low:,.1f} to {spread.high:,.1f}",
             ),
-            ("Failures", *failures_of(improved.reported)),
+            *safety_metrics(improved.reported),
             ("Rules", f"{len(rules):,}", "Over all actions"),
             (
                 "Demonstrations",
@@ -126,19 +125,6 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
             ),
         ):
             st.metric(label, value, border=True, height="stretch", help=hint)
-
-
-def failures_of(episodes: Episodes) -> tuple[str, str]:
-    """The share of episodes that ended in failure, and what it tells."""
-    failed = episodes.failures
-    if failed is None:
-        why = no_failures_text(episodes.env_id)
-        return "–", f"{why[0].upper()}{why[1:]}"
-    return (
-        at_least_text(failed.rate, failed.unknown),
-        f"{failed.count:,} of {failed.of:,} fresh episodes, 95 % interval "
-        f"{share_text(failed.low)} to {share_text(failed.high)}",
-    )
 
 
 def how_chosen(improved: Aggregation) -> str:

@@ -13,6 +13,8 @@ from sarl_core.explaining.figures.aggregation import budget_figure, budget_point
 from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.improving.aggregation_files import card_path
 from sarl_core.mining.language import counted, share_text
+from sarl_core.rollouts.failures import rate_text
+from sarl_core.rollouts.statistics import Rate
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.state.data import SHIPPED_SETS
 from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file
@@ -109,10 +111,15 @@ def _failures_of_card(reported: Reported) -> str:
     """How many of a card's episodes failed; nothing where it does not say."""
     if reported.failures is None:
         return ""
-    low, high = share_text(reported.failure_low), share_text(reported.failure_high)
-    cut = reported.cut
-    also = f", and {cut:,} were cut off before they could" if cut else ""
-    return f"; {reported.failures:,} of them failed{also} (95 % interval {low} to {high})"
+    rate = Rate(
+        reported.failures,
+        reported.episodes,
+        reported.failures / max(reported.episodes, 1),
+        reported.failure_low,
+        reported.failure_high,
+        reported.cut,
+    )
+    return f"; failures: {rate_text(rate)}"
 
 
 def _policy_of_card(reported: Reported) -> str:

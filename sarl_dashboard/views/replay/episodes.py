@@ -18,6 +18,7 @@ from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
+from sarl_dashboard.components.safety import safety_column_config, safety_columns
 from sarl_dashboard.jobs.replays import (
     EPISODE_RUNS,
     EPISODES,
@@ -70,7 +71,7 @@ def comparison(order: ReplayOrder) -> None:
         st.session_state["_compared"] = (order, episodes)
         st.rerun()  # the recorder above shows their steps
     rows, table = [], []
-    for name, run in runs:
+    for (name, run), safety in zip(runs, safety_columns([run for _, run in runs]), strict=True):
         interval = summarise(run.returns)
         rows.append(
             ReturnRow(
@@ -89,6 +90,7 @@ def comparison(order: ReplayOrder) -> None:
                 "Typical return": f"{interval.iqm:,.1f}",
                 "95 % interval": f"{interval.low:,.1f} to {interval.high:,.1f}",
                 "Mean length": f"{run.lengths.mean():,.1f}",
+                **safety,
                 "Changed": share_text(float(run.interventions.sum()) / float(run.lengths.sum()))
                 if name == WITH
                 else "–",
@@ -98,7 +100,7 @@ def comparison(order: ReplayOrder) -> None:
     chart(
         comparison_figure(rows), "comparison", "Returns of the episodes with the rules and without"
     )
-    st.dataframe(table, hide_index=True)
+    st.dataframe(table, hide_index=True, column_config=safety_column_config())
     st.caption(
         "A point is an episode. The diamond is the typical return, the mean of the middle "
         "half of the episodes, which a few odd ones do not move, with its 95 % interval. The "

@@ -9,13 +9,14 @@ import streamlit as st
 
 from sarl_core.explaining.figures.comparison import returns_figure, typical_figure
 from sarl_core.explaining.words.comparison import POLICY_TEXT, verdict_on_all
-from sarl_core.mining.language import at_least_text, share_text
+from sarl_core.mining.language import share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.studies.comparison import Comparison
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import episodes_bar, watched
+from sarl_dashboard.components.safety import safety_column_config, safety_columns
 from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.state.agents import offered_agents
 from sarl_dashboard.text import escaped
@@ -91,7 +92,12 @@ def show(finished: Finished, *, at_work: bool) -> None:
         "alone."
     )
     st.dataframe(
-        [table_row(line, episodes) for line, episodes in finished],
+        [
+            table_row(line, episodes) | safety
+            for (line, episodes), safety in zip(
+                finished, safety_columns([episodes for _, episodes in finished]), strict=True
+            )
+        ],
         hide_index=True,
         height="content",
         column_config=column_config(env_id),
@@ -194,22 +200,13 @@ def column_config(env_id: str) -> dict[str, Any]:
         flips_title(env_id): column.TextColumn(
             alignment="right", help="How often the shield switches on or off"
         ),
-        "Crashes": column.TextColumn(
-            alignment="right",
-            help="Share of the episodes that ended in failure: a fall, a crash, or whatever else "
-            "ends an episode of this environment before its time. A landing or an arrival is none. "
-            "A dash where it is not known which ends are failures, or none is.",
-        ),
-        "Crashes, 95 %": column.TextColumn(
-            alignment="right",
-            help="Where the share of crashes probably lies (95 % interval by Clopper and Pearson)",
-        ),
+        **safety_column_config(),
     }
 
 
 def table_row(line: ShieldLine, episodes: Episodes) -> dict[str, Any]:
     """What the table says of a line."""
-    numbers, summary, failures = episodes.statistics, episodes.summary(), episodes.failures
+    numbers, summary = episodes.statistics, episodes.summary()
     rules = line.arm.rules
     return {
         "Agent": line.agent,
@@ -228,10 +225,6 @@ def table_row(line: ShieldLine, episodes: Episodes) -> dict[str, Any]:
         flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
         if rules is not None and episodes.flips is not None
         else "–",
-        "Crashes": "–" if failures is None else at_least_text(failures.rate, failures.unknown),
-        "Crashes, 95 %": "–"
-        if failures is None
-        else f"{share_text(failures.low)} to {share_text(failures.high)}",
     }
 
 
