@@ -19,7 +19,7 @@ st.caption(
     "demonstrations: they guarantee nothing."
 )
 set_out()
-asked_for = replay_bar(settings())
+current_order = replay_bar(settings())
 jump = arrived()
 played = latest()
 if played is None:
@@ -31,7 +31,7 @@ if played is None:
             icon=":material/play_circle:",
         )
     st.stop()
-headline(played.replay, asked_for)
+headline(played.replay, current_order)
 numbers(played.replay)
 film(played.replay)
 step_by_step(played)
