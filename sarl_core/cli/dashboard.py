@@ -89,6 +89,7 @@ def _offers(
     from sarl_core.agents.offers import VARIABLE, Offers, named_agents, read_offers
     from sarl_core.environments.description import describe_environment
     from sarl_core.environments.imports import named_object
+    from sarl_core.environments.signals import check_signals
 
     beside = (env_args, wrappers or None, failure, cost)
     if len(envs) != 1 and any(value is not None for value in beside):
@@ -109,6 +110,7 @@ def _offers(
     )
     for environment in offers.environments:
         describe_environment(environment)
+        check_signals(environment)
     for name, spec in offers.agents:
         named_object(spec, f"the agent {name}")
     return {VARIABLE: offers.to_text()}

@@ -31,6 +31,18 @@ _COMPARES = re.compile(r"[<>]")
 _WORKS_OUT = re.compile(r"[-+*/<>()'\"]")
 
 
+def check_signals(environment: EnvironmentOrId) -> None:
+    """Read what is called a failure and a cost, without playing.
+
+    Args:
+        environment: In which it is called so.
+
+    Raises:
+        InputError: If one of them cannot be read or imported.
+    """
+    SignalTally(environment, 1, str)
+
+
 class StepOutcomes(NamedTuple):
     """What B steps brought.
 

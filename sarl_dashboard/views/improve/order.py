@@ -12,6 +12,7 @@ from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.rules import Thresholds
+from sarl_core.rollouts.choices import check_choice
 from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.improving import ImprovementOrder
@@ -67,7 +68,9 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
         generations=choices.refinement,
         validation=choices.validation,
         seed=choices.seed,
+        choose=choices.choose,
     )
+    check_choice(plan.choose, env_id)
     command = command_for(choices, demonstrations, env_id, thresholds)
     return ImprovementOrder(demonstrations, env_id, plan, expert, None, command)
 
@@ -116,6 +119,7 @@ def command_for(
         ("--divider", choices.divider, MIN_DIVIDER),
         ("--refine", choices.refinement, 0),
         ("--validation", choices.validation, None),
+        ("--choose", choices.choose, "return"),
         ("--seed", choices.seed, 0),
     ):
         if value is not None and value != usual:

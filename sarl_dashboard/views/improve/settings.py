@@ -9,6 +9,7 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.improving.refinement import generation_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_dashboard.components.settings import environment_choice
 from sarl_dashboard.state.agents import PolicyFile, own_agents, policy_upload
 from sarl_dashboard.state.rule_files import OWN_FILE
@@ -35,6 +36,7 @@ class ImproveChoices:
     validation: int
     seed: int
     divider: int
+    choose: Choice
 
 
 def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> int:
@@ -49,6 +51,7 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
     has_expert = expert != NOBODY
     max_rules, cut, rounds, refinement, validation = MIN_RULES, EVERY_LEAF, 1, 0, 1
     divider, policy_file = MIN_DIVIDER, None
+    choose: Choice = "return"
     with st.container(border=True):
         with st.grid(5, min_column_width=150, gap="small"):
             env = environment_choice()
@@ -105,6 +108,16 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     "All rounds are tried on a few episodes, the better half on twice as many, "
                     "and so on; the last one left on this many.",
                 )
+                choose = st.selectbox(
+                    "Choose by",
+                    tuple(CHOICE_TEXTS),
+                    key="choose",
+                    bind="query-params",
+                    format_func=lambda name: f"{name} first",
+                    help="Which of the tried is the best. Return: the highest mean return. "
+                    "Failures: the fewest failures, and among equals the highest mean return. It "
+                    "is reported on other episodes.",
+                )
                 refinement = number(
                     "Refinement steps",
                     "refine",
@@ -140,4 +153,5 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
         validation,
         seed,
         divider,
+        choose,
     )
