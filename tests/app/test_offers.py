@@ -10,7 +10,7 @@ import pytest
 from sarl_core import Environment
 from sarl_core.agents.offers import VARIABLE, Offers
 from sarl_dashboard.state.environments import offers
-from tests.app.screens import errors, html, metrics, open_page, run_through
+from tests.app.screens import errors, finished, html, metrics, open_page, run_through
 
 TASK = """
 import gymnasium
@@ -46,6 +46,16 @@ def test_an_offered_agent_acts_in_an_offered_environment(offered: None) -> None:
     assert not errors(app)
     assert metrics(app)["Length"] == "12 steps"
     assert "boom speed" in html(app)
+
+
+def test_an_offered_agent_is_compared_with_the_others(offered: None) -> None:
+    query = {"env": CRANE.id, "agents": "operator", "shields": "no shield", "episodes": "2"}
+    app = open_page("shield", **query)
+    app.button(key="run_comparison").click().run()
+    finished(app, "comparison")
+    assert not errors(app)
+    (table,) = [frame.value for frame in app.dataframe if "Agent" in frame.value]
+    assert list(table["Agent"]) == ["operator"]
 
 
 def test_nothing_is_imported_that_is_not_offered(tmp_path: Path) -> None:

@@ -13,7 +13,13 @@ from sarl_core.shielding.shield import Outside
 from sarl_core.studies.comparison import Arm
 from sarl_dashboard.components.settings import no_boxes_notice
 from sarl_dashboard.jobs.episodes import Row
-from sarl_dashboard.state.agents import PROJECTIONS, ChosenAgent, agent_for, offered_agents
+from sarl_dashboard.state.agents import (
+    PROJECTIONS,
+    ChosenAgent,
+    agent_for,
+    offered_agents,
+    own_agents,
+)
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
 from sarl_dashboard.text import refuse
@@ -74,8 +80,9 @@ def pilots(choices: ShieldChoices, env_id: EnvironmentOrId) -> list[Pilot]:
         InputError: If one of them cannot be had.
     """
     chosen: list[Pilot] = []
+    places = (*AGENT_PLACES[:-1], *own_agents(), AGENT_PLACES[-1])
     for choice in choices.agents:
-        place = AGENT_PLACES.index(choice)
+        place = places.index(choice)
         if choice != OWN_FILE:
             agent = agent_for(choice, None, env_id, choices.seed)
             chosen.append(Pilot(choice, place, agent))

@@ -18,7 +18,7 @@ from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_pla
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.components.safety import safety_column_config, safety_columns
 from sarl_dashboard.jobs.episodes import COMPARISON, known
-from sarl_dashboard.state.agents import offered_agents
+from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.shield.lines import ShieldLine
 
@@ -158,7 +158,7 @@ def agent_name(agent: str) -> str:
     """An agent in the middle of a sentence, after "the"."""
     if agent == "untrained":
         return "untrained agent"
-    return agent if agent in offered_agents() else f"agent {agent}"
+    return agent if agent in AGENTS else f"agent {agent}"
 
 
 def rules_name(shield: str) -> str:
