@@ -48,23 +48,23 @@ class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any
 
     def observation(self, observation: Any) -> NDArray[np.float32]:
         """The features of the present scene, shape (14,), whatever the simulator's own table."""
-        scene: Any = self.unwrapped
-        start, end, aimed_at = scene.vehicle.target_lane_index
-        lanes = scene.road.network.graph[start][end]
+        own, road = self.get_wrapper_attr("vehicle"), self.get_wrapper_attr("road")
+        start, end, aimed_at = own.target_lane_index
+        lanes = road.network.graph[start][end]
 
         def traffic(lane: int) -> list[float]:
             """Gap and time to collision ahead, then behind."""
             if not 0 <= lane < len(lanes):
                 return [0.0] * 4
-            ahead, behind = _neighbours(scene, (start, end, lane))
-            return [*_gap(scene.vehicle, ahead), *_gap(behind, scene.vehicle)]
+            ahead, behind = _neighbours(road, own, (start, end, lane))
+            return [*_gap(own, ahead), *_gap(behind, own)]
 
-        leaves = scene.vehicle.lane_index[2]
+        leaves = own.lane_index[2]
         ahead = np.minimum(traffic(leaves)[:2], traffic(aimed_at)[:2])
-        aside = abs(lanes[aimed_at].local_coordinates(scene.vehicle.position)[1])
+        aside = abs(lanes[aimed_at].local_coordinates(own.position)[1])
         return np.array(
             [
-                scene.vehicle.speed,
+                own.speed,
                 aside,
                 aimed_at,
                 len(lanes) - 1 - aimed_at,
@@ -76,13 +76,13 @@ class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any
         )
 
 
-def _neighbours(scene: Any, index: tuple[str, str, int]) -> tuple[Any, Any]:
+def _neighbours(road: Any, own: Any, index: tuple[str, str, int]) -> tuple[Any, Any]:
     """Who is next ahead and next behind in a lane; who changes into it is in it already."""
-    lane, own = scene.road.network.get_lane(index), scene.vehicle
+    lane = road.network.get_lane(index)
     place = lane.local_coordinates(own.position)[0]
     ahead = behind = None
     nearest_ahead, nearest_behind = np.inf, -np.inf
-    for vehicle in scene.road.vehicles:
+    for vehicle in road.vehicles:
         along, aside = lane.local_coordinates(vehicle.position)
         if vehicle is own or not (
             vehicle.target_lane_index == index
