@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import re
@@ -141,6 +142,10 @@ def of_archive(data: bytes, random: Random, mutate: Bytes) -> bytes:
         entries[name] = of_array(content, random, mutate)
     elif content[:1] == b"{":
         entries[name] = of_json(content, random, mutate)
+    elif content[:4] == b"PAR1":
+        entries[name] = of_parquet(content, random, mutate)
+    elif content[:4] in (b"ARRO", b"\x89HDF", b"\xff\xff\xff\xff"):
+        entries[name] = of_numbers(content, random, mutate)
     else:
         entries[name] = mutate(content)
     out = io.BytesIO()
@@ -153,6 +158,35 @@ def of_archive(data: bytes, random: Random, mutate: Bytes) -> bytes:
         start = max(packed.find(b"PK\x01\x02"), 0)
         packed[start + random.randrange(min(46, len(packed) - start))] = random.randrange(256)
     return bytes(packed)
+
+
+def of_gzip(data: bytes, random: Random, mutate: Bytes) -> bytes:
+    """Gzip: the text within, packed again, or anything."""
+    try:
+        content = gzip.decompress(data)
+    except Exception:
+        return mutate(data)
+    if random.randrange(6) == 0:
+        return mutate(data)
+    return gzip.compress(of_table(content, random, mutate))
+
+
+def of_numbers(data: bytes, random: Random, mutate: Bytes) -> bytes:
+    """A binary file with its beginning and end: a number in it, a byte, or anything between."""
+    choice = random.randrange(4)
+    changed = bytearray(data)
+    if choice == 0 or len(data) < 64:
+        return data[:8] + mutate(data[8:-8]) + data[-8:]
+    if choice == 1:
+        changed[random.randrange(8, len(data))] = random.randrange(256)
+    else:
+        width, sign = random.choice(((2, "<h"), (4, "<i"), (8, "<q")))
+        at = random.randrange(8, len(data) - width)
+        at -= at % width
+        value = random.choice((0, 1, -1, 2, 255, 2**15 - 1, 2**31 - 1, 2**40, 2**62, len(data)))
+        most = 2 ** (8 * width - 1)
+        changed[at : at + width] = struct.pack(sign, (value + most) % (2 * most) - most)
+    return bytes(changed)
 
 
 def of_array(content: bytes, random: Random, mutate: Bytes) -> bytes:

@@ -26,7 +26,16 @@ from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.shielding.shield import Shield
 from tests.bad_inputs import BAD_INPUTS, ROWS, csv_bytes, good_arrays, npz_bytes, parquet_bytes
-from tests.fuzz.mutations import Bytes, of_archive, of_json, of_parquet, of_table
+from tests.fuzz import formats
+from tests.fuzz.mutations import (
+    Bytes,
+    of_archive,
+    of_gzip,
+    of_json,
+    of_numbers,
+    of_parquet,
+    of_table,
+)
 
 
 @dataclass(frozen=True)
@@ -177,6 +186,13 @@ READERS = {
     "npz": Reader(
         lambda: [npz_bytes(**good_arrays()), *bad(".npz")], of_archive, read_as("demo.npz")
     ),
+    "jsonl": Reader(formats.json_lines, of_table, read_as("demo.jsonl")),
+    "json": Reader(formats.json_files, of_json, read_as("demo.json")),
+    "gzip": Reader(formats.gzip_files, of_gzip, read_as("demo.csv.gz")),
+    "arrow": Reader(formats.arrow_files, of_numbers, read_as("demo.arrow")),
+    "hdf5": Reader(formats.hdf5_files, of_numbers, read_as("demo.hdf5")),
+    "xlsx": Reader(formats.excel_files, of_archive, read_as("demo.xlsx")),
+    "zip": Reader(formats.archives, of_archive, read_as("demo.zip")),
     "pair": Reader(lambda: [b"0.5;1.5\n0.25;1.0\n0.1;0.2\n\n\n0\n1\n0\n"], of_table, read_pair),
     "rules": Reader(rule_seeds, of_json, read_rules),
     "policy": Reader(policy_seeds, of_archive, read_policy),

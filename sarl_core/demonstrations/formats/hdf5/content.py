@@ -55,7 +55,10 @@ class Hdf5Content:
         with _refusing_damage():
             if len(group) > _MOST_ENTRIES:
                 raise InputError(f"there are {len(group):,} entries in it; give a smaller file")
-            return tuple(group)
+            names = tuple(group)
+            if not all(isinstance(name, str) for name in names):  # bytes that are no text
+                raise ValueError("a name is no text")
+            return names
 
     def entry_of(self, group: Any, name: str) -> Any:
         """What stands under a name.

@@ -186,4 +186,6 @@ def _listed(content: memoryview) -> list[str]:
         )
         if not names or not all(isinstance(name, str) for name in names):
             raise InputError("it lists no files; save the data set again")
+        if len(set(names)) < len(names):
+            raise InputError("it lists a file twice; save the data set again")
         return [str(name) for name in names]
