@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import io
 import json
 import struct
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -88,6 +90,41 @@ def long_lists() -> bytes:
     return zstd(obs_a=lists, action=labels(2))
 
 
+def zipped_zeros(size: int, says: int | None = None) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("run.csv", b"obs_a,action\n" + bytes(size))
+    content = bytearray(out.getvalue())
+    if says is not None:
+        at = content.index(b"PK\x01\x02")
+        content[at + 24 : at + 28] = struct.pack("<I", says)
+    return bytes(content)
+
+
+def packed_arrow(column: Any) -> bytes:
+    table = pa.table({"obs_a": column, "action": labels(len(column))})
+    out = io.BytesIO()
+    options = pa.ipc.IpcWriteOptions(compression="zstd")
+    with pa.ipc.new_stream(out, table.schema, options=options) as writer:
+        writer.write_table(table)
+    return out.getvalue()
+
+
+def hdf5_zeros() -> bytes:
+    out = io.BytesIO()
+    with h5py.File(out, "w") as file:
+        file.create_dataset("observations", (10**8, 4), "f4", chunks=(10**5, 4), compression="gzip")
+        file["actions"] = labels(2)
+    return out.getvalue()
+
+
+def workbook_of_texts() -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/sharedStrings.xml", b"<si><t>x</t></si>" * 10**7)
+    return out.getvalue()
+
+
 def long_bytes() -> bytes:
     return zstd(obs_a=pa.array([b"\0" * 10**8] * 2, pa.binary(10**8)), action=labels(2))
 
@@ -134,6 +171,19 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "one long text": ("parquet", one_long_text, "column 'obs_a' holds no numbers"),
     "long bytes": ("parquet", long_bytes, "column 'obs_a' holds no numbers"),
     "long lists": ("parquet", long_lists, "column 'obs_a' holds a list in each row"),
+    "gzip": ("csv.gz", lambda: gzip.compress(b"obs_a,action\n" + bytes(3 * 10**8)), "unpacks to"),
+    "an archive": ("zip", lambda: zipped_zeros(3 * 10**8), "unpacks to"),
+    "an archive that says little": ("zip", lambda: zipped_zeros(10**8, says=1000), "damaged"),
+    "Arrow": ("arrow", lambda: packed_arrow(pa.array(np.zeros(3 * 10**7))), "unpacks to"),
+    "Arrow's texts": ("arrow", lambda: packed_arrow(pa.array(["x" * 5 * 10**7] * 5)), "unpacks to"),
+    "rows without values": ("arrow", lambda: packed_arrow(pa.nulls(10**8)), "unpacks to"),
+    "HDF5": ("hdf5", hdf5_zeros, "unpacks to"),
+    "JSON lines": (
+        "jsonl",
+        lambda: b"".join(b'{"obs_%d": 0, "action": 1}\n' % n for n in range(4000)) * 40,
+        "unpacks to",
+    ),
+    "a workbook": ("xlsx", workbook_of_texts, "unpacks to"),
     "zeros": ("parquet", lambda: zstd(obs_a=np.zeros(N), action=labels(N)), READ_LIMIT),
     "nothing": ("parquet", lambda: zstd(obs_a=pa.nulls(N), action=labels(N)), READ_LIMIT),
     "metadata": ("parquet", wide_metadata, "its metadata 'sarl' is too large: it unpacks to"),
