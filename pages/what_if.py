@@ -39,5 +39,5 @@ with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
         projection = projection_choice(220)
 no_boxes_notice([rules.rule_set], outside)
 situation = situation_of(demonstrations, rules, projection, outside)
-fit_sliders(situation.spans)
+fit_sliders(situation)
 question_and_answer(situation)

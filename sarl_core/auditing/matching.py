@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import (
     NamedFeatures,
     line_up,
@@ -53,7 +54,12 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
         InputError: If the log lacks a feature or an action that the rules speak of, has it in
             another unit, or holds a label that the rules do not know.
     """
-    observations, notes = _observations(rule_set, log, called)
+    log = recoded(log, rule_set.source.features, called=called)
+    places, notes = _feature_places(rule_set, log, called)
+    observations = log.observations
+    if places != list(range(observations.shape[1])):
+        observations = np.ascontiguousarray(observations[:, places])
+    _check_units(rule_set, log, places, called)
     names = tuple(dimension.name for dimension in log.action_dimensions)
     order = tuple(range(len(names)))
     if len(names) > 1 or len(rule_set.actions) > 1:
@@ -84,103 +90,12 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
     return MatchedLog(observations, labels, actions[:, 0] if single else actions, notes)
 
 
-def _observations(
-    rule_set: RuleSet, log: Demonstrations, called: str
-) -> tuple[NDArray[np.float32], tuple[str, ...]]:
-    """The log's states in the rules' order, (N, d); words are said as the rules say them."""
-    theirs, ours = rule_set.source.features, log.features
-    columns = {plain_names([one.indicator.column])[0] for one in ours if one.indicator is not None}
-    words = {
-        place: plain_names([one.indicator.column])[0]
-        for place, one in enumerate(theirs)
-        if one.indicator is not None
-    }
-    decoded = {place: column for place, column in words.items() if column in columns}
-    rest = [place for place in range(len(theirs)) if place not in decoded]
-    left = [
-        place
-        for place, one in enumerate(ours)
-        if one.indicator is None
-        or plain_names([one.indicator.column])[0] not in set(decoded.values())
-    ]
-    notes: tuple[str, ...] = ()
-    places: list[int] = []
-    if rest:
-        places, notes = _feature_places(rule_set, log, rest, left, called)
-        _check_units(rule_set, log, dict(zip(rest, places, strict=True)), called)
-    if not decoded:
-        if places == list(range(len(ours))):
-            return log.observations, notes
-        return np.ascontiguousarray(log.observations[:, places]), notes
-    observations = np.empty((len(log), len(theirs)), dtype=np.float32)
-    observations[:, rest] = log.observations[:, places]
-    for column in dict.fromkeys(decoded.values()):
-        own = [place for place, name in decoded.items() if name == column]
-        _tell_words(observations, rule_set, own, log, column, called)
-    return observations, notes
-
-
-def _tell_words(
-    observations: NDArray[np.float32],
-    rule_set: RuleSet,
-    places: list[int],
-    log: Demonstrations,
-    column: str,
-    called: str,
-) -> None:
-    """Fill in what the rules ask about a column of words.
-
-    Args:
-        observations: To fill in, (N, d).
-        rule_set: The rules.
-        places: Of their features that are of this column.
-        log: That holds it, too.
-        column: Its plain name.
-        called: What the log is called in a message.
-
-    Raises:
-        InputError: If the log holds a word that the rules do not know.
-    """
-    indicators = [rule_set.source.features[place].indicator for place in places]
-    known = list(
-        dict.fromkeys(
-            word
-            for one in indicators
-            if one is not None
-            for word in (one.value, one.otherwise)
-            if word
-        )
-    )
-    # Which of these words each step holds; words that the rules do not know come after them.
-    words = [*known]
-    held = np.full(len(log), -1)
-    for place, feature in enumerate(log.features):
-        indicator = feature.indicator
-        if indicator is None or plain_names([indicator.column])[0] != column:
-            continue
-        words += [word for word in (indicator.value, indicator.otherwise) if word not in words]
-        if indicator.otherwise:
-            held[:] = words.index(indicator.otherwise)
-        held[log.observations[:, place] == 1] = words.index(indicator.value)
-    unknown = (held < 0) | (held >= len(known))
-    if unknown.any():
-        row = int(np.argmax(unknown))
-        raise InputError(
-            f"{called} holds the {column} {[*words, ''][held[row]]!r} in row {row + 1} "
-            f"({int(unknown.sum()):,} rows in all), which the rules do not know: they were mined "
-            f"from {shortened(known)}; leave those rows out, or mine from demonstrations with it"
-        )
-    for place, one in zip(places, indicators, strict=True):
-        assert one is not None
-        observations[:, place] = held == known.index(one.value)
-
-
 def _feature_places(
-    rule_set: RuleSet, log: Demonstrations, rest: list[int], left: list[int], called: str
+    rule_set: RuleSet, log: Demonstrations, called: str
 ) -> tuple[list[int], tuple[str, ...]]:
-    """For some features of the rules their places in the log, among some of its features."""
-    theirs = tuple(rule_set.source.features[place].name for place in rest)
-    ours = tuple(log.features[place].name for place in left)
+    """For each feature of the rules its place in the log."""
+    theirs = tuple(feature.name for feature in rule_set.source.features)
+    ours = tuple(feature.name for feature in log.features)
     wanted, have = plain_names(theirs), plain_names(ours)
     missing = [name for name, plain in zip(theirs, wanted, strict=True) if plain not in have]
     further = [name for name, plain in zip(ours, have, strict=True) if plain not in wanted]
@@ -189,7 +104,7 @@ def _feature_places(
             NamedFeatures(called, ours, log.env_id),
             NamedFeatures("the rules", theirs, rule_set.source.env_id),
         )
-        return [left[place] for place in lined.places], tuple(filter(None, [lined.note]))
+        return list(lined.places), tuple(filter(None, [lined.note]))
     if missing or only_counts(ours) or only_counts(theirs) or len(set(have)) < len(have):
         lacks = f" has no {shortened(missing)}" if missing else f" has {len(ours)}"
         raise InputError(
@@ -197,14 +112,11 @@ def _feature_places(
             f"(the rules: {shortened(theirs)}; {called}: {shortened(ours)}); {_CURE}"
         )
     note = f"{shortened(further)} of {called} is no feature of the rules and was left out"
-    return [left[have.index(name)] for name in wanted], (note,)
+    return [have.index(name) for name in wanted], (note,)
 
 
-def _check_units(
-    rule_set: RuleSet, log: Demonstrations, places: dict[int, int], called: str
-) -> None:
-    for own, place in places.items():
-        feature = rule_set.source.features[own]
+def _check_units(rule_set: RuleSet, log: Demonstrations, places: list[int], called: str) -> None:
+    for feature, place in zip(rule_set.source.features, places, strict=True):
         unit = log.features[place].unit.strip()
         if unit and feature.unit.strip() and unit != feature.unit.strip():
             raise InputError(

@@ -37,6 +37,7 @@ def diff(
     data/demonstrations/cartpole.parquet`
     """
     with terminal.working("Comparing"):
+        from sarl_core.demonstrations.recoding import recoded
         from sarl_core.mining.editing.difference import comparable
         from sarl_core.mining.rule_order import rules_for
         from sarl_core.mining.rule_set import RuleSet
@@ -52,6 +53,7 @@ def diff(
             )
         else:
             recorded = read_demonstrations(demonstrations, None, columns)
+            recorded = recoded(recorded, one.source.features, called=str(demonstrations))
             one, more = rules_for(one, recorded, called="the states")
             other, notes = comparable(one, other)[0], (*recorded.notes, *notes, *more)
             states = recorded.observations

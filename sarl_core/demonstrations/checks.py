@@ -65,7 +65,7 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
         "observations": observations,
         "actions": actions,
         "episodes": episodes,
-        "steps": _counted(episodes) if steps is None else steps,
+        "steps": counted_steps(episodes) if steps is None else steps,
         "rewards": None
         if raw.rewards is None
         else frozen(column_of_numbers(raw.rewards, n, "column 'reward'"), np.float64),
@@ -218,7 +218,7 @@ def _names(given: Iterable[Any] | None, count: int, what: str) -> tuple[str, ...
     return names
 
 
-def _counted(episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def counted_steps(episodes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Steps from 0 within each episode."""
     n = len(episodes)
     starts = np.concatenate([[0], np.flatnonzero(episodes[1:] != episodes[:-1]) + 1])

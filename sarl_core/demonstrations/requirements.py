@@ -252,7 +252,8 @@ def crowded(values: NDArray[np.float32]) -> NDArray[np.bool_]:
     """
     if not len(values):
         return np.zeros(values.shape[1], dtype=np.bool_)
-    low, high = values.min(axis=0).astype(np.float64), values.max(axis=0).astype(np.float64)
+    # Of what is missing nothing is asked here.
+    low, high = (ends.reduce(values, axis=0).astype(np.float64) for ends in (np.fmin, np.fmax))
     with np.errstate(invalid="ignore", over="ignore"):  # what is infinite is refused elsewhere
         step = np.spacing(np.maximum(np.abs(low), np.abs(high)).astype(np.float32))
         return np.asarray(high - low < _FEW_STEPS * step.astype(np.float64))
@@ -278,7 +279,7 @@ def coarse_columns(
     for index in np.flatnonzero(crowded(rounded)).tolist():
         different, left = len(np.unique(exact[:, index])), len(np.unique(rounded[:, index]))
         if left < different:
-            least = exact[:, index].min()
+            least = np.fmin.reduce(exact[:, index])
             notes.append(
                 f"{columns[index]} has {different:,} different values and rules can tell only "
                 f"{left:,} of them apart, as they compare 7 digits (float32); subtract an offset "

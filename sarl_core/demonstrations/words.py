@@ -132,6 +132,15 @@ def indicated(coded: Coded, indicators: Sequence[Indicator]) -> NDArray[np.float
     return values
 
 
+def columns_of_words(indicators: Sequence[Indicator | None]) -> dict[str, list[int]]:
+    """Where the indicators of each column of words stand among the features."""
+    places: dict[str, list[int]] = {}
+    for at, one in enumerate(indicators):
+        if one is not None:
+            places.setdefault(one.column, []).append(at)
+    return places
+
+
 def words_of(indicators: Sequence[Indicator]) -> tuple[str, ...]:
     """The words that the indicators of one column know, as `indicators_of` was given them."""
     if len(indicators) == 1 and indicators[0].otherwise:

@@ -53,10 +53,12 @@ def value_text(value: float, feature: Feature, bounds: Iterable[Bounds]) -> str:
 
     Returns:
         As "293.4": three significant digits, more where it takes them to stay on its side of
-        each bound.
+        each bound. As "yes" or "no" where it says which word a column holds.
     """
     if not math.isfinite(value):
         return _no_number(value)
+    if feature.indicator is not None and value in (0.0, 1.0):
+        return "yes" if value else "no"
     limits = [
         float(limit) for one in bounds for limit in limit_texts(one, feature, beside=(value,))
     ]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import FeatureOrder, NamedFeatures, line_up
 from sarl_core.errors import InputError
 from sarl_core.mining.evidence import DataBox
@@ -77,6 +78,7 @@ def rules_for(
     Raises:
         InputError: If features or actions are others.
     """
+    recoded(demonstrations, rule_set.source.features, called=called)  # names an unknown word
     fitted = fitted_rules(
         rule_set,
         NamedFeatures(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,10 +17,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, load_demonstrations, mine_rules
+from sarl_core.auditing.audit import audit
 from sarl_core.demonstrations.fields import Indicator
 from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.explaining.words.what_if import near_miss_text
+from sarl_core.mining.editing.manual_rules import asks_of, manual_rule
+from sarl_core.mining.language import conditions_text
+from sarl_core.mining.rule_order import rules_for
+from sarl_core.mining.rule_set import RuleSet, rules_from_json
+from sarl_core.shielding.neighbourhood import FeatureChange
 from sarl_core.shielding.shield import Shield
 
 ROWS = "mode,gap,done_by,action\n" + "".join(
@@ -172,3 +181,60 @@ def test_a_word_that_csv_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'action' holds 'NA' as a word"):
         save_demonstrations(shown, tmp_path / "log.csv")
     assert not (tmp_path / "log.csv").exists()
+
+
+def mined_words() -> RuleSet:
+    return mine_rules(read(ROWS), supp_min=0.0, conf_min=1.0)
+
+
+def test_another_log_says_its_words_as_the_rules_do() -> None:
+    rules = mined_words()
+    few = ROWS.replace("medium", "light")  # two words are one feature, and three are three
+    log = recoded(read(few), rules.source.features, called="the log")
+    assert log.features == rules.source.features
+    assert log.observations[:3, :3].tolist() == [[1, 0, 0], [0, 1, 0], [0, 1, 0]]
+    held = audit(rules, read(few))
+    assert held.agreement == 1.0
+    one = read(ROWS.replace("medium", "heavy").replace("light", "heavy"))
+    assert recoded(one, rules.source.features, called="the log").observations[:, 0].all()
+
+
+def test_a_word_that_rules_do_not_know_is_named() -> None:
+    rules, strange = mined_words(), read(ROWS.replace("medium", "huge"))
+    said = r"'mode' is 'huge' in row 3 \(10 rows in all\).*'heavy', 'light', 'medium'"
+    with pytest.raises(InputError, match=said):
+        audit(rules, strange)
+    with pytest.raises(InputError, match=said):
+        rules_for(rules, strange)
+
+
+def test_words_are_said_in_edits_and_near_misses() -> None:
+    rules = mined_words()
+    features = rules.source.features
+    assert features[0].statement(False) == "mode is not heavy"
+    assert features[4].statement(False) == "done_by is false"
+    renamed = replace(features[0], name="load is large")
+    assert renamed.statement(False) == "load is not large"
+    assert replace(features[0], name="laden").statement(True) == "laden is true"
+    change = FeatureChange(0, 0.0, 1.0)
+    assert near_miss_text((change,), features) == "mode were heavy"
+    asks, other = asks_of(rules[0], rules), 1 - rules[0].action
+    again = manual_rule(rules, asks, rule_id="by hand", action=other, dimension=0)
+    assert conditions_text(again, rules) == conditions_text(rules[0], rules)
+
+
+def test_a_rule_file_with_words_has_version_2_and_others_stay_what_they_were(
+    tmp_path: Path,
+) -> None:
+    rules = mined_words()
+    rules.save(tmp_path / "rules.json")
+    document = json.loads((tmp_path / "rules.json").read_text())
+    assert document["version"] == 2
+    assert document["features"][0]["indicator"] == {"column": "mode", "value": "heavy"}
+    assert RuleSet.load(tmp_path / "rules.json").digest == rules.digest
+    document["features"][0]["indicator"]["colour"] = "red"
+    with pytest.raises(InputError, match=r"'colour' is not known to this version"):
+        rules_from_json(json.dumps(document))
+    plain = mine_rules(read("obs_x,action\n1,0\n2,1\n"), supp_min=0.0, conf_min=1.0)
+    plain.save(tmp_path / "plain.json")
+    assert json.loads((tmp_path / "plain.json").read_text())["version"] == 1

@@ -23,6 +23,7 @@ from sarl_core import (
     load_demonstrations,
     mine_rules,
 )
+from sarl_core.demonstrations.fields import Indicator
 from sarl_core.explaining.exports.code_c import rules_to_c
 from sarl_core.explaining.exports.code_python import rules_to_python
 from sarl_core.explaining.exports.onnx_model import rules_to_onnx
@@ -69,6 +70,23 @@ def several_discrete() -> RuleSet:
     return mine_rules(demonstrations, supp_min=0.0, conf_min=1.0)
 
 
+@cache
+def words_and_codes() -> RuleSet:
+    """A feature that says which word a column holds, and labels that do not count."""
+    rng = np.random.default_rng(3)
+    states = rng.normal(size=(800, 3)).astype(np.float32)
+    states[:, 0] = states[:, 0] > 0
+    codes = np.array([100, 205, 90000])[(states[:, 0] + (states[:, 1] > 0.3)).astype(int)]
+    demonstrations = Demonstrations(
+        states,
+        np.stack([codes, np.where(states[:, 2] > 0, 1, -1)], axis=1),
+        np.repeat(np.arange(8), 100),
+        feature_names=("mode is heavy", "x", "y"),
+        indicators=(Indicator("mode", "heavy", "light"), None, None),
+    )
+    return mine_rules(demonstrations, supp_min=0.0, conf_min=1.0)
+
+
 def edited(rules: RuleSet) -> RuleSet:
     """With a rule switched off, one pinned, one by hand that overlaps others, and one wider."""
     first, second, *others = rules.rules
@@ -106,6 +124,7 @@ SETS = {
     "one discrete action": lambda: mined("cartpole", 0.001, 0.97),
     "merged": lambda: merged_rules(mined("lunar_lander", 0.002, 0.9)),
     "several discrete actions": several_discrete,
+    "words and codes": words_and_codes,
     "edited": lambda: edited(mined("cartpole", 0.002, 0.95)),
     "one continuous action": lambda: mined("pendulum", 0.002, 0.95, 3),
     "several continuous actions": lambda: mined("bipedal_walker", 0.02, 0.9, 3),
@@ -319,7 +338,12 @@ HOSTILE = (
 def test_names_stay_names(hostile: str, tmp_path: Path) -> None:
     base = mined("cartpole", 0.005, 0.95)
     features = tuple(
-        replace(feature, name=f"{hostile}{index}", unit=hostile)
+        replace(
+            feature,
+            name=f"{hostile}{index}",
+            unit=hostile,
+            indicator=None if index else Indicator(hostile, hostile, hostile),
+        )
         for index, feature in enumerate(base.source.features)
     )
     action = replace(base.actions[0], name=hostile, label_names=(hostile, f"{hostile}2"))
@@ -351,6 +375,18 @@ def test_names_in_the_model_are_data() -> None:
     props = {entry.key: entry.value for entry in model.metadata_props}
     assert props["environment"] == "CartPole-v1"
     assert '"cart position"' in props["features"]
+
+
+def test_an_export_says_what_its_numbers_stand_for() -> None:
+    rules = words_and_codes()
+    for source in (rules_to_c(rules), rules_to_python(rules)):
+        assert "mode is heavy (1 if so, else 0)" in source
+        assert "mode is light" in source  # of the query whether it is at most 0.5
+        assert "action 0 90000" in source
+    labels = replace(rules.actions[0], label_names=("slow", "fast", "stop"))
+    named = replace(rules, actions=(labels, rules.actions[1]))
+    for source in (rules_to_c(named), rules_to_python(named)):
+        assert "90000  stop" in source
 
 
 def test_an_empty_set_is_refused() -> None:

@@ -40,6 +40,7 @@ from sarl_core.demonstrations.formats.tables import (
     episode_fields,
     given,
     label_words,
+    missing_block,
     names_of_features,
     numbers_of,
     observation_block,
@@ -194,6 +195,7 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         indicators=block.indicators,
         action_words=label_words(taken.read, dimensions),
         feature_units=units_of(block.columns, {}, table.metadata.column_units),
+        missing_actions=missing_block(taken.read, dimensions),
         action_names=action_names(dimensions) if others.named else None,
         **fields,
         guess_labels=done.ndim == 1,
@@ -259,8 +261,7 @@ def _observations_of(table: CsvTable) -> _Half:
     words = {name for name, column in read.items() if column.words}
     guess = settle(guess, {name: column.values for name, column in read.items()}, words)
     read = {name: read[name] for name in guess.columns.used}
-    require_filled(read)
-    require_numbers(read, guess.columns.singles.values())
+    _require_marks(read, guess.columns)
     return _Half(guess, read, guess_notes(guess))
 
 
@@ -279,15 +280,20 @@ def _actions_of(table: CsvTable) -> _Half:
     if not guess.columns.actions:
         require_clear(guess, table.names)
     read = table.read(guess.columns)
-    require_filled(read)
-    require_numbers(read, guess.columns.singles.values())
+    _require_marks(read, guess.columns)
     return _Half(guess, read, ())
+
+
+def _require_marks(read: dict[str, TableColumn], columns: ColumnMap) -> None:
+    """Refuse what numbers or ends episodes and is empty or no number."""
+    singles = columns.singles.values()
+    require_filled({name: read[name] for name in singles}, reward=columns.reward)
+    require_numbers(read, singles)
 
 
 def _whole(table: CsvTable, columns: ColumnMap) -> _Half:
     """Read a file without names."""
     read = table.read(columns)
-    require_filled(read)
     return _Half(given(columns, "there is no header, and this is what the file is for"), read, ())
 
 
@@ -300,7 +306,7 @@ def _together(
     """Observations for the actions, and what both files say of the episodes."""
     columns = [half.guess.columns for half in halves]
     single = [
-        {role: half.read[name].values for role, name in half.guess.columns.singles.items()}
+        {role: half.read[name].with_gaps for role, name in half.guess.columns.singles.items()}
         for half in halves
     ]
     notes = (*halves[0].notes, *halves[1].notes)

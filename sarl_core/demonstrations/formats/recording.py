@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.checks import counted_steps
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import ColumnUse, Indicator
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
+from sarl_core.demonstrations.formats.missing import Missing, complete_rows
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
     as_numbers,
@@ -42,7 +44,10 @@ class Recording:
 
     Attributes:
         observations: Shape (N, d), or (N + episodes, d) with one more at each episode's end.
-        actions: Shape (N,) or (N, m), numbers of any type.
+        actions: Shape (N,) or (N, m), numbers of any type; what is not a number is missing, as
+            among the observations and rewards.
+        missing_actions: Where actions are missing whose type has no other way to say so, (N, m),
+            or None.
         observation_columns: What the d columns are called in messages.
         action_columns: What the m columns are called in messages.
         feature_names: d names, None where the file has none.
@@ -73,6 +78,7 @@ class Recording:
     action_names: tuple[str, ...] | None = None
     indicators: tuple[Indicator | None, ...] = ()
     action_words: tuple[tuple[str, ...], ...] = ()
+    missing_actions: NDArray[np.bool_] | None = None
     episodes: NDArray[Any] | None = None
     steps: NDArray[Any] | None = None
     rewards: NDArray[Any] | None = None
@@ -87,13 +93,16 @@ class Recording:
 
 
 def to_demonstrations(
-    recording: Recording, description: EnvironmentDescription | None
+    recording: Recording,
+    description: EnvironmentDescription | None,
+    missing: Missing = "refuse",
 ) -> Demonstrations:
     """Complete what a file holds and check it.
 
     Args:
         recording: What it holds.
         description: The environment to take from what the file does not say, or None.
+        missing: What becomes of steps without one of their values.
 
     Returns:
         The demonstrations.
@@ -101,6 +110,8 @@ def to_demonstrations(
     Raises:
         InputError: In one sentence with the column, as the file calls it, and the first row.
     """
+    if missing not in get_args(Missing):
+        raise InputError(f"missing is {quoted(missing)}; give 'refuse' or 'drop'")
     recording = replace(recording, actions=as_numbers(recording.actions, "actions"))
     metadata = recording.metadata
     described = description or _described(metadata)
@@ -109,9 +120,10 @@ def to_demonstrations(
     if described is not None:
         recording = _fit(recording, described)
     observations = _owned(recording.observations, np.float32)
-    require_finite(observations, recording.observation_columns, recording.rows)
     coarse = coarse_columns(recording.observations, observations, recording.observation_columns)
     recording = _without_last_observations(_checked(replace(recording, observations=observations)))
+    recording = _complete(recording, missing)
+    require_finite(recording.observations, recording.observation_columns, recording.rows)
     discrete, note = _is_discrete(recording, described)
     notes = (*recording.notes, *coarse, *((note,) if note is not None else ()))
     features = _features(recording, described)
@@ -226,6 +238,9 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
                 action_columns=actions.put(recording.action_columns),
                 action_names=described.action_names,
                 action_words=actions.put(recording.action_words),
+                missing_actions=None
+                if recording.missing_actions is None
+                else recording.missing_actions[:, actions.places],
                 metadata=recording.metadata.with_actions_in(actions),
             )
     notes = tuple(order.note for order in orders if order.note)
@@ -239,7 +254,6 @@ def _checked(recording: Recording) -> Recording:
     for attribute, role, check in (
         ("episodes", "episode", whole_numbers),
         ("steps", "step", whole_numbers),
-        ("rewards", "reward", column_of_numbers),
         ("terminated", "terminated", flags),
         ("truncated", "truncated", flags),
     ):
@@ -254,6 +268,60 @@ def _checked(recording: Recording) -> Recording:
         recording.rows,
     )
     return recording
+
+
+def _complete(recording: Recording, missing: Missing) -> Recording:
+    """Refuse or leave out steps without one of their values, and check the rewards."""
+    holes = _holes(recording)
+    if holes:
+        episodes, steps = _some(recording.episodes), recording.steps
+        left, note = complete_rows(holes, recording.rows, missing)
+
+        def of_left(values: NDArray[Any] | None) -> Any:
+            return None if values is None else values[left]
+
+        recording = replace(
+            recording,
+            observations=_owned(recording.observations[left], np.float32),
+            actions=recording.actions[left],
+            missing_actions=None,
+            episodes=episodes[left],
+            steps=(counted_steps(episodes) if steps is None else steps)[left],
+            rewards=of_left(recording.rewards),
+            terminated=of_left(recording.terminated),
+            truncated=of_left(recording.truncated),
+            rows=left if recording.rows is None else recording.rows[left],
+            notes=(*recording.notes, note),
+        )
+    if recording.rewards is None:
+        return recording
+    n, called = len(recording.actions), _called(recording, "reward")
+    return replace(
+        recording, rewards=column_of_numbers(recording.rewards, n, called, recording.rows)
+    )
+
+
+def _holes(recording: Recording) -> dict[str, NDArray[np.bool_]]:
+    """For each column that lacks values where it does, (N,)."""
+    n = len(recording.actions)
+    actions = recording.actions.reshape(n, -1)
+    blocks: list[tuple[Sequence[str], NDArray[Any]]] = [
+        (recording.observation_columns, recording.observations),
+        (recording.action_columns, actions),
+    ]
+    if recording.rewards is not None:
+        rewards = as_numbers(recording.rewards, _called(recording, "reward"))
+        if rewards.shape == (n,):
+            blocks.append(((_called(recording, "reward"),), rewards[:, None]))
+    holes = {
+        name: np.isnan(column)
+        for names, block in blocks
+        if block.dtype.kind == "f" and block.size and np.isnan(block.min())
+        for name, column in zip(names, block.T, strict=True)
+    }
+    if recording.missing_actions is not None:
+        holes |= dict(zip(recording.action_columns, recording.missing_actions.T, strict=True))
+    return {name: hole for name, hole in holes.items() if hole.any()}
 
 
 def _called(recording: Recording, role: str) -> str:

@@ -22,6 +22,7 @@ from sarl_core.demonstrations.formats.kinds import (
 )
 from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview, previewed
 from sarl_core.demonstrations.formats.mapping.roles import Roles
+from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming, naming_both
 from sarl_core.demonstrations.formats.pair import (
     alone_note,
@@ -59,6 +60,7 @@ def load_demonstrations(
     *,
     env_id: EnvironmentOrId | None = None,
     columns: Columns | None = None,
+    missing: Missing = "refuse",
 ) -> Demonstrations:
     """Load demonstrations from a file, a folder, or several files.
 
@@ -72,9 +74,12 @@ def load_demonstrations(
         columns: Which columns of a table hold what: a `ColumnMap` of all that are read, or the
             roles of some, as `{"brake": "action", "speed": "feature:m/s"}`; the others, and None,
             go by their names.
+        missing: What becomes of steps that lack a value (an empty cell, NaN, null, NA) among
+            observations, actions and rewards: "refuse" the file, or "drop" them. What is left of
+            an episode keeps its number and the numbers of its steps.
 
     Returns:
-        The demonstrations; their `notes` say what had to be guessed.
+        The demonstrations; their `notes` say what had to be guessed, and what was left out.
 
     Raises:
         InputError: If the file cannot be used: one sentence with file, column and first row.
@@ -90,12 +95,12 @@ def load_demonstrations(
     if len(paths) != 1:
         name = str(path) if isinstance(path, str | Path) else f"{len(paths)} files"
         with naming(name):
-            return _read_set(files_at(paths, name), description, columns)
+            return _read_set(files_at(paths, name), description, columns, missing)
     (path,) = paths
     with naming(str(path)):
         files = _files_of(path)
         if files is not None:
-            return _read_set(files, description, columns)
+            return _read_set(files, description, columns, missing)
         if not path.exists():
             raise InputError("there is no such file; check its name")
         names = partner_names(path.name) if columns is None else ()
@@ -103,15 +108,15 @@ def load_demonstrations(
             (path.with_name(name) for name in names if path.with_name(name).is_file()), None
         )
         if partner is None:
-            return _read(_content(path), path.name, description, columns)
+            return _read(_content(path), path.name, description, columns, missing)
         content = _content(path)
         unpacked(content, path.name)
         if is_complete(content, path.name, partner.name, description):
-            alone = _read(content, path.name, description, columns)
+            alone = _read(content, path.name, description, columns, missing)
             return _noted(alone, alone_note(path.name, partner.name))
         pair = (partner, path) if holds_actions(path.name) else (path, partner)
         contents = _content(pair[0]), _content(pair[1])
-    return _read_pair(contents, (str(pair[0]), str(pair[1])), description)
+    return _read_pair(contents, (str(pair[0]), str(pair[1])), description, missing)
 
 
 def read_demonstrations(
@@ -121,6 +126,7 @@ def read_demonstrations(
     env_id: EnvironmentOrId | None = None,
     columns: Columns | None = None,
     companion: tuple[Content, str] | None = None,
+    missing: Missing = "refuse",
 ) -> Demonstrations:
     """Read demonstrations from what was uploaded.
 
@@ -130,6 +136,7 @@ def read_demonstrations(
         env_id: As for `load_demonstrations`.
         columns: As for `load_demonstrations`.
         companion: Content and name of the other file of a pair, observations or actions.
+        missing: As for `load_demonstrations`.
 
     Returns:
         The demonstrations.
@@ -142,7 +149,7 @@ def read_demonstrations(
     with naming(name):
         content = _bytes(data)
     if companion is None:
-        return _read_named(content, name, description, columns)
+        return _read_named(content, name, description, columns, missing)
     other, other_name = companion
     with naming(other_name):
         other_content = _bytes(other)
@@ -150,8 +157,8 @@ def read_demonstrations(
         with naming(name):
             raise _no_pair_mapped()
     if holds_actions(name) and not holds_actions(other_name):
-        return _read_pair((other_content, content), (other_name, name), description)
-    return _read_pair((content, other_content), (name, other_name), description)
+        return _read_pair((other_content, content), (other_name, name), description, missing)
+    return _read_pair((content, other_content), (name, other_name), description, missing)
 
 
 def save_demonstrations(demonstrations: Demonstrations, path: str | Path) -> None:
@@ -183,6 +190,7 @@ def read_files(
     *,
     env_id: EnvironmentOrId | None = None,
     columns: Columns | None = None,
+    missing: Missing = "refuse",
 ) -> Demonstrations:
     """Read demonstrations from files that were uploaded together.
 
@@ -191,6 +199,7 @@ def read_files(
             and actions, or several tables of the same columns.
         env_id: As for `load_demonstrations`.
         columns: As for `load_demonstrations`.
+        missing: As for `load_demonstrations`.
 
     Returns:
         The demonstrations.
@@ -201,12 +210,14 @@ def read_files(
     columns = stated(columns)
     first, *others = files
     if not others:
-        return read_demonstrations(*first, env_id=env_id, columns=columns)
+        return read_demonstrations(*first, env_id=env_id, columns=columns, missing=missing)
     if _are_pair([name for _, name in files]):
-        return read_demonstrations(*first, env_id=env_id, columns=columns, companion=others[0])
+        return read_demonstrations(
+            *first, env_id=env_id, columns=columns, companion=others[0], missing=missing
+        )
     description = describe_environment(env_id) if env_id else None
     with naming(f"{len(files)} files"):
-        return _read_set(_given(files), description, columns)
+        return _read_set(_given(files), description, columns, missing)
 
 
 def table_columns(source: Source, name: str | None = None) -> tuple[str, ...]:
@@ -336,25 +347,28 @@ def _table_of(files: FileSet) -> Table | None:
 
 
 def _read_set(
-    files: FileSet, description: EnvironmentDescription | None, columns: ColumnMap | Roles | None
+    files: FileSet,
+    description: EnvironmentDescription | None,
+    columns: ColumnMap | Roles | None,
+    missing: Missing,
 ) -> Demonstrations:
     pair = pair_among(files.sizes)
     if pair is not None:
         if columns is not None:
             raise _no_pair_mapped()
         contents = files.contents(pair)
-        return _read_pair((contents[pair[0]], contents[pair[1]]), pair, description)
+        return _read_pair((contents[pair[0]], contents[pair[1]]), pair, description, missing)
     opened = _opened_set(files)
     if isinstance(opened, Recording):
         if columns is not None:
             raise InputError(
                 "columns are mapped in a table, and this data set has none; leave the map out"
             )
-        return to_demonstrations(opened, description)
+        return to_demonstrations(opened, description, missing)
     chosen = columns if columns is not None else opened.columns
     recording = recording_from_table(opened.table, chosen, description)
     recording = replace(recording, notes=(*opened.notes, *recording.notes))
-    return to_demonstrations(recording, description)
+    return to_demonstrations(recording, description, missing)
 
 
 def _read_named(
@@ -362,9 +376,10 @@ def _read_named(
     name: str,
     description: EnvironmentDescription | None,
     columns: ColumnMap | Roles | None,
+    missing: Missing,
 ) -> Demonstrations:
     with naming(name):
-        return _read(content, name, description, columns)
+        return _read(content, name, description, columns, missing)
 
 
 def _read(
@@ -372,9 +387,12 @@ def _read(
     name: str,
     description: EnvironmentDescription | None,
     columns: ColumnMap | Roles | None,
+    missing: Missing,
 ) -> Demonstrations:
     if extension_of(name) == ZIP:
-        return _read_set(files_in_archive(unpacked(content, name), name), description, columns)
+        return _read_set(
+            files_in_archive(unpacked(content, name), name), description, columns, missing
+        )
     form = format_of(name)
     content = unpacked(content, name)
     if form.open_table is None:
@@ -383,7 +401,7 @@ def _read(
             raise InputError(
                 f"columns are mapped in a table, and {form.kind} has none; leave the map out"
             )
-        return to_demonstrations(form.read(content), description)
+        return to_demonstrations(form.read(content), description, missing)
     table = form.open_table(content)
     partners = partner_names(PurePath(name).name)
     if partners and not table.named and columns is None and not fits(table, description):
@@ -393,13 +411,16 @@ def _read(
             f"it has no header, so it holds the {halves[own]} of a pair alone; give "
             f"{partners[0]!r} with the {halves[not own]} too"
         )
-    return to_demonstrations(recording_from_table(table, columns, description), description)
+    return to_demonstrations(
+        recording_from_table(table, columns, description), description, missing
+    )
 
 
 def _read_pair(
     contents: tuple[memoryview, memoryview],
     names: tuple[str, str],
     description: EnvironmentDescription | None,
+    missing: Missing,
 ) -> Demonstrations:
     with naming_both(names):
         for content, name in zip(contents, names, strict=True):
@@ -411,7 +432,7 @@ def _read_pair(
                 unpacked(content, name)
         recording = read_pair(*contents, names)
         with naming(f"{names[0]} with {names[1]}"):
-            return _noted(to_demonstrations(recording, description), pair_note(names))
+            return _noted(to_demonstrations(recording, description, missing), pair_note(names))
 
 
 def _no_pair_mapped() -> InputError:

@@ -84,6 +84,13 @@ class TableColumn:
             return cls(np.full(len(missing), np.nan), missing)
         return cls(coded.codes, missing if missing.any() else None, coded.words)
 
+    @property
+    def with_gaps(self) -> NDArray[Any]:
+        """The values, not a number where missing."""
+        if self.missing is None or self.values.dtype.kind == "f":
+            return self.values
+        return np.where(self.missing, np.nan, self.values)
+
     def at(self, rows: NDArray[np.int64]) -> TableColumn:
         """The same column in some of its rows."""
         missing = None if self.missing is None else self.missing[rows]
@@ -157,7 +164,7 @@ def recording_from_table(
         notes = guess_notes(guess)
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
-    require_filled(read, rows)
+    require_filled({name: read[name] for name in chosen.singles.values()}, rows, chosen.reward)
     single, numbered = singles_of(read, chosen, rows)
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
@@ -174,6 +181,7 @@ def recording_from_table(
         feature_units=units_of(block.columns, guess.roles, table.metadata.column_units),
         indicators=block.indicators,
         action_words=label_words(actions, chosen.actions),
+        missing_actions=missing_block(actions, chosen.actions),
         action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
         **fields,
         rows=rows,
@@ -204,7 +212,7 @@ def singles_of(
     singles = columns.singles
     episode = singles.get("episode")
     require_numbers(read, [name for name in singles.values() if name != episode], rows)
-    values = {role: read[name].values for role, name in singles.items()}
+    values = {role: read[name].with_gaps for role, name in singles.items()}
     if episode is None or not read[episode].words:
         return values, ()
     _, first, codes = np.unique(values["episode"], return_index=True, return_inverse=True)
@@ -319,18 +327,23 @@ def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     return {name: column.values for name, column in read.items()}
 
 
-def require_filled(read: Mapping[str, TableColumn], rows: NDArray[np.int64] | None = None) -> None:
-    """Refuse an empty field.
+def require_filled(
+    read: Mapping[str, TableColumn],
+    rows: NDArray[np.int64] | None = None,
+    reward: str | None = None,
+) -> None:
+    """Refuse an empty field where no step can be without one.
 
     Args:
         read: The columns by name.
         rows: The rows they had in the file, from 0; None if they are those.
+        reward: The column of rewards, which may be empty.
 
     Raises:
         InputError: With the column and its first empty row.
     """
     for name, column in read.items():
-        if column.missing is not None and column.missing.any():
+        if name != reward and column.missing is not None and column.missing.any():
             row = int(np.argmax(column.missing))
             number = row if rows is None else int(rows[row])
             raise InputError(
@@ -407,7 +420,7 @@ def observation_block(
         for index, (column, indicator) in enumerate(parts):
             held = read[column]
             if indicator is None or not held.words:
-                values[:, index] = held.values
+                values[:, index] = held.with_gaps
             else:
                 values[:, index] = indicated(Coded(held.values, held.words), [indicator])[:, 0]
     unnamed = names is None and not any(indicator for _, indicator in parts)
@@ -464,6 +477,18 @@ def action_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArr
     columns = [read[name].values for name in names]
     columns = [one.astype(np.int64) if one.dtype.kind == "b" else one for one in columns]
     return np.stack(columns, axis=1) if _is_vector(names) else columns[0]
+
+
+def missing_block(
+    read: Mapping[str, TableColumn], names: Sequence[str]
+) -> NDArray[np.bool_] | None:
+    """Where actions are missing, (N, m); None if they are nowhere."""
+    if all(read[name].missing is None for name in names):
+        return None
+    n = len(read[names[0]].values)
+    nowhere = np.zeros(n, dtype=np.bool_)
+    missing = [read[name].missing for name in names]
+    return np.stack([nowhere if one is None else one for one in missing], axis=1)
 
 
 def label_words(

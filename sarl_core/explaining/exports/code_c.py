@@ -9,8 +9,11 @@ from sarl_core.explaining.exports.program import (
     DimensionProgram,
     Program,
     Replacement,
+    action_lines,
     parts_of,
     program_of,
+    query_name,
+    state_lines,
 )
 from sarl_core.mining.language import action_text, conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
@@ -144,15 +147,8 @@ def _head(program: Program) -> str:
 
 
 def _names(program: Program) -> str:
-    features = [
-        f" *   {index:>3}  {comment(feature.name)}"
-        + (f" ({comment(feature.unit)})" if feature.unit else "")
-        for index, feature in enumerate(program.rule_set.source.features)
-    ]
-    actions = [
-        f" *   {index:>3}  {comment(order.dimension.name)}"
-        for index, order in enumerate(program.orders)
-    ]
+    features = [f" *   {comment(line)}" for line in state_lines(program.rule_set.source.features)]
+    actions = [f" *   {comment(line)}" for line in action_lines(program.rule_set.actions)]
     prototype = _SIGNATURE.format(kind=_kind(program))
     return "\n".join(
         [
@@ -162,8 +158,8 @@ def _names(program: Program) -> str:
             *actions,
             " */",
             "enum {",
-            f"    SHIELD_FEATURES = {len(features)},",
-            f"    SHIELD_ACTIONS = {len(actions)},",
+            f"    SHIELD_FEATURES = {len(program.rule_set.source.features)},",
+            f"    SHIELD_ACTIONS = {len(program.orders)},",
             f"    SHIELD_RULES = {len(program.rule_set)},",
             "    SHIELD_INVALID = -1",
             "};",
@@ -277,7 +273,7 @@ def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str:
     space = "    " * (step.level + 1)
     match step.kind:
         case "if":
-            name = comment(rule_set.source.features[step.feature].name)
+            name = comment(query_name(rule_set.source.features[step.feature]))
             return f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {name} */"
         case "else":
             return f"{space}}} else {{"

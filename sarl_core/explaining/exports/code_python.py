@@ -9,8 +9,11 @@ from sarl_core.explaining.exports.program import (
     DimensionProgram,
     Program,
     Replacement,
+    action_lines,
     parts_of,
     program_of,
+    query_name,
+    state_lines,
 )
 from sarl_core.mining.language import action_text, conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
@@ -185,16 +188,9 @@ def _names(program: Program) -> list[str]:
         f"# {counted(len(rule_set), 'rule')} for "
         f"{one_line(rule_set.source.env_id) or 'an unnamed environment'}. The state:"
     ]
-    lines += [
-        f"#   {index:>3}  {one_line(feature.name)}"
-        + (f" ({one_line(feature.unit)})" if feature.unit else "")
-        for index, feature in enumerate(rule_set.source.features)
-    ]
+    lines += [f"#   {line}" for line in state_lines(rule_set.source.features)]
     lines.append("# The actions:")
-    lines += [
-        f"#   {index:>3}  {one_line(order.dimension.name)}"
-        for index, order in enumerate(program.orders)
-    ]
+    lines += [f"#   {line}" for line in action_lines(rule_set.actions)]
     lines.append(f"FEATURES = {len(rule_set.source.features)}")
     if not program.continuous:
         lines.append(f"SINGLE = {len(program.orders) == 1}")
@@ -268,7 +264,7 @@ def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str | None:
     space = "    " * (step.level + 1)
     match step.kind:
         case "if":
-            name = one_line(rule_set.source.features[step.feature].name)
+            name = query_name(rule_set.source.features[step.feature])
             return f"{space}if x[{step.feature}] <= {_number(step.threshold)}:  # {name}"
         case "else":
             return f"{space}else:"

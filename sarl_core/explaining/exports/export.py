@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError, require
 from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
@@ -103,6 +104,9 @@ def prepare(
     if demonstrations is not None:
         must = "what thresholds are rounded on must be Demonstrations"
         require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+        demonstrations = recoded(
+            demonstrations, rule_set.source.features, called="the demonstrations"
+        )
         rule_set, notes = rules_for(rule_set, demonstrations)
         rounding = rounded_rules(rule_set, demonstrations)
         changed = decisions_changed(rule_set, rounding.rule_set, demonstrations)

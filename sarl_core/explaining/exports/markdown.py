@@ -9,7 +9,14 @@ from sarl_core.explaining.words.evidence import held_out_interval_text, held_out
 from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
-from sarl_core.mining.language import action_text, counted, one_line, share_text
+from sarl_core.mining.language import (
+    action_text,
+    counted,
+    flag_text,
+    is_flag,
+    one_line,
+    share_text,
+)
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
 
@@ -91,6 +98,8 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
 
 def _interval(bounds: Bounds, feature: Feature) -> str:
     """What is asked of one feature."""
+    if feature.indicator is not None and is_flag(feature, bounds):
+        return _text(flag_text(feature, bounds))
     name = _text(feature.name)
     unit = f" {_text(feature.unit)}" if feature.unit else ""
     limits = limit_texts(bounds, feature)

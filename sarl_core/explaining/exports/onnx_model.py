@@ -107,6 +107,7 @@ def rules_to_onnx(
                 [{"name": f.name, "unit": f.unit} for f in rule_set.source.features]
             ),
             "actions": json.dumps([order.dimension.name for order in program.orders]),
+            **({} if program.continuous else {"labels": json.dumps(_labels(program))}),
             "rules": json.dumps([rule.id for rule in rule_set.rules]),
         },
     )
@@ -121,6 +122,15 @@ _INVALID: dict[OnInvalid, str] = {
     "pass": "Where `invalid` is true, no rule was asked, and the action passes as it is "
     "(on_invalid: pass).",
 }
+
+
+def _labels(program: Program) -> list[dict[str, str]]:
+    """For each action dimension the name of each action."""
+    dimensions = [order.dimension for order in program.orders]
+    return [
+        {str(action): name for action, name in zip(one.actions, one.label_names, strict=True)}
+        for one in dimensions
+    ]
 
 
 def _valid(graph: _Graph, program: Program) -> str:

@@ -7,13 +7,16 @@ does with a state or an action that is none is the choice that the program was m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from sarl_core.demonstrations.dataset import Feature
 from sarl_core.errors import InputError, require
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
 from sarl_core.mining.rules import Rule
@@ -111,6 +114,48 @@ class CodeLine(NamedTuple):
     feature: int = LEAF
     threshold: float = 0.0
     target: int = NO_RULE
+
+
+def state_lines(features: Sequence[Feature]) -> list[str]:
+    """What the numbers of a state are, for a comment.
+
+    Args:
+        features: The d features.
+
+    Returns:
+        As "  0  gap (m)" and "  1  mode is heavy (1 if so, else 0)".
+    """
+    return [
+        f"{index:>3}  {one_line(feature.name)}"
+        + (f" ({one_line(feature.unit)})" if feature.unit else "")
+        + ("" if feature.indicator is None else " (1 if so, else 0)")
+        for index, feature in enumerate(features)
+    ]
+
+
+def action_lines(dimensions: Sequence[LabelledDimension]) -> list[str]:
+    """What the numbers of an action are, for a comment.
+
+    Args:
+        dimensions: The m action dimensions.
+
+    Returns:
+        As "  0  pedal", and where its labels have names "       0  brake" for each.
+    """
+    lines = []
+    for index, dimension in enumerate(dimensions):
+        lines.append(f"{index:>3}  {one_line(dimension.name)}")
+        if not dimension.is_interval and dimension.label_names != tuple(
+            map(str, dimension.actions)
+        ):
+            labels = zip(dimension.actions, dimension.label_names, strict=True)
+            lines += [f"     {action:>3}  {one_line(name)}" for action, name in labels]
+    return lines
+
+
+def query_name(feature: Feature) -> str:
+    """What a query whether a feature is at most a threshold is about, for a comment."""
+    return one_line(feature.name if feature.indicator is None else feature.statement(False))
 
 
 def require_rules(rule_set: RuleSet) -> None:

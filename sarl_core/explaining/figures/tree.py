@@ -133,7 +133,9 @@ def node_lines(tree: PolicyTree, node: int) -> list[str]:
     feature = int(tree.feature[node])
     if feature != LEAF:
         queried = tree.source.features[feature]
-        lines.append(f"asks: {queried.name} ≤ {limit_text(float(tree.threshold[node]), queried)}?")
+        limit = limit_text(float(tree.threshold[node]), queried)
+        plain = queried.indicator is None
+        lines.append(f"asks: {f'{queried.name} ≤ {limit}' if plain else queried.statement(True)}?")
     return lines
 
 

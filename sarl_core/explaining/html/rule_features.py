@@ -66,9 +66,12 @@ def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> tuple[str, M
         if math.isfinite(bound)
     ]
     values, shares = round_ticks(low, high, _X_TICKS), round_ticks(0.0, highest, _Y_TICKS)
+    said = list(map(tick_text, values))
+    if feature.indicator is not None:
+        values, said = [0.0, 1.0], ["no", "yes"]
     drawn = plot(
         parts,
-        Axis(across, values, list(map(tick_text, values)), feature.unit or feature.name),
+        Axis(across, values, said, feature.unit or feature.name),
         Axis(upwards, shares, [f"{100 * share:g} %" for share in shares]),
         label=_in_words(one, feature),
         height=132,

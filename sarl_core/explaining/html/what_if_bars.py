@@ -20,6 +20,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.neighbourhood import FeatureLine
 
 _PALE = 0.32
+_BETWEEN = 0.5  # no and yes of a feature that says which word a column holds
 
 
 class _Row(NamedTuple):
@@ -118,13 +119,17 @@ def _row(
     widest_first = sorted(parts, key=lambda part: part[0] - part[1])
     near = decimal_text(decimal_on_scale(value, low, high))
     now = f"{feature.name} is {with_unit(near, feature)}"
+    if feature.indicator is not None:
+        now = feature.statement(value > _BETWEEN)
     return _Row(
         feature.name,
         f"{now}: {_described(parts, value, feature, labels)}",
         now,
         f"{100 * (value - low) / (high - low):.2f}%",
         [_part(part, ends, feature, labels) for part in widest_first],
-        [
+        ["no", "yes"]
+        if feature.indicator is not None
+        else [
             with_unit(number_text(end, apart_from=other), feature)
             for end, other in ((low, high), (high, low))
         ],
@@ -172,6 +177,9 @@ def _described(
 
 
 def _between(start: float, end: float, feature: Feature) -> str:
+    if feature.indicator is not None:
+        holds = [one for one in (False, True) if (start < _BETWEEN, end > _BETWEEN)[one]]
+        return " or ".join("yes" if one else "no" for one in holds)
     return (
         f"{number_text(start, apart_from=end)} to "
         f"{with_unit(number_text(end, apart_from=start), feature)}"

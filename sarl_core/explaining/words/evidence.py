@@ -310,6 +310,9 @@ def band_text(band: Band, feature: Feature) -> str:
     sign = "≤" if band.op == "<=" else ">"
     limit = limit_text(band.threshold, feature)
     own = f"{feature.name} {sign} {limit}{f' {feature.unit}' if feature.unit else ''}"
+    if feature.indicator is not None:
+        own = feature.statement(band.op == ">")
+        return own if band.rounds else f"{own} (not asked again)"
     if not band.rounds:
         return f"{own} (not asked again)"
     low = number_text(band.low, apart_from=band.high)

@@ -57,7 +57,7 @@ def condition_views(
             ConditionView(
                 short_condition(bounds, feature, beside=(value,)),
                 with_unit(value_text(value, feature, [bounds]), feature),
-                with_unit(number_text(room), feature),
+                "–" if is_flag(feature, bounds) else with_unit(number_text(room), feature),
             )
         )
     return tuple(views)
@@ -85,6 +85,9 @@ def outside_texts(
     ):
         if least <= value <= most:
             continue
+        if feature.indicator is not None:
+            texts.append(f"{feature.statement(value > least)}, which was never seen there")
+            continue
         below = value < least
         edge = least if below else most
         texts.append(
@@ -104,8 +107,10 @@ def feature_change_text(change: FeatureChange, feature: Feature) -> str:
         feature: Its name and unit.
 
     Returns:
-        As "pole angle were 0.03 rad less", or "there were no left leg contact".
+        As "pole angle were 0.03 rad less", "there were no left leg contact", or "mode were heavy".
     """
+    if _is_contact(change, feature) and feature.indicator is not None:
+        return feature.statement(change.by > 0).replace(" is ", " were ", 1)
     if _is_contact(change, feature):
         return f"there were {'no ' if change.by < 0 else ''}{feature.name}"
     way = "less" if change.by < 0 else "more"

@@ -76,7 +76,8 @@ def begin(of: Base, rule: Rule | None = None, *, changing: bool = False) -> Draf
         for row, ask in enumerate(asks):
             sign = next(word for word, op in SIGNS.items() if op == ask.op)
             place = names.index(ask.feature)
-            for name, value in (("feature", place), ("sign", sign), ("at", ask.threshold)):
+            filled = ("feature", place), ("sign", sign), ("at", ask.threshold), ("says", ask.op)
+            for name, value in filled:
                 st.session_state[draft.key(name, row)] = value
         st.session_state[draft.key("dimension")] = rule.dimension
         st.session_state[draft.key("action")] = rule.action
@@ -192,28 +193,7 @@ def _condition(base: Base, draft: Draft, row: int) -> Ask:
             label_visibility="collapsed",
             width=260,
         )
-        sign = st.selectbox(
-            "Is",
-            list(SIGNS),
-            key=draft.key("sign", row),
-            persist_state="session",
-            label_visibility="collapsed",
-            width=110,
-        )
-        values = base.basis.ground.states[:, feature]
-        least, most = float(values.min()), float(values.max())
-        low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
-        threshold = st.number_input(
-            "Number",
-            value=None,
-            step=None,
-            format="%.17g",  # every digit, and no more than tell the number from all others
-            key=draft.key("at", row),
-            persist_state="session",
-            label_visibility="collapsed",
-            placeholder=f"{low} to {high}",
-            width=190,
-        )
+        ask = _ask(base, draft, row, feature)
         st.button(
             "Remove the condition",
             on_click=_fewer,
@@ -222,7 +202,46 @@ def _condition(base: Base, draft: Draft, row: int) -> Ask:
             key=draft.key("fewer", row),
             type="tertiary",
         )
-    return Ask(features[feature].name, SIGNS[sign], threshold)
+    return ask
+
+
+def _ask(base: Base, draft: Draft, row: int, at: int) -> Ask:
+    """What is asked of a feature: a bound; of one that is about words, which it is."""
+    feature = base.rule_set.source.features[at]
+    if feature.indicator is not None:
+        op = st.selectbox(
+            "Says",
+            list(SIGNS.values()),
+            format_func=lambda op: feature.statement(op == ">"),
+            key=draft.key("says", row),
+            persist_state="session",
+            label_visibility="collapsed",
+            width=310,
+        )
+        return Ask(feature.name, op, 0.5)
+    sign = st.selectbox(
+        "Is",
+        list(SIGNS),
+        key=draft.key("sign", row),
+        persist_state="session",
+        label_visibility="collapsed",
+        width=110,
+    )
+    values = base.basis.ground.states[:, at]
+    least, most = float(values.min()), float(values.max())
+    low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
+    threshold = st.number_input(
+        "Number",
+        value=None,
+        step=None,
+        format="%.17g",  # every digit, and no more than tell the number from all others
+        key=draft.key("at", row),
+        persist_state="session",
+        label_visibility="collapsed",
+        placeholder=f"{low} to {high}",
+        width=190,
+    )
+    return Ask(feature.name, SIGNS[sign], threshold)
 
 
 def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import Indicator
+from sarl_core.demonstrations.words import Coded, columns_of_words, indicated, spelled
 from sarl_core.explaining.state_path import PathFinder
 from sarl_core.explaining.words.what_if import by_use
 from sarl_core.mining.rule_set import RuleSet
@@ -42,6 +45,15 @@ class Situation:
         return _order(self.rules.rule_set)
 
     @property
+    def columns(self) -> dict[str, list[int]]:
+        """Where the indicators of each column of words stand."""
+        return columns_of_words([one.indicator for one in self.demonstrations.features])
+
+    def indicators(self, places: Sequence[int]) -> list[Indicator]:
+        """Of one column of words."""
+        return [one for at in places if (one := self.demonstrations.features[at].indicator)]
+
+    @property
     def finder(self) -> PathFinder:
         """Follows a state through rules that are of no tree at hand."""
         return _finder(self.rules.rule_set)
@@ -63,8 +75,17 @@ def _neighbourhood(rule_set: RuleSet, projection: Projection, outside: Outside) 
 
 @cached()
 def _spans(demonstrations: Demonstrations) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
-    observations = demonstrations.observations
-    return feature_spans(observations), feature_spreads(observations)
+    observations, features = demonstrations.observations, demonstrations.features
+    spans = list(feature_spans(observations))
+    # Of words the most frequent one stands in the middle: medians need not be any of them.
+    for places in columns_of_words([one.indicator for one in features]).values():
+        indicators = [one for at in places if (one := features[at].indicator)]
+        codes, words = spelled(observations[:, places], indicators)
+        likeliest = np.bincount(codes[codes >= 0], minlength=len(words)).argmax()
+        middle = indicated(Coded(np.array([likeliest]), words), indicators)[0].tolist()
+        for at, value in zip(places, middle, strict=True):
+            spans[at] = Span(0.0, value, 1.0)
+    return tuple(spans), feature_spreads(observations)
 
 
 @cached()

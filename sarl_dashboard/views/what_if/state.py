@@ -8,6 +8,7 @@ import numpy as np
 import streamlit as st
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.words import Coded, indicated, spelled, words_of
 from sarl_core.shielding.sampling import Span, random_state, within
 from sarl_dashboard.jobs.replays import latest
 from sarl_dashboard.text import escaped
@@ -94,7 +95,7 @@ def _take(situation: Situation, more: int = 0) -> None:
     state = _state(situation, source, number)
     st.session_state["_what_if_none"] = state if isinstance(state, str) else ""
     if not isinstance(state, str):
-        _put(state, situation.spans)
+        _put(state, situation)
 
 
 def _state(situation: Situation, source: str, number: int) -> NDArray[np.float32] | str:
@@ -134,47 +135,68 @@ def _replayed(features: int) -> NDArray[np.float32] | None:
 # --- its sliders -------------------------------------------------------------------------------
 
 
-def fit_sliders(spans: Sequence[Span]) -> None:
+def fit_sliders(situation: Situation) -> None:
     """Move the sliders where other data has other values; before they are drawn."""
     # Other data has other sliders under the same names.
-    data = repr(spans)
+    spans, columns = situation.spans, situation.columns
+    data = repr((spans, columns))
     if st.session_state.get("_what_if_data", data) != data:
-        _put(_middle(spans), spans)
+        _put(_middle(spans), situation)
     st.session_state["_what_if_data"] = data
+    of_words = {at for places in columns.values() for at in places}
     for index, span in enumerate(spans):
         value = st.session_state.get(f"x{index}")
-        if value is not None and not span.low <= value <= span.high:
+        if index not in of_words and value is not None and not span.low <= value <= span.high:
             st.session_state[f"x{index}"] = span.middle
 
 
 def sliders(situation: Situation) -> NDArray[np.float32]:
-    """The state, shape (d,)."""
-    order = situation.order
-    values = dict.fromkeys(order, 0.0)
+    """The state, shape (d,): a slider for each number of it, a choice for each word."""
+    first = {at: places[0] for places in situation.columns.values() for at in places}
+    order = tuple(dict.fromkeys(first.get(index, index) for index in situation.order))
+    state = np.zeros(len(situation.spans), dtype=np.float32)
     for index in order[:FIRST]:
-        values[index] = _slider(situation, index)
+        _set(state, situation, index)
     rest = order[FIRST:]
     if rest:
         with st.expander(f"{len(rest)} more features", icon=":material/unfold_more:"):
             for index in rest:
-                values[index] = _slider(situation, index)
-    return np.array([values[index] for index in range(len(order))], dtype=np.float32)
+                _set(state, situation, index)
+    return state
 
 
-def _slider(situation: Situation, index: int) -> float:
-    """One feature's."""
+def _set(state: NDArray[np.float32], situation: Situation, index: int) -> None:
+    """Ask for one feature of the state, or for the word of a column that several are about."""
     feature = situation.demonstrations.features[index]
-    name = escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name)
-    return span_slider(name, situation.spans[index], f"x{index}")
+    if feature.indicator is None:
+        name = escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name)
+        state[index] = span_slider(name, situation.spans[index], f"x{index}")
+        return
+    column = feature.indicator.column
+    places = situation.columns[column]
+    indicators = situation.indicators(places)
+    words = words_of(indicators)
+    middle = np.array([[situation.spans[at].middle for at in places]], dtype=np.float32)
+    likeliest = int(spelled(middle, indicators).codes[0])
+    word = st.selectbox(
+        escaped(column), words, index=likeliest, key=f"x{index}", bind="query-params"
+    )
+    state[places] = indicated(Coded(np.array([words.index(word)]), words), indicators)[0]
 
 
 def _middle(spans: Sequence[Span]) -> NDArray[np.float32]:
     return np.array([span.middle for span in spans], dtype=np.float32)
 
 
-def _put(state: NDArray[np.float32], spans: Sequence[Span]) -> None:
+def _put(state: NDArray[np.float32], situation: Situation) -> None:
     """Move the sliders; for callbacks, and before they are drawn."""
-    near = within(state, spans)
+    near = within(state, situation.spans)
     for index, value in enumerate(near.tolist()):
         st.session_state[f"x{index}"] = value
+    for places in situation.columns.values():
+        indicators = situation.indicators(places)
+        code = int(spelled(near[None, places], indicators).codes[0])
+        for at in places[1:]:
+            del st.session_state[f"x{at}"]  # the first of them has the widget
+        st.session_state[f"x{places[0]}"] = words_of(indicators)[max(code, 0)]
     st.session_state["_what_if_moved"] = int((near != state).sum())

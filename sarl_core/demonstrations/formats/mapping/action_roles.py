@@ -60,15 +60,24 @@ def stated_actions(
                 )
             columns[name] = read[name]
             continue
-        if kind == "labels" and not without_fraction(values).all():
-            row = int(np.argmax(~without_fraction(values)))
+        gaps = np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(values), np.bool_)
+        broken = ~(without_fraction(values) | gaps)
+        if kind == "labels" and broken.any():
+            row = int(np.argmax(broken))
             raise InputError(
                 f"column {quoted(name)} is {values[row]} in row "
                 f"{(row if rows is None else int(rows[row])) + 1}, which is no label; map it as "
                 "continuous, or mend that row"
             )
-        dtype = np.int64 if kind == "labels" else np.float64
-        columns[name] = replace(read[name], values=values.astype(dtype))
+        if kind == "continuous":
+            columns[name] = replace(read[name], values=read[name].with_gaps.astype(np.float64))
+            continue
+        missing = read[name].missing
+        columns[name] = replace(
+            read[name],
+            values=np.where(gaps, 0, values).astype(np.int64),
+            missing=(gaps if missing is None else gaps | missing) if gaps.any() else missing,
+        )
     return columns
 
 

@@ -1,0 +1,98 @@
+"""Words of one set of demonstrations said by the indicators that rules know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.fields import TRUTH
+from sarl_core.demonstrations.words import Coded, columns_of_words, indicated, spelled, words_of
+from sarl_core.environments.feature_order import plain_names, shortened
+from sarl_core.errors import InputError, quoted
+
+
+def recoded(
+    demonstrations: Demonstrations, features: Sequence[Feature], *, called: str
+) -> Demonstrations:
+    """Demonstrations whose columns of words have the indicators of other features.
+
+    Which words occur decides which indicators a column becomes; rules know those of the data that
+    they were mined from.
+
+    Args:
+        demonstrations: N steps.
+        features: Of rules.
+        called: What the demonstrations are called in a message.
+
+    Returns:
+        The same steps; the same object where the indicators are the same, or there are none.
+
+    Raises:
+        InputError: If a column holds a word that the rules do not know.
+    """
+    wanted = _by_column(features)
+    own = _by_column(demonstrations.features)
+    indicators = [one.indicator for one in demonstrations.features]
+    if not wanted or [one.indicator for one in features] == indicators:
+        return demonstrations
+    columns: list[np.ndarray[tuple[int], np.dtype[np.float32]]] = []
+    said: list[Feature] = []
+    for at, feature in enumerate(demonstrations.features):
+        (column,) = plain_names((feature.indicator.column if feature.indicator else feature.name,))
+        places = own.get(column, [at])
+        if column not in wanted or at != places[0]:
+            if column not in wanted or feature.indicator is None:
+                columns.append(demonstrations.observations[:, at])
+                said.append(feature)
+            continue
+        coded = _words(demonstrations, places)
+        known = [features[place] for place in wanted[column]]
+        if coded is None:  # numbers, which are refused as another feature
+            columns.append(demonstrations.observations[:, at])
+            said.append(feature)
+            continue
+        _require_known(coded, known, called)
+        columns += list(indicated(coded, [one.indicator for one in known if one.indicator]).T)
+        said += known
+    return replace(
+        demonstrations,
+        observations=np.stack(columns, axis=1),
+        feature_names=tuple(one.name for one in said),
+        feature_units=tuple(one.unit for one in said),
+        indicators=tuple(one.indicator for one in said),
+    )
+
+
+def _by_column(features: Sequence[Feature]) -> dict[str, list[int]]:
+    """Where the features of each column of words stand."""
+    places = columns_of_words([one.indicator for one in features])
+    return dict(zip(plain_names(tuple(places)), places.values(), strict=True))
+
+
+def _words(demonstrations: Demonstrations, places: Sequence[int]) -> Coded | None:
+    """The words of a column; of one that holds 1 and 0, true and false."""
+    values = demonstrations.observations[:, list(places)]
+    indicators = [one for at in places if (one := demonstrations.features[at].indicator)]
+    if indicators:
+        return spelled(values, indicators)
+    if not np.isin(values, (0, 1)).all():
+        return None
+    return Coded(values[:, 0].astype(np.int64), TRUTH)
+
+
+def _require_known(coded: Coded, features: Sequence[Feature], called: str) -> None:
+    """Refuse a word that the rules do not know."""
+    indicators = [one.indicator for one in features if one.indicator is not None]
+    words = words_of(indicators)
+    unknown = [code for code, word in enumerate(coded.words) if word not in words]
+    rows = np.flatnonzero(np.isin(coded.codes, unknown))
+    if len(rows):
+        word = coded.words[int(coded.codes[rows[0]])]
+        raise InputError(
+            f"{called} holds the {indicators[0].column} {quoted(word)} in row {rows[0] + 1} "
+            f"({len(rows):,} rows in all), which the rules do not know: they were mined from "
+            f"{shortened(words)}; leave those rows out, or mine from demonstrations with it"
+        )
