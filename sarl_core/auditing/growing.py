@@ -7,6 +7,7 @@ from pathlib import Path
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations
 from sarl_core.demonstrations.formats.columns import Columns
+from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.errors import InputError
 from sarl_core.limits import limited_bytes
 
@@ -21,12 +22,15 @@ class RotatedError(InputError):
 class GrowingLog:
     """A text file of lines that somebody writes to."""
 
-    def __init__(self, path: Path, columns: Columns | None = None) -> None:
+    def __init__(
+        self, path: Path, columns: Columns | None = None, missing: Missing = "refuse"
+    ) -> None:
         """Begin with nothing read.
 
         Args:
             path: A `.csv`, `.tsv`, `.jsonl` or `.ndjson` file.
             columns: What is said of its columns, as for `load_demonstrations`.
+            missing: What becomes of steps that lack a value, likewise.
 
         Raises:
             InputError: If it is of another kind, or not there.
@@ -40,6 +44,7 @@ class GrowingLog:
             raise InputError(f"{path} is no file that could be followed; check its name")
         self.path = path
         self.columns = columns
+        self.missing: Missing = missing
         self._file = path.stat().st_ino
         self._size = 0
 
@@ -73,4 +78,6 @@ class GrowingLog:
         whole = content[: content.rfind(b"\n") + 1]
         if whole.count(b"\n") < _FEWEST_LINES:
             return None
-        return read_demonstrations(whole, str(self.path), columns=self.columns)
+        return read_demonstrations(
+            whole, str(self.path), columns=self.columns, missing=self.missing
+        )

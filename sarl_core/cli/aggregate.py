@@ -19,6 +19,7 @@ from sarl_core.cli.options import (
     File,
     Json,
     MaxSteps,
+    MissingName,
     Normalise,
     ProjectionName,
     Seed,
@@ -53,6 +54,7 @@ def aggregate(
         ),
     ],
     columns: Columns,
+    missing: MissingName = "refuse",
     max_rules: Annotated[
         int, typer.Option("--max-rules", help="Most rules of each action dimension.")
     ] = 48,
@@ -131,7 +133,7 @@ def aggregate(
             max_steps=max_steps,
             choose=choose,
         )
-        start = read_demonstrations(file, env, columns)
+        start = read_demonstrations(file, env, columns, missing)
         environment = env or recorded_environment(start)
         agents = _agents(agent, expert, environment, normalise)
         read = start.notes

@@ -12,7 +12,14 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import Columns, Json, ProjectionName, out_option, with_columns
+from sarl_core.cli.options import (
+    Columns,
+    Json,
+    MissingName,
+    ProjectionName,
+    out_option,
+    with_columns,
+)
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,6 +49,7 @@ def audit(
         ),
     ],
     columns: Columns,
+    missing: MissingName = "refuse",
     out: Annotated[
         Path | None,
         out_option(
@@ -106,14 +114,16 @@ def audit(
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
         mined_from = (
-            None if demonstrations is None else read_demonstrations(demonstrations, None, columns)
+            None
+            if demonstrations is None
+            else read_demonstrations(demonstrations, None, columns, missing)
         )
 
         def hold(path: Path, steps: Demonstrations | None = None) -> Audit:
             try:
                 return against(
                     rule_set,
-                    read_demonstrations(path, None, columns) if steps is None else steps,
+                    read_demonstrations(path, None, columns, missing) if steps is None else steps,
                     projection=projection,
                     demonstrations=mined_from,
                 )
@@ -124,7 +134,7 @@ def audit(
         if follow:
             from sarl_core.auditing.growing import GrowingLog
 
-            held, rotated = _followed(GrowingLog(log, columns), partial(hold, log), guards)
+            held, rotated = _followed(GrowingLog(log, columns, missing), partial(hold, log), guards)
         else:
             held = hold(log)
         comparison = None if compare is None else LogComparison(held, hold(compare))

@@ -16,6 +16,7 @@ from sarl_core.cli.options import (
     EnvOfFile,
     File,
     Json,
+    MissingName,
     Normalise,
     Seed,
     Stochastic,
@@ -76,6 +77,7 @@ def record(
 def check(
     file: File,
     columns: Columns,
+    missing: MissingName = "refuse",
     env: EnvOfFile = None,
     suggest: Annotated[
         Path | None,
@@ -98,7 +100,7 @@ def check(
     if suggest is not None:
         _suggest_columns(file, columns, suggest, as_json)
         return
-    _tell_demonstrations(read_demonstrations(file, env, columns), file, as_json)
+    _tell_demonstrations(read_demonstrations(file, env, columns, missing), file, as_json)
 
 
 def _suggest_columns(file: Path, columns: Columns, out: Path, as_json: bool) -> None:

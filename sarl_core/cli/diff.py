@@ -9,7 +9,7 @@ import typer
 
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
-from sarl_core.cli.options import Columns, Json, with_columns
+from sarl_core.cli.options import Columns, Json, MissingName, with_columns
 
 
 @with_columns
@@ -19,6 +19,7 @@ def diff(
         Path, typer.Argument(metavar="B.json", show_default=False, help="Other rules.")
     ],
     columns: Columns,
+    missing: MissingName = "refuse",
     demonstrations: Annotated[
         Path | None,
         typer.Option(
@@ -52,7 +53,7 @@ def diff(
                 "the same every time; --demonstrations takes those of a file."
             )
         else:
-            recorded = read_demonstrations(demonstrations, None, columns)
+            recorded = read_demonstrations(demonstrations, None, columns, missing)
             recorded = recoded(recorded, one.source.features, called=str(demonstrations))
             one, more = rules_for(one, recorded, called="the states")
             other, notes = comparable(one, other)[0], (*recorded.notes, *notes, *more)

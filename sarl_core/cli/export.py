@@ -13,6 +13,7 @@ from sarl_core.cli.options import (
     Columns,
     EnvOfFile,
     Json,
+    MissingName,
     OnInvalidName,
     ProjectionName,
     out_option,
@@ -67,6 +68,7 @@ def export(
     env: EnvOfFile = None,
     projection: ProjectionName = "centre",
     on_invalid: OnInvalidName = "raise",
+    missing: MissingName = "refuse",
     as_json: Json = False,
 ) -> None:
     """Write rules as code or for reading, with test vectors at every threshold.
@@ -87,7 +89,9 @@ def export(
 
         rule_set = RuleSet.load(rules)
         given = (
-            None if demonstrations is None else read_demonstrations(demonstrations, env, columns)
+            None
+            if demonstrations is None
+            else read_demonstrations(demonstrations, env, columns, missing)
         )
         vectors, prepared = export_rules(
             rule_set,

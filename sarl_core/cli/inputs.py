@@ -51,7 +51,10 @@ def read_agent(
 
 
 def read_demonstrations(
-    file: Path, env_id: EnvironmentOrId | None, columns: Roles
+    file: Path,
+    env_id: EnvironmentOrId | None,
+    columns: Roles,
+    missing: Literal["refuse", "drop"] = "refuse",
 ) -> Demonstrations:
     """Read a file of demonstrations.
 
@@ -59,6 +62,7 @@ def read_demonstrations(
         file: As the argument names it.
         env_id: Of the option ``--env``, or None.
         columns: What was said of columns with ``--columns`` and ``--column``.
+        missing: Of the option ``--missing``.
 
     Returns:
         What is in it.
@@ -68,7 +72,7 @@ def read_demonstrations(
     """
     from sarl_core.demonstrations.formats import load_demonstrations
 
-    return load_demonstrations(file, env_id=env_id, columns=columns)
+    return load_demonstrations(file, env_id=env_id, columns=columns, missing=missing)
 
 
 def read_shield(

@@ -188,6 +188,14 @@ _ColumnRoles = Annotated[
         "several times.",
     ),
 ]
+MissingName = Annotated[
+    Literal["refuse", "drop"],
+    typer.Option(
+        "--missing",
+        help="What becomes of steps that lack a value (an empty cell, NaN, null, NA): refuse the "
+        "file and say how many there are, or drop those steps; the others keep their numbers.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 

@@ -14,6 +14,7 @@ from sarl_core.cli.options import (
     Columns,
     Json,
     MaxSteps,
+    MissingName,
     Normalise,
     out_option,
     with_columns,
@@ -92,6 +93,7 @@ def report(
         int, typer.Option("--episodes", min=1, help="Played for the pictures.")
     ] = _EPISODES,
     max_steps: MaxSteps = None,
+    missing: MissingName = "refuse",
     as_json: Json = False,
 ) -> None:
     """Write a report of rules: one HTML file for people who know only the task.
@@ -109,12 +111,13 @@ def report(
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
-        given = read_demonstrations(demonstrations, env, columns)
+        given = read_demonstrations(demonstrations, env, columns, missing)
         card = read_card(rules)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
             "--demonstrations": demonstrations,
             "--column": as_options(columns),
+            "--missing": None if missing == "refuse" else missing,
             "--comparison": comparison,
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
@@ -126,7 +129,9 @@ def report(
             "--max-steps": max_steps,
             "--out": out,
         }
-        mined = mining_command(rule_set, rules, demonstrations, given, env=env, columns=columns)
+        mined = mining_command(
+            rule_set, rules, demonstrations, given, env=env, columns=columns, missing=missing
+        )
         document = make_report(
             rule_set,
             given,

@@ -15,6 +15,7 @@ from sarl_core.cli.options import (
     EnvOfFile,
     File,
     Json,
+    MissingName,
     out_option,
     with_columns,
     with_environment,
@@ -28,6 +29,7 @@ def mine(
     file: File,
     out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
     columns: Columns,
+    missing: MissingName = "refuse",
     support: Annotated[
         float | None,
         typer.Option(
@@ -136,7 +138,7 @@ def mine(
         if setting is not None:
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
-        demonstrations = read_demonstrations(file, env, columns)
+        demonstrations = read_demonstrations(file, env, columns, missing)
         oddities = describe_oddities(demonstrations)
         tried = split = None
         if hold_out is not None:
@@ -178,6 +180,7 @@ def landscape(
     file: File,
     out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],
     columns: Columns,
+    missing: MissingName = "refuse",
     env: EnvOfFile = None,
     divider: Divider = 2,
     supports: Annotated[
@@ -214,7 +217,7 @@ def landscape(
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        recorded = read_demonstrations(file, env, columns)
+        recorded = read_demonstrations(file, env, columns, missing)
         trees = grow_policy_trees(recorded, divider=divider)
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
+from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.environment import Environment
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -105,6 +106,7 @@ def mining_command(
     *,
     env: Environment | None = None,
     columns: Roles | None = None,
+    missing: Missing = "refuse",
 ) -> str | None:
     """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
 
@@ -115,6 +117,7 @@ def mining_command(
         given: The demonstrations.
         env: That was named when they were read, which gives names and bounds; None for none.
         columns: What was said of their columns.
+        missing: What became of steps that lack a value.
 
     Returns:
         One line; None for rules from other data, of a budget, tried on episodes kept aside, or
@@ -140,6 +143,7 @@ def mining_command(
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
             "--column": as_options(columns or {}),
+            "--missing": None if missing == "refuse" else missing,
             **({} if env is None else env.options),
             "--out": rules,
         },
