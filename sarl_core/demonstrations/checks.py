@@ -120,11 +120,12 @@ def _indicators(
     given: Iterable[Indicator | None] | None,
     observations: NDArray[np.float32],
     feature_names: tuple[str, ...],
-) -> tuple[Indicator | None, ...]:
+) -> tuple[Indicator | None, ...] | None:
     """What features say of words; each such feature is 1 or 0."""
-    d = len(feature_names)
-    indicators = (None,) * d if given is None else tuple(given)
-    require_length(len(indicators), d, "indicators", "features")
+    indicators = () if given is None else tuple(given)
+    if not any(indicators):
+        return None
+    require_length(len(indicators), len(feature_names), "indicators", "features")
     for index, indicator in enumerate(indicators):
         if indicator is None:
             continue
@@ -252,7 +253,7 @@ def _labels(
     return {
         "label_names": tuple(one[0] for one in labels),
         "label_first": tuple(one[1] for one in labels),
-        "label_codes": tuple(one[2] for one in labels),
+        "label_codes": tuple(one[2] for one in labels) if any(one[2] for one in labels) else None,
         "action_low": None,
         "action_high": None,
         "bounds_from": None,
@@ -348,5 +349,5 @@ def _bounds(
         "bounds_from": source,
         "label_names": ((),) * m,
         "label_first": (0,) * m,
-        "label_codes": ((),) * m,
+        "label_codes": None,
     }

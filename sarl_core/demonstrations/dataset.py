@@ -143,7 +143,8 @@ class Demonstrations(DemonstrationFields):
         steps: Index of each step within its episode, (N,) int64; counted where not given.
         feature_names: d names; "feature 0"... where not given.
         feature_units: d units, "" where there is none.
-        indicators: For each feature what it says of a column of words, or None.
+        indicators: For each feature what it says of a column of words, or None; None where none
+            does.
         action_names: m names, one an action dimension.
         label_names: For each action dimension the names of its labels, () if continuous.
         label_first: For each dimension the action that label 0 stands for (`Discrete.start`).
@@ -242,10 +243,10 @@ class Demonstrations(DemonstrationFields):
         """Names and units of the observation vector's d entries."""
         assert self.feature_names is not None
         assert self.feature_units is not None
-        assert self.indicators is not None
+        indicators = self.indicators or (None,) * len(self.feature_names)
         return tuple(
             Feature(*known)
-            for known in zip(self.feature_names, self.feature_units, self.indicators, strict=True)
+            for known in zip(self.feature_names, self.feature_units, indicators, strict=True)
         )
 
     @cached_property
@@ -255,14 +256,13 @@ class Demonstrations(DemonstrationFields):
         if self.is_discrete:
             assert self.label_names is not None
             assert self.label_first is not None
-            assert self.label_codes is not None
             return tuple(
                 ActionDimension(name, "discrete", labels=labels, first=first, codes=codes)
                 for name, labels, first, codes in zip(
                     self.action_names,
                     self.label_names,
                     self.label_first,
-                    self.label_codes,
+                    self.label_codes or ((),) * len(self.action_names),
                     strict=True,
                 )
             )

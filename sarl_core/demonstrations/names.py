@@ -160,7 +160,7 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
             observations=demonstrations.observations[:, features.places],
             feature_names=features.put(own.features),
             feature_units=features.put(own.units),
-            indicators=features.put(demonstrations.indicators or ()),
+            indicators=features.put(demonstrations.indicators or ()) or None,
         )
     if len(own.actions) > 1 or len(description.action_names) > 1:
         actions = line_up(

@@ -58,5 +58,5 @@ def complete_rows(
     return np.flatnonzero(~lacking), (
         f"{count:,} of {n:,} steps {'lacks' if one else 'lack'} a value and "
         f"{'was' if one else 'were'} left out ({where}); the others keep their episodes and their "
-        "step numbers, and returns are without what was left out"
+        "step numbers"
     )

@@ -291,7 +291,10 @@ def _complete(recording: Recording, missing: Missing) -> Recording:
             terminated=of_left(recording.terminated),
             truncated=of_left(recording.truncated),
             rows=left if recording.rows is None else recording.rows[left],
-            notes=(*recording.notes, note),
+            notes=(
+                *recording.notes,
+                note if recording.rewards is None else f"{note}, and returns lack their rewards",
+            ),
         )
     if recording.rewards is None:
         return recording

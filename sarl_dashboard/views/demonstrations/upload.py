@@ -20,6 +20,7 @@ from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
 
+_LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
 _LOGGER = logging.getLogger(__name__)
 
 
@@ -35,12 +36,18 @@ def read_upload(columns: ColumnMap | None = None) -> None:
         columns: Which column is what; guessed where not given.
     """
     st.session_state.pop("_upload_error", None)
+    st.session_state["_upload_columns"] = columns
     files = uploaded_files()
     if not files:
         return
     try:
         with st.spinner("Reading and checking …"):
-            demonstrations = read_files(files, env_id=environment(), columns=columns)
+            demonstrations = read_files(
+                files,
+                env_id=environment(),
+                columns=columns,
+                missing="drop" if st.session_state.get("upload_missing") else "refuse",
+            )
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
@@ -55,6 +62,11 @@ def read_upload(columns: ColumnMap | None = None) -> None:
         return
     set_upload(demonstrations, file_name=", ".join(name for _, name in files))
     st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
+
+
+def _read_again() -> None:
+    """Read again with the columns that were mapped, if any were."""
+    read_upload(st.session_state.get("_upload_columns"))
 
 
 def environment() -> Environment | None:
@@ -153,6 +165,15 @@ def upload_section(*, expanded: bool) -> None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()
         if files:
+            lacking = error is not None and _LEFT_OUT in error
+            if lacking or st.session_state.get("upload_missing"):
+                st.toggle(
+                    "Leave out the steps that lack a value",
+                    key="upload_missing",
+                    on_change=_read_again,
+                    help="An empty cell, NaN, null or NA among observations, actions and rewards. "
+                    "What is left of an episode keeps its number and the numbers of its steps.",
+                )
             names = columns_of(files)
             # An error about a row is not mended by another map; one about columns is.
             mendable = error is not None and "column" in error and not re.search(r"\brow \d", error)
