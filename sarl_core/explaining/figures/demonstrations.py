@@ -37,11 +37,11 @@ def feature_figure(
     """
     figure = go.Figure()
     total = max(int(histogram.counts.sum()), 1)
-    texts = _bin_texts(histogram, feature.unit)
+    texts = _bin_texts(histogram, feature)
     positions: Any = histogram.centres
     widths: Any = np.diff(histogram.edges)
     if histogram.values is not None:
-        positions, widths = _value_texts(histogram.values), 0.72
+        positions, widths = _value_texts(histogram.values, feature), 0.72
     for label in range(dimension.n_labels):
         name = plain(label_text(label, dimension))
         figure.add_bar(
@@ -98,7 +98,7 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
             type="category", autorange="reversed", fixedrange=True, ticklabelstandoff=6
         )
         return figure
-    texts = _bin_texts(histogram, "")
+    texts = _bin_texts(histogram, Feature(""))
     for label in range(dimension.n_labels):
         name = plain(label_text(label, dimension))
         figure.add_bar(
@@ -173,14 +173,16 @@ def episode_figure(series: EpisodeSeries, name: str, colour: str) -> go.Figure:
     return figure
 
 
-def _value_texts(values: NDArray[np.float64]) -> list[str]:
+def _value_texts(values: NDArray[np.float64], feature: Feature) -> list[str]:
+    if feature.indicator is not None:
+        return ["yes" if value else "no" for value in values.tolist()]
     return [decimal_text(float32_decimal(value)) for value in values.tolist()]
 
 
-def _bin_texts(histogram: Histogram, unit: str) -> list[str]:
-    suffix = f" {plain(unit)}" if unit else ""
+def _bin_texts(histogram: Histogram, feature: Feature) -> list[str]:
+    suffix = f" {plain(feature.unit)}" if feature.unit else ""
     if histogram.values is not None:
-        return [f"{text}{suffix}" for text in _value_texts(histogram.values)]
+        return [f"{text}{suffix}" for text in _value_texts(histogram.values, feature)]
     return [
         f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{suffix}"
         for low, high in pairwise(histogram.edges.tolist())

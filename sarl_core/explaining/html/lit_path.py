@@ -34,6 +34,8 @@ def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup
     for query in path.queries:
         feature = features[query.condition.feature]
         number = value_text(query.value, feature, [bounds_of(query.condition)])
+        if feature.indicator is not None:
+            number = feature.statement(query.value > query.condition.threshold)
         queries.append(
             (
                 query_text(query.condition, features, beside=(query.value,)),

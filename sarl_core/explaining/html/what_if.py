@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import (
@@ -22,7 +23,7 @@ from sarl_core.explaining.words.what_if import (
 from sarl_core.mining.language import action_text, counted, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.neighbourhood import DecisionChange, NearMiss
+from sarl_core.shielding.neighbourhood import DecisionChange, FeatureChange, NearMiss
 from sarl_core.shielding.sampling import Span
 from sarl_core.shielding.shield import Decision, Outside
 
@@ -163,9 +164,16 @@ def _change_row(
         executed_text(tuple(change.executed.astype(float).tolist()), rule_set.actions),
         ", ".join(rules) or "none",
         number_text(change.distance),
-        with_unit(float32_text(moved.after), feature),
+        _exactly(moved, feature),
         _yes(span.low <= moved.after <= span.high),
     )
+
+
+def _exactly(change: FeatureChange, feature: Feature) -> str:
+    """The number from which it is so; none of what is said in words."""
+    if feature.indicator is not None:
+        return "–"
+    return with_unit(float32_text(change.after), feature)
 
 
 def misses_html(misses: Sequence[NearMiss], rule_set: RuleSet) -> Markup:
@@ -192,10 +200,7 @@ def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
         near_miss_text(miss.changes, features),
         number_text(miss.distance),
         _yes(miss.in_force),
-        ", ".join(
-            with_unit(float32_text(change.after), features[change.feature])
-            for change in miss.changes
-        ),
+        ", ".join(_exactly(change, features[change.feature]) for change in miss.changes),
     )
 
 

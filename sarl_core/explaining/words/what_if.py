@@ -56,7 +56,9 @@ def condition_views(
         views.append(
             ConditionView(
                 short_condition(bounds, feature, beside=(value,)),
-                with_unit(value_text(value, feature, [bounds]), feature),
+                feature.statement(value > max(bounds.low, 0.0))
+                if is_flag(feature, bounds) and feature.indicator is not None
+                else with_unit(value_text(value, feature, [bounds]), feature),
                 "–" if is_flag(feature, bounds) else with_unit(number_text(room), feature),
             )
         )
