@@ -17,11 +17,11 @@ from sarl_core.demonstrations.fields import TRUTH
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, is_text
+from sarl_core.demonstrations.formats.saved_columns import columns_in_words
 from sarl_core.demonstrations.formats.tables import (
     TableColumn,
     as_float32,
     check_names,
-    columns_in_words,
 )
 from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted

@@ -30,7 +30,8 @@ from sarl_core.demonstrations.formats.parquet_pages import (
     footer_size,
     largest_chunk,
 )
-from sarl_core.demonstrations.formats.tables import MAX_NAME, TableColumn, check_names, columns_of
+from sarl_core.demonstrations.formats.saved_columns import columns_of
+from sarl_core.demonstrations.formats.tables import MAX_NAME, TableColumn, check_names
 from sarl_core.demonstrations.words import Coded, in_order
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import read_limit, require_memory, table_memory

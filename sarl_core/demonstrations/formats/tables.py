@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import TRUTH, Indicator
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
@@ -33,7 +32,7 @@ from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
-from sarl_core.demonstrations.words import Coded, indicated, indicators_of, spelled
+from sarl_core.demonstrations.words import Coded, indicated, indicators_of
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
@@ -498,71 +497,6 @@ def label_words(
     return tuple(
         TRUTH if read[name].values.dtype.kind == "b" else read[name].words for name in names
     )
-
-
-def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
-    """The columns in which demonstrations are saved, in order, all of them numbers."""
-    assert demonstrations.steps is not None
-    columns: dict[str, NDArray[Any]] = {
-        "episode": demonstrations.episodes,
-        "step": demonstrations.steps,
-    }
-    for feature, values in zip(demonstrations.features, demonstrations.observations.T, strict=True):
-        columns[f"obs_{feature.name}"] = np.ascontiguousarray(values)
-    if demonstrations.actions.ndim == 1:
-        columns["action"] = demonstrations.actions
-    else:
-        for dimension, values in zip(
-            demonstrations.action_dimensions, demonstrations.action_columns.T, strict=True
-        ):
-            columns[f"action_{dimension.name}"] = np.ascontiguousarray(values)
-    singles = {
-        "reward": demonstrations.rewards,
-        "terminated": demonstrations.terminated,
-        "truncated": demonstrations.truncated,
-    }
-    return columns | {name: values for name, values in singles.items() if values is not None}
-
-
-def columns_in_words(demonstrations: Demonstrations) -> dict[str, Any]:
-    """The same for a file that has no place to say what numbers stand for.
-
-    Args:
-        demonstrations: To save.
-
-    Returns:
-        Texts in the place of what indicators say of a column, and of actions that are words. Where
-        an environment knows the names of its actions they stay numbers.
-    """
-    columns: dict[str, Any] = columns_of(demonstrations)
-    features, observations = demonstrations.features, demonstrations.observations
-    in_words: dict[str, Any] = {}
-    for name, values in columns.items():
-        indicator = next((one.indicator for one in features if f"obs_{one.name}" == name), None)
-        if indicator is None:
-            in_words[name] = values
-            continue
-        of_column = [
-            at
-            for at, one in enumerate(features)
-            if one.indicator is not None and one.indicator.column == indicator.column
-        ]
-        indicators = [one for at in of_column if (one := features[at].indicator) is not None]
-        in_words[f"obs_{indicator.column}"] = _texts(
-            spelled(observations[:, of_column], indicators)
-        )
-    if demonstrations.is_discrete and not demonstrations.env_id:
-        actions = [name for name in in_words if name == "action" or name.startswith("action_")]
-        for name, dimension in zip(actions, demonstrations.action_dimensions, strict=True):
-            if dimension.labels != tuple(map(str, dimension.actions)):
-                codes = dimension.labels_of(in_words[name])
-                in_words[name] = _texts(Coded(codes, dimension.labels))
-    return in_words
-
-
-def _texts(coded: Coded) -> list[str]:
-    words = [*coded.words, ""]  # the last one for -1
-    return [words[code] for code in coded.codes.tolist()]
 
 
 def _without_names(metadata: Metadata) -> Metadata:
