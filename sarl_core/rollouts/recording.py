@@ -10,10 +10,12 @@ import numpy as np
 from sarl_core.agents.agent import Agent, make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
-from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, require_whole
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.player import EpisodeArrays, EpisodeFaultError, play
+from sarl_core.rollouts.statistics import rate_of
 from sarl_core.rollouts.steps import concatenate
 
 SHIPPED = {
@@ -108,10 +110,16 @@ def _demonstrations(
     terminated, truncated = np.zeros((2, int(lengths.sum())), dtype=np.bool_)
     terminated[ends] = np.concatenate([outcome.terminated for outcome in outcomes])
     truncated[ends] = np.concatenate([outcome.truncated for outcome in outcomes])
+    episodes = np.repeat(np.arange(len(lengths)), lengths)[:steps]
+    notes: tuple[str, ...] = ()
+    if as_environment(env_id).failure:  # who says what a failure is wants to know of them
+        failed = np.bincount(episodes, weights=table.failed) > 0
+        ended = np.bincount(episodes, weights=(terminated | truncated)[:steps]) > 0
+        notes = (f"failures while recording: {rate_text(rate_of(failed, ~failed & ~ended))}",)
     return Demonstrations(
         observations=table.observation,
         actions=table.executed[:, 0] if description.action_shape == () else table.executed,
-        episodes=np.repeat(np.arange(len(lengths)), lengths)[:steps],
+        episodes=episodes,
         rewards=table.reward,
         terminated=terminated[:steps],
         truncated=truncated[:steps],
@@ -124,6 +132,7 @@ def _demonstrations(
         env_id=str(env_id),
         agent=agent,
         seed=seed,
+        notes=notes,
         **_bounds(env_id),
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from sarl_core import Shield, load_demonstrations, mine_rules, rollout
+from sarl_core import Environment, Shield, load_demonstrations, mine_rules, record, rollout
 from sarl_core.cli.app import main
 from tests.cli.conftest import CART, ROOT
 
@@ -59,3 +59,28 @@ def test_rules_that_abstain_leave_all_to_the_agent():
     assert (in_force >= 0).all()
     assert act.freedom(states, in_force).tolist() == [0.0, 0.0]
     assert abstain.freedom(states, in_force)[1] == 1.0
+
+
+def test_a_failure_and_a_cost_are_named_on_the_command_line(capsys):
+    cart = ["evaluate", "--env", "CartPole-v1", "--agent", "novice", "--episodes", "6", "--json"]
+    named = ["--failure", "abs(pole angle) > 0.1", "--cost", "pole angle > 0"]
+    assert main([*cart, *named]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["summary"]["failures"] == sum(one["failed"] for one in document["episodes"])
+    costs = [one["cost"] for one in document["episodes"]]
+    assert document["summary"]["cost"] == pytest.approx(np.mean(costs))
+    assert document["summary"]["cost_low"] < np.mean(costs) < document["summary"]["cost_high"]
+    for options, says in (
+        (["--failure", "crashd"], "has 'crashd' in its info, which is empty"),
+        (["--failure", "pole angel > 1"], "did you mean 'pole angle'"),
+        (["--cost", " "], "--cost is empty"),
+    ):
+        assert main([*cart, *options]) == 2
+        assert says in capsys.readouterr().err
+
+
+def test_recordings_say_what_failed_in_them_where_it_is_named():
+    environment = Environment("CartPole-v1", failure="abs(pole angle) > 0.1")
+    recorded = record(environment, "novice", steps=100)
+    assert recorded.notes[0].startswith("failures while recording: ")
+    assert not record("CartPole-v1", "novice", steps=100).notes

@@ -2,11 +2,16 @@ import numpy as np
 import pytest
 
 from sarl_core.errors import InputError
+from sarl_core.rollouts.failures import bound_text, rate_text, safety_cells, safety_facts
 from sarl_core.rollouts.statistics import (
+    cost_interval,
     interquartile_mean,
     mean_interval,
+    rate_of,
+    rate_over_groups,
     summarise,
     summarise_groups,
+    worst_tenth,
 )
 
 
@@ -110,3 +115,59 @@ def test_the_interval_of_a_mean_without_spread_or_without_values() -> None:
     assert (mean_interval([0.5]).low, mean_interval([0.5]).high) == (0.5, 0.5)
     empty = mean_interval([np.nan])
     assert np.isnan([empty.mean, empty.low, empty.high]).all()
+
+
+@pytest.mark.parametrize(("of", "words"), [(20, "14 %"), (300, "1 %"), (3_000, "0.1 %")])
+def test_without_a_failure_the_rate_is_at_most_what_would_rarely_show_none(
+    of: int, words: str
+) -> None:
+    """One-sided: at the bound, none in so many is seen once in twenty times."""
+    rate = rate_of(np.zeros(of))
+    assert (1 - rate.at_most) ** of == pytest.approx(0.05)
+    assert rate_text(rate) == f"0 failures in {of:,}: at most {words} with 95 % certainty"
+    assert float(bound_text(rate.at_most).removesuffix(" %")) / 100 >= rate.at_most
+
+
+def test_failures_are_worded_with_what_is_not_known() -> None:
+    assert rate_text(rate_of([True, *[False] * 9])).startswith("1 of 10 episodes, 10 % (95 %")
+    happened, unknown = np.arange(10) < 1, np.arange(10) > 7
+    text = rate_text(rate_of(happened, unknown))
+    assert text.startswith("1 of the 8 that ended, at least 10 % of all (95 % interval 0.3 %")
+    assert rate_text(rate_of([False], [True])) == "not known: no episode ran to its end"
+
+
+def test_the_worst_tenth_counts_its_last_episode_in_part() -> None:
+    values = np.arange(25.0)
+    assert worst_tenth(values, worst="lowest") == pytest.approx((0 + 1 + 0.5 * 2) / 2.5)
+    assert worst_tenth(values, worst="highest") == pytest.approx((24 + 23 + 0.5 * 22) / 2.5)
+    assert worst_tenth([3.0, -7.0], worst="lowest") == -7.0
+
+
+def test_a_cost_does_not_fall_below_what_it_can_be_and_claims_no_spread_unseen() -> None:
+    cost = cost_interval([0.0, 0.0, 0.0, 9.0])
+    assert cost is not None
+    assert (cost.mean, cost.low) == (2.25, 0.0)
+    assert cost.high == pytest.approx(mean_interval([0.0, 0.0, 0.0, 9.0]).high)
+    alike = cost_interval([0.0] * 50)
+    assert alike is not None
+    assert np.isnan([alike.low, alike.high]).all()
+    assert cost_interval([1.0, np.nan]) is None
+
+
+def test_a_rate_over_learners_allows_for_how_they_differ() -> None:
+    apart, alike = rate_over_groups([0, 50, 0], [50, 50, 50]), rate_over_groups([5, 5], [50, 50])
+    assert apart.rate == pytest.approx(1 / 3)
+    assert (apart.low, apart.high) == (0.0, 1.0)
+    assert alike == rate_of(np.arange(100) < 10)
+
+
+def test_facts_say_only_what_is_known() -> None:
+    known = {"failures": 0, "failure_rate": 0.0, "failure_low": 0.0, "failure_high": 0.17}
+    more = {"cost": 2.5, "cost_low": 1.0, "cost_high": 4.0, "worst_tenth": -3.0, "freedom": 0.5}
+    facts = dict(safety_facts(known | more, 20, "my:Own-v0", shielded=True))
+    assert facts["failures"].startswith("0 failures in 20")
+    assert facts["cost"] == "2.50 an episode (95 % interval 1.00 to 4.00)"
+    assert facts["freedom"] == "50 % of the choice is left to the agent"
+    assert list(dict(safety_facts({}, 20, "my:Own-v0", shielded=False))) == ["failures"]
+    assert set(safety_cells({}, 20).values()) == {"–"}
+    assert safety_cells(known | more, 20)["Cost"] == "2.50 (1.00 to 4.00)"

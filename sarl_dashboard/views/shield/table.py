@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import streamlit as st
@@ -87,13 +87,13 @@ def show(finished: Finished, *, at_work: bool) -> None:
         )
     st.caption(
         "The typical return is the mean of the middle half of the episodes, with its 95 % "
-        "interval. It leaves out the worst quarter of the episodes, and so hides crashes: read the "
-        "mean return and the crashes beside it. Click a name to hide its line, twice to see it "
-        "alone."
+        "interval. It leaves out the worst quarter of the episodes, and so hides failures: read "
+        "the mean return and the failures beside it. Click a name to hide its line, twice to see "
+        "it alone."
     )
     st.dataframe(
         [
-            table_row(line, episodes) | safety
+            table_row(line, episodes, safety)
             for (line, episodes), safety in zip(
                 finished, safety_columns([episodes for _, episodes in finished]), strict=True
             )
@@ -204,7 +204,7 @@ def column_config(env_id: str) -> dict[str, Any]:
     }
 
 
-def table_row(line: ShieldLine, episodes: Episodes) -> dict[str, Any]:
+def table_row(line: ShieldLine, episodes: Episodes, safety: Mapping[str, str]) -> dict[str, Any]:
     """What the table says of a line."""
     numbers, summary = episodes.statistics, episodes.summary()
     rules = line.arm.rules
@@ -216,6 +216,7 @@ def table_row(line: ShieldLine, episodes: Episodes) -> dict[str, Any]:
         "Typical return": numbers.iqm,
         "95 % interval": f"{numbers.low:,.1f} to {numbers.high:,.1f}",
         "Mean return": numbers.mean,
+        **safety,
         "Changed": share_text(summary["intervention_rate"]) if rules is not None else "–",
         "Outside": share_text(summary["outside_rate"])
         if rules is not None and any(rule.box is not None for rule in rules.rules)
