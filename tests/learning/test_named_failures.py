@@ -1,0 +1,21 @@
+"""A learner's episodes fail by what its caller calls a failure."""
+
+from __future__ import annotations
+
+from sarl_core import Environment
+from sarl_core.learning.arms import ARMS
+from sarl_core.learning.run import learn
+
+
+def test_a_learner_fails_by_what_its_caller_calls_a_failure() -> None:
+    def learned(failure: str, cost: str = ""):
+        environment = Environment("CartPole-v1", failure=failure, cost=cost)
+        return learn(environment, None, ARMS["none"], steps=600, episodes=4)
+
+    never, often = learned("cart position > 100"), learned("cart position > -100", "pole angle > 9")
+    assert len(never.curve) == len(often.curve) > 0
+    assert never.curve.crashes == 0
+    assert often.curve.crashed.all()
+    assert (never.alone.crashes, often.alone.crashes) == (0, 4)
+    assert often.alone.failed == (True,) * 4
+    assert often.alone.costs == (0.0,) * 4
