@@ -194,6 +194,7 @@ class Audit:
         broken = self.is_broken
         begins = np.zeros(self.steps, dtype=np.bool_)
         begins[self.log.episode_starts] = True
+        begins[1:] |= self._jumps != 0  # what was done in between, nobody knows
         first = broken & (begins | ~np.append(False, broken[:-1]))
         rows = np.flatnonzero(broken)
         starts = np.flatnonzero(first[rows])

@@ -49,7 +49,7 @@ def audit(
         ),
     ],
     columns: Columns,
-    missing: MissingName = "refuse",
+    missing: MissingName = "drop",
     out: Annotated[
         Path | None,
         out_option(

@@ -287,3 +287,6 @@ def test_gaps_in_the_numbers_of_steps_are_counted(
     held = audit(rules, replace(demonstrations, steps=steps))
     assert (held.gaps, held.missing_steps) == (2, 8)
     assert guard("missing_steps>0").holds(held)
+    wrong = audit(rules, replace(held.log, actions=(held.labels[:, 0] + 1) % 4))
+    rows, lengths = wrong.runs
+    assert not ((rows < 50) & (rows + lengths > 50)).any()

@@ -112,3 +112,16 @@ def test_a_log_that_is_rotated_ends_with_what_was_read(
     assert "run.csv was rotated" in error
     assert main(["audit", RULES, LOG, "--follow"]) == 2
     assert "cannot be followed" in capsys.readouterr().err
+
+
+def test_steps_that_lack_a_value_are_counted_and_do_not_end_a_job(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "run.csv"
+    rows = ["0,0,0,0,0.1,0,1", "0,1,0,nan,0.1,0,0", "0,2,0,0,,0,0", "0,3,0,0,0.1,0,0"]
+    log.write_text(HEAD + "\n".join(rows) + "\n")
+    assert main(["audit", RULES, str(log), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["steps"], document["gaps"], document["missing_steps"]) == (2, 1, 2)
+    assert "2 of 4 steps lack a value and were left out" in document["notes"][0]
+    assert main(["audit", RULES, str(log), "--json", "--missing", "refuse"]) == 2

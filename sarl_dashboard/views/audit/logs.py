@@ -124,4 +124,6 @@ def _audited(rules: ChosenRules, file: UploadedFile) -> Audit:
 def _held(
     rule_set: RuleSet, content: bytes, name: str, demonstrations: Demonstrations | None
 ) -> Audit:
-    return audit(rule_set, read_demonstrations(content, name), demonstrations=demonstrations)
+    # States that are none are said, and nothing is held against them.
+    log = read_demonstrations(content, name, missing="drop")
+    return audit(rule_set, log, demonstrations=demonstrations)
