@@ -31,6 +31,7 @@ from sarl_core.demonstrations.formats.mapping.action_roles import (
 from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
 from sarl_core.demonstrations.words import Coded, indicated, indicators_of
 from sarl_core.environments.description import EnvironmentDescription
@@ -170,14 +171,18 @@ def recording_from_table(
     called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
     block = observation_block(read, chosen.observations, called)
     coarse = coarse_notes(table, block, rows)
+    names, units = block.names, units_of(block.columns, guess.roles, table.metadata.column_units)
+    if names is not None and not chosen.feature_names:
+        names, written = without_units(names)
+        units = tuple(known or behind for known, behind in zip(units, written, strict=True))
     actions = stated_actions(read, chosen.actions, guess.roles, rows)
     return Recording(
         observations=block.values,
         actions=action_block(actions, chosen.actions),
         observation_columns=tuple(f"column {name!r}" for name in block.columns),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
-        feature_names=block.names,
-        feature_units=units_of(block.columns, guess.roles, table.metadata.column_units),
+        feature_names=names,
+        feature_units=units if any(units) else None,
         indicators=block.indicators,
         action_words=label_words(actions, chosen.actions),
         missing_actions=missing_block(actions, chosen.actions),
@@ -296,9 +301,7 @@ def names_of_features(guess: Guess, named: bool) -> tuple[str, ...] | None:
     return feature_names(columns) if guess.prefixed or not named else columns
 
 
-def units_of(
-    columns: Sequence[str], roles: Roles, units: Mapping[str, str]
-) -> tuple[str, ...] | None:
+def units_of(columns: Sequence[str], roles: Roles, units: Mapping[str, str]) -> tuple[str, ...]:
     """The units of features; what says which word a column holds has none.
 
     Args:
@@ -307,12 +310,11 @@ def units_of(
         units: What the file says of them.
 
     Returns:
-        One a column, "" where there is none; None where there is none at all.
+        One a column, "" where there is none.
     """
-    known = tuple(
+    return tuple(
         (roles[name].unit if name in roles else "") or units.get(name, "") for name in columns
     )
-    return known if any(known) else None
 
 
 def numbers_of(table: Table, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
