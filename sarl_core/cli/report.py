@@ -104,6 +104,7 @@ def report(
     terminal.check_output(out, (".html",))
     with terminal.working("Making the report") as advance:
         from sarl_core.demonstrations.formats.mapping.roles import as_options
+        from sarl_core.demonstrations.recoding import recoded
         from sarl_core.explaining.report.comparison import read_results
         from sarl_core.explaining.report.provenance import command_line, mining_command
         from sarl_core.explaining.report.report import make_report
@@ -111,7 +112,11 @@ def report(
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
-        given = read_demonstrations(demonstrations, env, columns, missing)
+        given = recoded(
+            read_demonstrations(demonstrations, env, columns, missing),
+            rule_set.source.features,
+            called=str(demonstrations),
+        )
         card = read_card(rules)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
