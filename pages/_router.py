@@ -27,6 +27,11 @@ PAGES = [
         url_path="start",  # never seen: the default page is at "/"
     ),
     st.Page(
+        "episodes.py",
+        title="Episodes",
+        icon=":material/timeline:",
+    ),
+    st.Page(
         "names.py",
         title="Names",
         icon=":material/label:",

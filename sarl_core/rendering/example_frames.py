@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, make_agent
-from sarl_core.agents.spaces import Actions
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rendering.camera import no_display, picture_of, picture_speed
 from sarl_core.rendering.film import Palette
+from sarl_core.rendering.repeating import Repeating
 from sarl_core.rollouts.episodes import rollout, run_seeds
 from sarl_core.rollouts.player import View, check_environment
 from sarl_core.rollouts.seeds import FRESH
@@ -279,20 +279,6 @@ class _AstrayError(Exception):
     """The environment went another way than it did."""
 
 
-@dataclass
-class _Repeating:
-    """An agent that does what was done, step by step."""
-
-    steps: StepTable
-    name: str = "repeating"
-    n_uniforms: int = 0
-    done: int = 0
-
-    def act(self, observations: NDArray[np.float32], uniforms: Any) -> Actions:
-        self.done += 1
-        return self.steps.executed[self.done - 1 : self.done]
-
-
 def _draw(
     env_id: EnvironmentOrId, seed: int, steps: StepTable, wanted: set[int], width: int
 ) -> dict[int, NDArray[np.uint8]]:
@@ -312,7 +298,7 @@ def _draw(
     with suppress(_AstrayError):
         run_seeds(
             env_id,
-            _Repeating(steps),
+            Repeating(steps.executed),
             None,
             np.array([seed]),
             max_steps=max(wanted) + 1,

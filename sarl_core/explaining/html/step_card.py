@@ -43,6 +43,19 @@ def picture(png: bytes, alt: str, ways: Sequence[tuple[str, Markup]] = ()) -> Ma
     return render("states/picture", png=b64encode(png).decode("ascii"), alt=alt, ways=ways)
 
 
+def state_table(state: Sequence[tuple[str, str, str]]) -> Markup:
+    """A state, a row a feature.
+
+    Args:
+        state: Name, value and unit of each feature.
+
+    Returns:
+        HTML.
+    """
+    rows = [(name, value, unit or "–") for name, value, unit in state]
+    return table_html(_STATE, rows, "The state")
+
+
 def step_card(view: StepView, *, shielded: bool) -> Markup:
     """What the agent wanted, what was done and why, and the state in which it was done.
 
@@ -53,12 +66,11 @@ def step_card(view: StepView, *, shielded: bool) -> Markup:
     Returns:
         HTML.
     """
-    rows = [(name, value, unit or "–") for name, value, unit in view.state]
     return render(
         "states/step_card",
         view=view,
         shielded=shielded,
         margin=margin_text(view.margin),
-        state=table_html(_STATE, rows, "The state"),
+        state=state_table(view.state),
         label_colour=label_colour,
     )

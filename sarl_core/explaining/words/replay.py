@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
@@ -17,6 +19,7 @@ from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.rollouts.steps import StepTable
 
 
@@ -157,23 +160,13 @@ def step_view(
             )
         )
     in_force = steps.rules[row].tolist() if rule_set is not None else []
-    bounds_of_rules = [
-        bounds
-        for rule in in_force
-        if rule_set is not None and rule >= 0
-        for bounds in rule_set.rules[rule].bounds
-    ]
+    asking = [rule_set.rules[rule] for rule in in_force if rule >= 0] if rule_set else []
+    as_asked = rule_set.source.features if rule_set is not None else features
     state = tuple(
-        (
-            feature.name,
-            value_text(
-                float(value),
-                rule_set.source.features[index] if rule_set is not None else feature,
-                [bounds for bounds in bounds_of_rules if bounds.feature == index],
-            ),
-            feature.unit,
+        (feature.name, value, feature.unit)
+        for feature, value in zip(
+            features, state_values(steps.observation[row], as_asked, asking), strict=True
         )
-        for index, (feature, value) in enumerate(zip(features, steps.observation[row], strict=True))
     )
     return StepView(
         int(steps.step[row]),
@@ -183,6 +176,28 @@ def step_view(
         bool(steps.outside[row]),
         steps.invalid[row] or "",
     )
+
+
+def state_values(
+    state: NDArray[np.float32], features: Sequence[Feature], rules: Sequence[Rule]
+) -> list[str]:
+    """The values of a state, with as many digits as keep them on their side of thresholds.
+
+    Args:
+        state: Shape (d,).
+        features: The d features.
+        rules: Those in force.
+
+    Returns:
+        d texts.
+    """
+    bounds_of_rules = [bounds for rule in rules for bounds in rule.bounds]
+    return [
+        value_text(
+            float(value), feature, [bounds for bounds in bounds_of_rules if bounds.feature == index]
+        )
+        for index, (feature, value) in enumerate(zip(features, state, strict=False))
+    ]
 
 
 def step_texts(

@@ -8,21 +8,13 @@ import numpy as np
 import streamlit as st
 
 from sarl_core.auditing.audit import Audit
-from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.audit import audit_tracks, step_texts
 from sarl_core.explaining.figures.replay import Timeline, intervention_strip
 from sarl_core.explaining.html.headings import heading
-from sarl_core.explaining.html.lit_path import lit_paths_html
-from sarl_core.explaining.html.step_card import legend
-from sarl_core.explaining.state_path import PathFinder
 from sarl_core.explaining.words.audit import stretch_text
-from sarl_core.mining.language import counted, label_text, sentence
-from sarl_core.mining.rule_order import fits
-from sarl_core.mining.rule_set import RuleSet
-from sarl_core.shielding.sampling import feature_spans, within
-from sarl_dashboard.cache import cached
-from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
-from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_core.mining.language import counted
+from sarl_dashboard.components.log_step import show_step
+from sarl_dashboard.components.timeline import show_legend
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.audit.logs import ChosenRules
 
@@ -54,7 +46,7 @@ def show_timeline(rules: ChosenRules, held: Audit) -> None:
         selection_mode="points",
         alt="What was done at each step, what the rule in force says, and the breaks",
     )
-    _key(held)
+    show_legend(held.rule_set.actions, marks="broken")
     points = picked["selection"]["points"]
     _step(rules, held, rows, int(points[0]["customdata"][0]) if points else None)
 
@@ -82,14 +74,6 @@ def _chosen_episode(held: Audit) -> slice:
     return slice(start + first, start + first + _MOST_STEPS)
 
 
-def _key(held: Audit) -> None:
-    """Which colour is which label."""
-    dimension = held.rule_set.actions[0]
-    if dimension.n_labels <= 12 and len(held.rule_set.actions) == 1:
-        labels = range(dimension.n_labels)
-        st.html(legend([(label_text(one, dimension), label_colour(one)) for one in labels]))
-
-
 def _step(rules: ChosenRules, held: Audit, rows: slice, clicked: int | None) -> None:
     """One step: the first that broke a rule where none was clicked."""
     broken = np.flatnonzero(held.is_broken[rows])
@@ -99,54 +83,4 @@ def _step(rules: ChosenRules, held: Audit, rows: slice, clicked: int | None) -> 
             return
         clicked = int(broken[0])
     row = rows.start + min(clicked, rows.stop - rows.start - 1)
-    assert held.log.steps is not None
-    state = held.observations[row]
-    with st.container(border=True):
-        st.markdown(
-            f"**Step {held.log.steps[row]} of episode {held.log.episodes[row]}.** "
-            + escaped(step_texts(held, slice(row, row + 1))[0].split(": ", 1)[1])
-            + (" – **broken**" if held.is_broken[row] else "")
-            + (", outside the data of the rule" if held.outside[row] else "")
-        )
-        for place in dict.fromkeys(held.rules[row].tolist()):
-            if place < 0:
-                continue
-            rule = held.rule_set[place]
-            st.markdown(
-                f"**{held.rule_set.name_of(rule)}.** {escaped(sentence(rule, held.rule_set))}"
-            )
-            if rules.choice in SET_ON_RULES_PAGE:
-                st.page_link(
-                    "rules.py",
-                    label=f"Open {held.rule_set.name_of(rule)}",
-                    icon=":material/rule:",
-                    query_params={"set": SET_ON_RULES_PAGE[rules.choice], "rule": rule.id},
-                )
-        for table in lit_paths_html(_finder(held.rule_set), state, held.rules[row]):
-            st.html(table)
-        _link_what_if(rules, held, row)
-
-
-def _link_what_if(rules: ChosenRules, held: Audit, row: int) -> None:
-    """A way to this state on the page What if, where that page asks about the same features."""
-    demonstrations = chosen_demonstrations()
-    if demonstrations is None or not fits(rules.rule_set, demonstrations):
-        return
-    names = [feature.name for feature in rules.rule_set.source.features]
-    if names != [feature.name for feature in demonstrations.features]:
-        return
-    # Its sliders reach as far as what was demonstrated.
-    state = within(held.observations[row], feature_spans(demonstrations.observations))
-    values = {f"x{index}": repr(float(value)) for index, value in enumerate(state.tolist())}
-    chosen = {"set": SET_ON_RULES_PAGE[rules.choice]} if rules.choice in SET_ON_RULES_PAGE else {}
-    st.page_link(
-        "what_if.py",
-        label="What if, with this state",
-        icon=":material/help_center:",
-        query_params={**st.query_params.to_dict(), **chosen, **values},
-    )
-
-
-@cached()
-def _finder(rule_set: RuleSet) -> PathFinder:
-    return PathFinder(rule_set)
+    show_step(held, row, rules.choice)

@@ -9,7 +9,6 @@ import streamlit as st
 from markupsafe import Markup
 from streamlit.errors import StreamlitAPIException
 
-from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.figures.replay import (
     SHIELDED_COLOUR,
     UNSHIELDED_COLOUR,
@@ -20,31 +19,17 @@ from sarl_core.explaining.figures.replay import (
     tracks,
 )
 from sarl_core.explaining.html.lit_path import lit_paths_html
-from sarl_core.explaining.html.step_card import legend, picture, step_card
+from sarl_core.explaining.html.step_card import picture, step_card
 from sarl_core.explaining.words.replay import StepView, step_texts, step_view
-from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import counted, label_text, number_text
+from sarl_core.mining.language import counted, number_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import pace_of_played
+from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_style, show_legend
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.recorder import flight_recorder
-
-
-def show_legend(dimensions: tuple[LabelledDimension, ...], *, marks: bool) -> None:
-    """The colours of the strip."""
-    many = len(dimensions) > 1
-    entries = [
-        (f"{dimension.name} {text}" if many else text, label_colour(label))
-        for dimension in dimensions
-        for label in range(min(dimension.n_labels, 24))
-        for text in [label_text(label, dimension)]
-    ]
-    if marks:
-        entries.append(("changed by the rules", INTERVENTION_COLOUR))
-    st.html(legend(entries, after="Click a step to look at it."))
 
 
 def pick_step() -> None:
@@ -53,10 +38,9 @@ def pick_step() -> None:
     The slider is drawn by another fragment, which finds the step as it begins: what a callback
     writes to a slider does not reach the browser when it asks for another run.
     """
-    points = st.session_state["strip"].selection.points
-    if points:
-        step = points[0]["customdata"]
-        st.session_state["_step"] = int(step["0"] if isinstance(step, dict) else step[0])
+    step = clicked_step("strip")
+    if step is not None:
+        st.session_state["_step"] = step
         # A click in a picture that is about to go finds no fragment: then the page runs as a whole.
         with contextlib.suppress(StreamlitAPIException):
             st.rerun("at_step")
@@ -75,7 +59,7 @@ def step_by_step(played: Played) -> None:
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     st.subheader("Step by step")
-    show_legend(replay.dimensions, marks=shielded)
+    show_legend(replay.dimensions, marks="changed by the rules" if shielded else "")
     plain = replay.plain.steps
     assert plain is not None  # a replay records them
     rows = tracks(steps, replay.dimensions, shielded=shielded)
@@ -105,22 +89,6 @@ def step_by_step(played: Played) -> None:
     at_step(played, timeline)
 
 
-def mark_style(timeline: Timeline) -> str:
-    """The mark over the figures, where `at_step` puts it."""
-    return (
-        "<style>"
-        ".st-key-timeline { position: relative; }"
-        ".st-key-timeline::after { content: ''; position: absolute; z-index: 2; top: 0;"
-        f" bottom: {timeline.bottom}px; width: 2px; pointer-events: none;"
-        f" left: calc({timeline.left - 1}px"
-        f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
-        # Of the page's ink, with a rim, so that it is seen on every colour.
-        " background: currentColor;"
-        " box-shadow: 0 0 0 1px rgba(140, 150, 160, 0.6); }"
-        "</style>"
-    )
-
-
 @st.fragment(key="at_step")
 def at_step(played: Played, timeline: Timeline) -> None:
     """The slider, and the step it stands at.
@@ -142,7 +110,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
     current = 0
     if last > 0:
         current = int(st.slider("Step", 0, last, key="step", bind="query-params"))
-    mark = f"<style>.st-key-timeline {{ --step-x: {timeline.place(current):.5f}; }}</style>"
+    mark = mark_at(timeline, current)
     if shielded:
         changes(replay, current, mark)
     else:

@@ -1,0 +1,18 @@
+"""Episodes: what was demonstrated, step by step."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
+from sarl_dashboard.views.episodes.steps import chosen_episode, episode_steps
+
+st.title("Episodes")
+st.caption(
+    "What was demonstrated, one episode at a time: the actions, the rule that applies at each "
+    "step, and the features. Click a step to look at it."
+)
+require_demonstrations()
+demonstrations = all_demonstrations()
+assert demonstrations is not None
+episode_steps(demonstrations, chosen_episode(demonstrations))
