@@ -104,6 +104,7 @@ def feature_lines(
     ticks = np.unique(np.linspace(0, len(values) - 1, min(7, len(values))).round().astype(int))
     figure.update_xaxes(
         title={"text": "step", "standoff": 2},
+        anchor="y" if len(features) == 1 else f"y{len(features)}",
         fixedrange=True,
         range=timeline.range,
         tickvals=ticks,

@@ -59,8 +59,6 @@ def episode_steps(demonstrations: Demonstrations, episode: int) -> None:
     left, right = st.columns(2, gap="medium")
     with right:
         show_step(held, current, choice)
-    with left:
-        scene = st.container()
         features, state = held.rule_set.source.features, held.observations[current]
         asking = [held.rule_set[place] for place in held.rules[current].tolist() if place >= 0]
         values = state_values(state, features, asking)
@@ -72,7 +70,7 @@ def episode_steps(demonstrations: Demonstrations, episode: int) -> None:
                 ]
             )
         )
-    with scene:  # last, because it may take a while
+    with left:  # last, because it may take a while
         show_scene(demonstrations, episode, current)
 
 
