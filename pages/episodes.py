@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
-from sarl_dashboard.views.episodes.steps import chosen_episode, episode_steps
+from sarl_dashboard.views.episodes.steps import show_episodes
 
 st.title("Episodes")
 st.caption(
@@ -15,4 +15,4 @@ st.caption(
 require_demonstrations()
 demonstrations = all_demonstrations()
 assert demonstrations is not None
-episode_steps(demonstrations, chosen_episode(demonstrations))
+show_episodes(demonstrations)

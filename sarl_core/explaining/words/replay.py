@@ -161,11 +161,11 @@ def step_view(
         )
     in_force = steps.rules[row].tolist() if rule_set is not None else []
     asking = [rule_set.rules[rule] for rule in in_force if rule >= 0] if rule_set else []
-    as_asked = rule_set.source.features if rule_set is not None else features
+    named = rule_set.source.features if rule_set is not None else features
     state = tuple(
         (feature.name, value, feature.unit)
         for feature, value in zip(
-            features, state_values(steps.observation[row], as_asked, asking), strict=True
+            features, state_values(steps.observation[row], named, asking), strict=True
         )
     )
     return StepView(

@@ -8,8 +8,7 @@ import streamlit as st
 
 from sarl_core.auditing.audit import Audit, audit
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.figures.audit import audit_tracks, step_texts
-from sarl_core.explaining.figures.episode import feature_lines
+from sarl_core.explaining.figures.audit import audit_tracks, feature_lines, step_texts
 from sarl_core.explaining.figures.replay import Timeline, intervention_strip
 from sarl_core.explaining.html.step_card import state_table
 from sarl_core.explaining.words.replay import state_values
@@ -28,25 +27,22 @@ _MOST_STEPS = 2_000  # that are drawn at once; of a longer episode, those around
 _AT_FIRST, _MOST_FEATURES = 4, 24
 
 
-def chosen_episode(demonstrations: Demonstrations) -> int:
-    """The widgets for the episode, as it stands in `demonstrations.episodes`."""
-    episodes = demonstrations.episodes[demonstrations.episode_starts].tolist()
-    place = _number("Episode", "episode", len(episodes) - 1)
-    return int(episodes[place])
-
-
-def episode_steps(demonstrations: Demonstrations, episode: int) -> None:
-    """The episode over its steps, and everything about the step that is looked at.
+def show_episodes(demonstrations: Demonstrations) -> None:
+    """An episode over its steps, and everything about the step that is looked at.
 
     Args:
         demonstrations: All of them.
-        episode: As it stands in `demonstrations.episodes`.
     """
+    episodes = demonstrations.episodes[demonstrations.episode_starts]
+    left, right = st.columns(2)
+    with left:
+        episode = int(episodes[_number("Episode", "episode", len(episodes) - 1)])
     choice = COMPACT if in_force() else CHOSEN
     rule_set = rules_for(choice, None)
     assert rule_set is not None
     held = _held(rule_set, demonstrations, episode)
-    current = _number("Step", "step", held.steps - 1)
+    with right:
+        current = _number("Step", "step", held.steps - 1)
     st.caption(
         f"{counted(held.steps, 'step')}. Some rule applies in {share_text(held.coverage)} of them; "
         f"the expert broke one in {counted(held.broken, 'step')}."
