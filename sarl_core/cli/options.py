@@ -13,7 +13,15 @@ import typer
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="Demonstrations.", show_default=False)]
+File = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="Demonstrations: a file, a folder or its ZIP, or several files by a pattern in "
+        'quotation marks ("runs/*.csv").',
+        show_default=False,
+    ),
+]
 # Commands that read demonstrations have a parameter `columns` and are `with_columns`.
 Columns = Mapping[str, Any]  # of roles
 # Commands with an option `--env` are `with_environment`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import json
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sarl_core.demonstrations.formats import load_demonstrations, read_files
+from sarl_core.demonstrations.formats import (
+    load_demonstrations,
+    read_demonstrations,
+    read_files,
+    table_columns,
+)
 from sarl_core.errors import InputError
 
 LENGTHS = (4, 3, 5)
@@ -108,6 +114,24 @@ def test_lerobot_names_in_all_their_forms(names: Any, features: Any, tmp_path: P
     assert load_demonstrations(lerobot(tmp_path, names=names)).feature_names == features
 
 
+def test_lerobot_columns_are_mapped_by_their_names(tmp_path: Path) -> None:
+    folder = lerobot(tmp_path)
+    assert table_columns(folder)[:4] == (
+        *("observation.speed", "observation.gap", "observation.tilt", "action.left"),
+    )
+    read = load_demonstrations(folder, columns={"observation.tilt": "ignore"})
+    assert read.feature_names == ("speed", "gap")
+    assert read.action_names == ("left", "right")
+    assert read.n_episodes == len(LENGTHS)
+
+
+def test_lerobot_without_its_data(tmp_path: Path) -> None:
+    folder = lerobot(tmp_path)
+    shutil.rmtree(folder / "data")
+    with pytest.raises(InputError, match="no Parquet files in its folder 'data'"):
+        load_demonstrations(folder)
+
+
 @pytest.mark.parametrize("version", ["v1.6", "v4.0", ""])
 def test_a_version_that_is_not_known_is_refused_by_name(version: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=rf"LeRobot's version '{version}', and this program"):
@@ -183,6 +207,27 @@ def test_continuous_actions_of_imitation(tmp_path: Path) -> None:
     acts = [ACTIONS[a:b].tolist() for a, b in itertools.pairwise(starts)]
     read = load_demonstrations(saved(tmp_path, trajectories() | {"acts": acts}))
     assert read.actions.tolist() == ACTIONS.tolist()
+
+
+def test_rows_that_are_episodes_in_other_files() -> None:
+    starts = np.cumsum((0, *LENGTHS)).tolist()
+    rows = [
+        {
+            "observations": STATES[a:b].tolist(),
+            "actions": ACTIONS[a:b].tolist(),
+            "rewards": [1.0] * (b - a),
+            "dones": [False] * (b - a),
+        }
+        for a, b in itertools.pairwise(starts)
+    ]
+    out = io.BytesIO()
+    pq.write_table(pa.Table.from_pylist(rows), out)
+    lines = "".join(json.dumps(row) + "\n" for row in rows).encode()
+    for name, content in (("hopper.parquet", out.getvalue()), ("hopper.jsonl", lines)):
+        read = read_demonstrations(content, name)
+        assert read.observations.tolist() == STATES.tolist()
+        assert read.actions.tolist() == ACTIONS.tolist()
+        assert read.episode_lengths.tolist() == list(LENGTHS)
 
 
 def test_a_data_set_with_a_row_a_step(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.arrow.nested import (
     Leaf,
+    few_leaves,
     has_lists,
     leaves_of,
     refuse_nested,
@@ -108,6 +109,25 @@ class ParquetTable:
             return {name: read[name] for name in columns.used}
 
 
+def whole_table(table: ParquetTable, columns: Sequence[str]) -> Any:
+    """Some columns as they stand in the file, lists of any length among them.
+
+    Args:
+        table: The opened file.
+        columns: Of the file.
+
+    Returns:
+        A ``pyarrow.Table``.
+
+    Raises:
+        InputError: If they are damaged, or unpack to too much.
+    """
+    with refusing_damage():
+        sizes = [_largest_of(table.file, table.data, [column]) for column in columns]
+        require_memory(len(table.data) + table.file.metadata.num_row_groups * sum(sizes))
+        return table.file.read(columns=list(columns), use_threads=False)
+
+
 def open_parquet(data: memoryview) -> ParquetTable:
     """Open a Parquet file without reading its columns.
 
@@ -137,6 +157,7 @@ def open_parquet(data: memoryview) -> ParquetTable:
     metadata = Metadata() if described is None else decode_metadata(described)
     with refusing_damage():
         leaves = _leaves_of(file, data)
+    leaves = few_leaves(leaves)
     check_names(tuple(leaves))
     return ParquetTable(leaves, metadata, file, data)
 

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats.arrow.table import ArrowTable
 from sarl_core.demonstrations.formats.columns import ColumnMap, Columns, stated
 from sarl_core.demonstrations.formats.hubs.hub import OpenedTable, open_hub
 from sarl_core.demonstrations.formats.hubs.minari import MAIN_FILE, METADATA
@@ -34,7 +35,9 @@ from sarl_core.demonstrations.formats.pair import (
     partner_names,
     read_pair,
 )
+from sarl_core.demonstrations.formats.parquet_file import ParquetTable, whole_table
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
+from sarl_core.demonstrations.formats.sets.episode_rows import keys_of_rows, recording_of_rows
 from sarl_core.demonstrations.formats.sets.file_set import (
     FileSet,
     files_at,
@@ -411,9 +414,20 @@ def _read(
             f"it has no header, so it holds the {halves[own]} of a pair alone; give "
             f"{partners[0]!r} with the {halves[not own]} too"
         )
-    return to_demonstrations(
-        recording_from_table(table, columns, description), description, missing
-    )
+    recording = _of_episode_rows(table) if columns is None else None
+    if recording is None:
+        recording = recording_from_table(table, columns, description)
+    return to_demonstrations(recording, description, missing)
+
+
+def _of_episode_rows(table: Table) -> Recording | None:
+    """What a table holds of which each row is an episode; None if it is none."""
+    if isinstance(table, ArrowTable):
+        return recording_of_rows(table.table)
+    if isinstance(table, ParquetTable):
+        keys = keys_of_rows(table.file.schema_arrow)
+        return recording_of_rows(whole_table(table, [*keys.values()])) if keys else None
+    return None
 
 
 def _read_pair(

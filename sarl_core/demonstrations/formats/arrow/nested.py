@@ -6,7 +6,7 @@ A list `obs` of three numbers is the columns `obs_0`, `obs_1` and `obs_2`, and a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,11 +50,14 @@ def leaves_of(column: str, kind: Any, first: Any = None) -> dict[str, Leaf]:
     return leaves
 
 
-def is_nested(kind: Any) -> bool:
-    """Whether a type has several values in each row that can be columns of their own."""
-    import pyarrow as pa
-
-    return bool(pa.types.is_struct(kind) or _is_list(kind))
+def few_leaves(leaves: Mapping[str, Leaf]) -> dict[str, Leaf]:
+    """Leaves that are not too many between them: else columns that have several stay whole."""
+    if len(leaves) <= MAX_FEATURES:
+        return dict(leaves)
+    few: dict[str, Leaf] = {}
+    for name, leaf in leaves.items():
+        few |= {leaf.column: Leaf(leaf.column)} if leaf.path else {name: leaf}
+    return few
 
 
 def has_lists(kind: Any) -> bool:
@@ -160,8 +163,3 @@ def refuse_nested(name: str, kind: Any) -> None:
             f"column {quoted(name)} holds a {str(kind).split('<')[0]} in each row that cannot be "
             "taken apart; give each number a column of its own"
         )
-
-
-def first_of(chunks: Sequence[Any]) -> Any:
-    """The first value of a column, as an Arrow scalar; None where there is none."""
-    return next((chunk[0] for chunk in chunks if len(chunk)), None)

@@ -9,6 +9,7 @@ from typing import Any
 from sarl_core.demonstrations.formats.arrow.messages import unpacked_size
 from sarl_core.demonstrations.formats.arrow.nested import (
     Leaf,
+    few_leaves,
     leaves_of,
     refuse_nested,
     values_in,
@@ -108,6 +109,7 @@ def arrow_table(table: Any) -> ArrowTable:
         for field, column in zip(table.schema, table.columns, strict=True):
             leaves |= leaves_of(field.name, field.type, column[0])
         described = (table.schema.metadata or {}).get(KEY.encode())
+    leaves = few_leaves(leaves)
     check_names(tuple(leaves))
     metadata = Metadata() if described is None else decode_metadata(described)
     return ArrowTable(leaves, table, metadata)

@@ -13,9 +13,10 @@ import msgspec
 
 from sarl_core.demonstrations.formats.columns import ColumnMap, listed
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.parquet_file import ParquetTable
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
-from sarl_core.demonstrations.formats.sets.table_set import open_tables
-from sarl_core.demonstrations.formats.tables import Table
+from sarl_core.demonstrations.formats.sets.table_set import TableSet, open_tables
+from sarl_core.demonstrations.formats.tables import Table, check_names
 from sarl_core.documents import Count, MisfitError, conformed, parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES
@@ -62,7 +63,12 @@ def open_lerobot(files: FileSet) -> tuple[Table, ColumnMap, tuple[str, ...]]:
         info = _info(files.content(INFO))
         pictures = [name for name, one in info.features.items() if one.dtype in _PICTURES]
     data = files.below("data/")
-    table, notes = open_tables(data)
+    parquet = {path: size for path, size in data.sizes.items() if path.endswith(".parquet")}
+    if not parquet:
+        raise InputError(
+            "there are no Parquet files in its folder 'data'; download the whole data set"
+        )
+    table, notes = open_tables(replace(data, sizes=parquet))
     numbers = {
         name: one for name, one in info.features.items() if one.dtype not in (*_PICTURES, "string")
     }
@@ -75,14 +81,31 @@ def open_lerobot(files: FileSet) -> tuple[Table, ColumnMap, tuple[str, ...]]:
                 f"{listed(info.features)}; choose a data set with one"
             )
     roles = {role: name for role, name in _ROLES.items() if name in table.names}
+    # Whoever maps columns sees the names, and not the places in vectors.
+    named = {
+        column: f"{word}.{name}"
+        for word, columns in (("observation", observed), ("action", acted))
+        for column, name in columns.items()
+    }
     chosen = replace(
-        ColumnMap.of_roles(tuple(observed), tuple(acted), roles),
+        ColumnMap.of_roles([named[one] for one in observed], [named[one] for one in acted], roles),
         feature_names=tuple(observed.values()),
         action_names=tuple(acted.values()),
     )
+    table = _renamed(table, named)
+    check_names(table.names)
     if pictures:
         notes += (f"the pictures {listed(pictures)} were not used, as rules cannot read them",)
     return table, chosen, notes
+
+
+def _renamed(table: Table, names: Mapping[str, str]) -> Table:
+    """The same table with other names for some of its columns."""
+    if isinstance(table, TableSet):
+        return replace(table, tables=tuple(_renamed(one, names) for one in table.tables))
+    assert isinstance(table, ParquetTable)
+    leaves = {names.get(name, name): leaf for name, leaf in table.leaves.items()}
+    return replace(table, leaves=leaves)
 
 
 def _info(content: memoryview) -> _LeRobotInfo:
