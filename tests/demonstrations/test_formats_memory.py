@@ -83,6 +83,12 @@ def one_long_text() -> bytes:
     return zstd(obs_a=["x" * 10**8, "1"], action=labels(2))
 
 
+def texts_in_objects() -> bytes:
+    codes = pa.array(np.zeros(60_000, np.int32))
+    texts = pa.DictionaryArray.from_arrays(codes, pa.array(["x" * 10**7]))
+    return zstd(obs_a=pa.StructArray.from_arrays([texts], ["b"]), action=labels(60_000))
+
+
 def long_lists() -> bytes:
     """Rows of two numbers, and one of a hundred million."""
     values = pa.array(np.zeros(10**8 + 2, np.int8))
@@ -170,6 +176,7 @@ REFUSED: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "plain texts": ("parquet", plain_texts, "0.3 GiB, more than the 0.125 GiB"),
     "one long text": ("parquet", one_long_text, "column 'obs_a' holds no numbers"),
     "long bytes": ("parquet", long_bytes, "column 'obs_a' holds no numbers"),
+    "texts in objects": ("parquet", texts_in_objects, "column 'obs_a.b' holds"),
     "long lists": ("parquet", long_lists, "column 'obs_a' holds a list in each row"),
     "gzip": ("csv.gz", lambda: gzip.compress(b"obs_a,action\n" + bytes(3 * 10**8)), "unpacks to"),
     "an archive": ("zip", lambda: zipped_zeros(3 * 10**8), "unpacks to"),

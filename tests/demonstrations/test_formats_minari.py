@@ -152,7 +152,7 @@ def test_actions_of_every_space(kind: str, data_format: str, tmp_path: Path) -> 
 def test_names_are_the_keys_of_spaces_else_those_of_the_environment(tmp_path: Path) -> None:
     keyed, _, _ = written(tmp_path / "keys", OBSERVATIONS["dict"], spaces.Discrete(2), "arrow")
     assert load_demonstrations(keyed).feature_names == (
-        *("speed", "gear 0", "gear 1", "gear 2", "gap 0", "gap 1"),
+        *("speed", "gear is 0", "gear is 1", "gear is 2", "gap 0", "gap 1"),
     )
     cart = spaces.Box(-1, 1, (4,))
     folder, _, _ = written(
@@ -201,6 +201,13 @@ def test_without_its_metadata_it_is_refused(data_format: str, tmp_path: Path) ->
 
 
 BOX = '{"type": "Box", "dtype": "float32", "shape": [3], "low": [-1, -1, -1], "high": [1, 1, 1]}'
+PICTURE = {
+    "type": "Box",
+    "dtype": "uint8",
+    "shape": [8, 8, 3],
+    "low": np.zeros((8, 8, 3), int).tolist(),
+    "high": np.full((8, 8, 3), 255).tolist(),
+}
 CHANGES: dict[str, tuple[dict[str, Any], str]] = {
     "no space": ({"observation_space": None}, r"not as it should be .*'observation_space'"),
     "no JSON": ({"observation_space": "{"}, "space of observations is none that is known"),
@@ -209,7 +216,7 @@ CHANGES: dict[str, tuple[dict[str, Any], str]] = {
         "space of observations is none that is known",
     ),
     "another width": (
-        {"observation_space": BOX.replace("[3]", "[4]")},
+        {"observation_space": BOX.replace("[3]", "[4]").replace("1]", "1, 1]")},
         "3 numbers, and its space 4|no 'observations_3'",
     ),
     "a huge space": (
@@ -218,7 +225,7 @@ CHANGES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "a huge shape": (
         {"observation_space": BOX.replace("[3]", "[1000000, 1000000]")},
-        "more than 4,096 numbers",
+        r"of shape \(1000000, 1000000\), as images are",
     ),
     "many labels": ({"action_space": '{"type": "Discrete", "n": 1000000000}'}, "labels that rules"),
     "text": (
@@ -227,7 +234,15 @@ CHANGES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "images": (
         {"observation_space": BOX.replace("[3]", "[64, 64, 3]").replace("float32", "uint8")},
-        "64x64x3, as images do",
+        r"of shape \(64, 64, 3\), as images are",
+    ),
+    "small images": (
+        {"observation_space": json.dumps(PICTURE)},
+        r"of shape \(8, 8, 3\), as images are",
+    ),
+    "bounds of another shape": (
+        {"observation_space": BOX.replace("[1, 1, 1]", "[1, 1]")},
+        "space of observations is not as it should be",
     ),
     "another format": ({"data_format": "zarr"}, "in the format 'zarr', which is not read"),
     "deep": (

@@ -15,6 +15,7 @@ from sarl_core.demonstrations.formats.arrow.nested import (
     Leaf,
     few_leaves,
     has_lists,
+    leaf_type,
     leaves_of,
     refuse_nested,
     values_in,
@@ -101,6 +102,11 @@ class ParquetTable:
                 )
             # Texts by their dictionary: each stands there once, however often it occurs.
             texts = [name for name in flat if is_text(schema.field(name).type)]
+            texts += [
+                ".".join((leaf.column, *map(str, leaf.path)))
+                for leaf in leaves.values()
+                if leaf.path and is_text(leaf_type(leaf, schema.field(leaf.column).type))
+            ]
             file = _opened(self.data, texts)
             read: dict[str, TableColumn] = {}
             for column in used:

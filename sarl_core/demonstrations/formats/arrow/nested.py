@@ -50,6 +50,13 @@ def leaves_of(column: str, kind: Any, first: Any = None) -> dict[str, Leaf]:
     return leaves
 
 
+def leaf_type(leaf: Leaf, kind: Any) -> Any:
+    """The Arrow type of a leaf in a column of some type."""
+    for step in leaf.path:
+        kind = kind.field(step).type if isinstance(step, str) else kind.value_type
+    return kind
+
+
 def few_leaves(leaves: Mapping[str, Leaf]) -> dict[str, Leaf]:
     """Leaves that are not too many between them: else columns that have several stay whole."""
     if len(leaves) <= MAX_FEATURES:

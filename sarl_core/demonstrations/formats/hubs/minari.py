@@ -22,6 +22,7 @@ from sarl_core.demonstrations.formats.hdf5.content import Hdf5Content, opened_hd
 from sarl_core.demonstrations.formats.hubs.spaces import (
     DiscreteSpace,
     SpacePart,
+    names_of,
     parsed_space,
     parts_of,
 )
@@ -33,6 +34,7 @@ from sarl_core.demonstrations.formats.sets.file_set import FileSet, natural_orde
 from sarl_core.demonstrations.formats.tables import Table
 from sarl_core.documents import MisfitError, conformed, parse_json
 from sarl_core.environments.description import catalogued
+from sarl_core.environments.feature_order import numbered
 from sarl_core.errors import InputError, quoted
 
 METADATA = "metadata.json"
@@ -101,9 +103,10 @@ def read_minari(files: FileSet) -> Recording:
     """
     with naming(METADATA):
         said = _metadata(files.content(METADATA))
-        observed = parts_of(parsed_space(said.observation_space, "observations"), "observations")
+        space = parsed_space(said.observation_space, "observations")
+        observed = parts_of(space, "observations")
         acted = parts_of(parsed_space(said.action_space, "actions"), "actions")
-        metadata = _described(said, observed, acted)
+        metadata = _described(said, names_of(space), acted)
     columns: dict[str, list[NDArray[Any]]] = {}
     lengths: list[int] = []
     for name, episode in _episodes(files, said.data_format, observed, acted):
@@ -158,7 +161,7 @@ def _metadata(content: memoryview) -> _MinariMetadata:
 
 
 def _described(
-    said: _MinariMetadata, observed: tuple[SpacePart, ...], acted: tuple[SpacePart, ...]
+    said: _MinariMetadata, names: tuple[str, ...], acted: tuple[SpacePart, ...]
 ) -> Metadata:
     """What the file says besides: names by the keys of its spaces, else by its environment."""
     kinds = {bool(part.counts) for part in acted}
@@ -168,13 +171,13 @@ def _described(
             "choose a data set with one"
         )
     discrete = kinds == {True}
-    d, m = sum(part.flat_width for part in observed), sum(part.width for part in acted)
+    m = sum(part.width for part in acted)
     env_id = _environment(said.env_spec)
-    names = catalogued(env_id, d, m, discrete=discrete)
-    features = names.features
-    if observed[0].path:
-        features = tuple((name, "") for part in observed for name in part.flat_names)
-    actions = names.actions
+    known = catalogued(env_id, len(names), m, discrete=discrete)
+    features = known.features
+    if names != numbered(len(names)):
+        features = tuple((name, "") for name in names)
+    actions = known.actions
     if acted[0].path:
         actions = tuple(
             part.name if part.width == 1 else f"{part.name} {index}"
@@ -197,8 +200,8 @@ def _described(
         features=tuple(Feature(name, unit) for name, unit in features),
         action_names=actions,
         label_names=tuple(
-            names.labels[index]
-            if index < len(names.labels) and len(names.labels[index]) == n
+            known.labels[index]
+            if index < len(known.labels) and len(known.labels[index]) == n
             else tuple(str(first[index] + label) for label in range(n))
             for index, n in enumerate(counts)
         ),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -12,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.documents import LARGEST_WHOLE, Count, MisfitError, conformed, parse_json
+from sarl_core.environments.naming import picture_in, space_names
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES
 
 _DEEPEST = 8  # spaces within one another
-_IMAGE_SIDE = 16  # numbers; a table with shorter sides is a vector
-_COLOURS = 3
 
 
 class _Space(msgspec.Struct, tag_field="type"):
@@ -105,8 +106,8 @@ class SpacePart:
 
     @property
     def name(self) -> str:
-        """The keys that lead to it, "" where it is alone; a place counts from 1."""
-        return " ".join(key if isinstance(key, str) else f"part {key + 1}" for key in self.path)
+        """The keys that lead to it, "" where it is alone."""
+        return ": ".join(key if isinstance(key, str) else f"part {key}" for key in self.path)
 
     @property
     def counts(self) -> tuple[int, ...]:
@@ -125,13 +126,6 @@ class SpacePart:
         if isinstance(self.space, MultiDiscreteSpace) and self.space.start is not None:
             return tuple(int(start) for start in np.ravel(self.space.start))
         return (0,) * self.width
-
-    @property
-    def flat_names(self) -> tuple[str, ...]:
-        """What its features are called."""
-        if self.flat_width == 1:
-            return (self.name,)
-        return tuple(f"{self.name} {index}" for index in range(self.flat_width))
 
     @property
     def flat_width(self) -> int:
@@ -229,6 +223,8 @@ def parts_of(space: Space, what: str) -> tuple[SpacePart, ...]:
         parts.append(part)
         numbers += part.flat_width if what == "observations" else part.width
         if numbers > MAX_FEATURES:
+            if isinstance(one, BoxSpace) and len(one.shape) > 1:
+                raise _images(f"{_placed(path)} is of shape {one.shape}")
             raise InputError(
                 f"its {what} have more than {MAX_FEATURES:,} numbers, more than rules a person "
                 "reads could use; choose a data set with fewer"
@@ -274,22 +270,64 @@ def _width(space: Simple, what: str, path: tuple[str | int, ...]) -> int:
         shape, counts = (space.n,) if isinstance(space.n, int) else space.n, []
     else:
         shape, counts = space.shape, []
-        if _is_image(space):
-            raise InputError(
-                f"{_placed(path)} has the shape {'x'.join(map(str, shape))}, as images do, which "
-                "rules cannot read; choose a data set with a vector of features"
-            )
     if any(n < 1 for n in counts):
         raise _malformed(what)
     return math.prod(shape)
 
 
-def _is_image(space: BoxSpace) -> bool:
-    shape = space.shape
-    if len(shape) == 3 and shape[-1] == _COLOURS:
-        return True
-    large = len(shape) in (2, 3) and min(shape[:2]) >= _IMAGE_SIDE
-    return space.dtype == "uint8" and large
+def names_of(space: Space) -> tuple[str, ...]:
+    """What the features of a space of observations are called.
+
+    Args:
+        space: Of which `parts_of` has been asked, so that it is not too large.
+
+    Returns:
+        A name for each; numbered ones where the space has no structure.
+
+    Raises:
+        InputError: If a part of it is an image, or it is not as it should be.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of bounds that a narrow type cannot hold
+            whole = _made(space)
+    except (ValueError, TypeError, AssertionError, OverflowError) as error:
+        raise _malformed("observations") from error
+    picture = picture_in(whole)
+    if picture:
+        raise _images(
+            f"each of its observations {'is' if picture[:3] == 'of ' else 'has'} {picture}"
+        )
+    return space_names(whole)
+
+
+def _made(space: Space) -> Any:
+    """The same space of Gymnasium's."""
+    from gymnasium import spaces
+
+    if isinstance(space, DictSpace):  # in their order, which a plain dictionary would lose
+        parts = ((key, _made(inner)) for key, inner in space.subspaces.items())
+        return spaces.Dict(OrderedDict(parts))
+    if isinstance(space, TupleSpace):
+        return spaces.Tuple([_made(inner) for inner in space.subspaces])
+    if isinstance(space, DiscreteSpace):
+        return spaces.Discrete(space.n, start=space.start)
+    if isinstance(space, MultiDiscreteSpace):
+        return spaces.MultiDiscrete(np.asarray(space.nvec, np.int64), start=space.start)
+    if isinstance(space, MultiBinarySpace):
+        return spaces.MultiBinary(space.n if isinstance(space.n, int) else list(space.n))
+    assert isinstance(space, BoxSpace)
+    dtype = np.dtype(space.dtype)
+    low = -np.inf if space.low is None else np.asarray(space.low, dtype)
+    high = np.inf if space.high is None else np.asarray(space.high, dtype)
+    return spaces.Box(low, high, space.shape, dtype.type)
+
+
+def _images(what: str) -> InputError:
+    return InputError(
+        f"{what}, as images are, which rules cannot read; choose a data set with a vector of "
+        "features"
+    )
 
 
 def _placed(path: tuple[str | int, ...]) -> str:
