@@ -31,6 +31,7 @@ Values = Mapping[str, NDArray[Any]]
 
 _LEAST_ROWS = 10  # fewer count up by chance
 _INFINITE = np.errstate(invalid="ignore", over="ignore")  # such values are refused afterwards
+_YEAR_2001, _YEAR_2065 = 1e9, 3e9  # seconds since 1970
 _LEAST_CHANGES = 5  # of a column, before another one may be called its next value
 
 
@@ -96,15 +97,23 @@ def counters(values: Values) -> dict[str, str]:
     Returns:
         Why each of them is no feature and no action.
     """
-    return {
-        name: "it rises by the same amount in every row, as a counter or a clock does"
-        for name, held in values.items()
-        if len(held) >= _LEAST_ROWS and rises_steadily(held)
-    } | {
-        name: "it counts the rows"
-        for name, held in values.items()
-        if _counts(held, None) or _counts(held[::-1], None)
-    }
+    return (
+        {
+            name: "it rises in every row, as seconds since 1970 do"
+            for name, held in values.items()
+            if len(held) >= _LEAST_ROWS and _rises_since_1970(held)
+        }
+        | {
+            name: "it rises by the same amount in every row, as a counter or a clock does"
+            for name, held in values.items()
+            if len(held) >= _LEAST_ROWS and rises_steadily(held)
+        }
+        | {
+            name: "it counts the rows"
+            for name, held in values.items()
+            if _counts(held, None) or _counts(held[::-1], None)
+        }
+    )
 
 
 def numbers_episodes(values: NDArray[Any]) -> bool:
@@ -280,6 +289,14 @@ def _followers(
         if base is not None and base != name and np.count_nonzero(np.diff(held)) >= _LEAST_CHANGES:
             followed[name] = base
     return followed
+
+
+def _rises_since_1970(values: NDArray[Any]) -> bool:
+    """Whether a column may be a clock's: seconds, milli-, micro- or nanoseconds of our years."""
+    if values.dtype.kind == "b" or not values[0] > _YEAR_2001:
+        return False
+    scale = 10.0 ** (3 * max(0, min(3, int(np.log10(values[0] / _YEAR_2001) // 3))))
+    return bool(values[-1] < _YEAR_2065 * scale and np.all(np.diff(values.astype(np.float64)) >= 0))
 
 
 def _counts(values: NDArray[Any], together: NDArray[np.bool_] | None) -> bool:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import codecs
-import csv
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import TRUTH
 from sarl_core.demonstrations.formats.columns import ColumnMap
+from sarl_core.demonstrations.formats.csv_head import Delimiter, read_head
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, is_text
 from sarl_core.demonstrations.formats.saved_columns import columns_in_words
@@ -27,10 +27,6 @@ from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
 
-Delimiter = Literal[";", "\t", "|", ","]
-_DELIMITERS: tuple[Delimiter, ...] = (";", "\t", "|", ",")  # a comma may be a decimal sign
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
-_FRACTION = re.compile(r"[+-]?\d*[.,]\d*(e[+-]?\d+)?|[+-]?\d+e[+-]?\d+|[+-]?(nan|inf)", re.I)
 _BOMS = {
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
@@ -38,7 +34,6 @@ _BOMS = {
     codecs.BOM_UTF16_BE: "UTF-16",
 }
 _MOST_DIFFERENT = 1_000  # texts of a column that are kept once each
-_MAX_LINE = 2**24  # characters of a header
 _BLOCK = 2**22  # bytes that are looked through at once
 _FEED, _RETURN = b"\n\r"
 # What Arrow's parser of numbers takes beside numbers, wherever it stands.
@@ -60,6 +55,7 @@ class CsvTable:
         decimal: The decimal sign.
         body: The file from its first data row on.
         first_line: Line of the first data row, from 1.
+        units: Of columns, where a row below the header gives them.
     """
 
     names: tuple[str, ...]
@@ -68,11 +64,16 @@ class CsvTable:
     decimal: str
     body: memoryview
     first_line: int
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def metadata(self) -> Metadata:
-        """CSV carries none."""
-        return Metadata()
+        """CSV carries units at most."""
+        if not self.units:
+            return Metadata()
+        name, unit = next(iter(self.units.items()))
+        note = f"the row below the header gives units, as {quoted(unit)} for {quoted(name)}"
+        return Metadata(notes=(note,), column_units=self.units)
 
     def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.
@@ -281,30 +282,13 @@ def open_csv(data: memoryview, *, like: CsvTable | None = None) -> CsvTable:
             name.
     """
     data = _as_text(data)
-    skipped = re.match(rb"\s*", data)
-    start = skipped.end() if skipped is not None else 0
-    line = 1 + bytes(data[:start]).count(b"\n")
-    head, end = _line(data, start)
-    if not head:
-        raise InputError("there is nothing but white space in it; give rows of numbers")
-    delimiter = like.delimiter if like is not None else _delimiter(head)
-    fields = _fields(head, delimiter)
-    second, _ = _line(data, end)
-    named = _is_header(fields, _fields(second, delimiter) if second else [])
-    if named:
-        names = tuple(fields)
-        check_names(names)
-    else:
-        names = tuple(f"column {number}" for number in range(1, len(fields) + 1))
-        check_names(names)
-        end = start
-    body = data[end:]
-    if not re.search(rb"\S", body):
-        raise InputError(
-            "there are no steps, only a header; give at least two observations with their actions"
-        )
-    decimal = like.decimal if like is not None else _decimal(body, delimiter)
-    return CsvTable(names, named, delimiter, decimal, body, line + named)
+    head = read_head(data, like.delimiter if like is not None else None)
+    check_names(head.names)
+    body = data[head.start :]
+    decimal = like.decimal if like is not None else _decimal(body, head.delimiter)
+    return CsvTable(
+        head.names, head.named, head.delimiter, decimal, body, head.line, dict(head.units)
+    )
 
 
 def write_csv(demonstrations: Demonstrations, out: BinaryIO) -> None:
@@ -381,43 +365,6 @@ def _as_text(data: memoryview) -> memoryview:
                 f"it is not UTF-8 in line {line} (byte 0x{data[wrong]:02x}); save it as UTF-8"
             ) from None
     return data
-
-
-def _line(data: memoryview, start: int) -> tuple[str, int]:
-    """The line that starts somewhere, and where the next one starts."""
-    match = re.compile(rb"([^\r\n]*)(\r\n|\r|\n|$)").match(data, start, start + _MAX_LINE)
-    if match is None or match.end() - start >= _MAX_LINE:
-        raise InputError("its first line is too long; give a CSV file with one row a step")
-    return bytes(match[1]).decode(), match.end()
-
-
-def _delimiter(head: str) -> Delimiter:
-    unquoted = re.sub(r'"(?:[^"]|"")*"', "", head)
-    return next((sign for sign in _DELIMITERS if sign in unquoted), ",")
-
-
-def _fields(line: str, delimiter: str) -> list[str]:
-    try:
-        fields = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-    except csv.Error as error:
-        raise InputError("its first line cannot be read as CSV; check its quotation marks") from (
-            error
-        )
-    if fields and fields[0].startswith("#"):  # as numpy.savetxt writes a header
-        fields[0] = fields[0][1:].lstrip()
-    return fields
-
-
-def _is_header(fields: Sequence[str], below: Sequence[str]) -> bool:
-    """Whether a first line holds names rather than numbers."""
-    stripped = [field.strip() for field in fields]
-    if any(_FRACTION.fullmatch(field) for field in stripped):
-        return False  # one wrong field does not make names of the others
-    if any(field and not _NUMBER.fullmatch(field) for field in stripped):
-        return True
-    # A data frame without names numbers its columns.
-    counted = len(fields) > 1 and stripped == [str(index) for index in range(len(fields))]
-    return counted and any(_FRACTION.fullmatch(field.strip()) for field in below)
 
 
 def _decimal(body: memoryview, delimiter: str) -> str:

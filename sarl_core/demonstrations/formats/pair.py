@@ -47,6 +47,7 @@ from sarl_core.demonstrations.formats.tables import (
     require_filled,
     require_numbers,
     units_of,
+    without_times,
 )
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action, plain
 from sarl_core.environments.description import EnvironmentDescription
@@ -257,12 +258,12 @@ def _observations_of(table: CsvTable) -> _Half:
     if guess.unclear:
         guess = resolved(guess, numbers_of(table, guess.unclear), table.names)
     require_clear(guess, table.names, actions=False)
-    read = table.read(guess.columns)
+    guess, read, numbered = without_times(guess, table.read(guess.columns))
     words = {name for name, column in read.items() if column.words}
     guess = settle(guess, {name: column.values for name, column in read.items()}, words)
     read = {name: read[name] for name in guess.columns.used}
     _require_marks(read, guess.columns)
-    return _Half(guess, read, guess_notes(guess))
+    return _Half(guess, read, (*guess_notes(guess), *numbered))
 
 
 def _actions_of(table: CsvTable) -> _Half:
@@ -279,9 +280,9 @@ def _actions_of(table: CsvTable) -> _Half:
     guess = guess.as_actions(counters(held))
     if not guess.columns.actions:
         require_clear(guess, table.names)
-    read = table.read(guess.columns)
+    guess, read, numbered = without_times(guess, table.read(guess.columns))
     _require_marks(read, guess.columns)
-    return _Half(guess, read, ())
+    return _Half(guess, read, numbered)
 
 
 def _require_marks(read: dict[str, TableColumn], columns: ColumnMap) -> None:

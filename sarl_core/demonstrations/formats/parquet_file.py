@@ -209,7 +209,7 @@ def _columns(
             raise _damaged()
         for name, leaf in leaves.items():
             held = values_in(leaf, batch.column(0), at)
-            if is_text(held.type):
+            if is_text(held.type) or _is_time(held.type):
                 texts.setdefault(name, []).append(held)
                 continue
             part = column_from_arrow(name, held, at)
@@ -318,7 +318,7 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
     import pyarrow.compute as pc
 
     kind = column.type
-    if is_text(kind):
+    if is_text(kind) or _is_time(kind):
         ordered = pa.types.is_dictionary(kind) and kind.ordered
         return TableColumn.of_words(_words(name, column, ordered=ordered))
     if pa.types.is_dictionary(kind):
@@ -350,6 +350,8 @@ def _words(name: str, column: Any, *, ordered: bool) -> Coded:
     import pyarrow.compute as pc
 
     chunked = column if isinstance(column, pa.ChunkedArray) else pa.chunked_array([column])
+    if _is_time(chunked.type):
+        chunked = pc.cast(chunked, pa.large_string())
     if not pa.types.is_dictionary(chunked.type):
         chunked = pc.dictionary_encode(chunked)
     whole = chunked.unify_dictionaries().combine_chunks()
@@ -383,6 +385,13 @@ def _is_numeric(kind: Any) -> bool:
         or pa.types.is_decimal(kind)
         or pa.types.is_null(kind)
     )
+
+
+def _is_time(kind: Any) -> bool:
+    """Whether its values are dates, times of day, or both, which are told as words."""
+    import pyarrow as pa
+
+    return bool(pa.types.is_timestamp(kind) or pa.types.is_date(kind) or pa.types.is_time(kind))
 
 
 def is_text(kind: Any) -> bool:

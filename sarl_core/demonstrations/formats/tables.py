@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.fields import TRUTH, Indicator
+from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
@@ -91,6 +92,11 @@ class TableColumn:
             return self.values
         return np.where(self.missing, np.nan, self.values)
 
+    @property
+    def is_time(self) -> bool:
+        """Whether each of its words is a date, a time of day, or both."""
+        return bool(self.words) and all(map(vocabulary.is_time, self.words))
+
     def at(self, rows: NDArray[np.int64]) -> TableColumn:
         """The same column in some of its rows."""
         missing = None if self.missing is None else self.missing[rows]
@@ -158,6 +164,7 @@ def recording_from_table(
         require_clear(guess, table.names)
     check_map(guess.columns, table.names)
     read, rows, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
+    guess, read, numbered = without_times(guess, read)
     if guessed:
         words = {name for name, column in read.items() if column.words}
         guess = settle(guess, {name: column.values for name, column in read.items()}, words)
@@ -165,7 +172,8 @@ def recording_from_table(
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
     require_filled({name: read[name] for name in chosen.singles.values()}, rows, chosen.reward)
-    single, numbered = singles_of(read, chosen, rows)
+    require_numbers(read, chosen.singles.values(), rows)
+    single = {role: read[name].with_gaps for role, name in chosen.singles.items()}
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
     called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
@@ -197,32 +205,38 @@ def recording_from_table(
     )
 
 
-def singles_of(
-    read: Mapping[str, TableColumn], columns: ColumnMap, rows: NDArray[np.int64] | None = None
-) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
-    """The values of columns that are neither features nor actions, by what they are.
+def without_times(
+    guess: Guess, read: Mapping[str, TableColumn]
+) -> tuple[Guess, dict[str, TableColumn], tuple[str, ...]]:
+    """A guess without features and steps that are times, and its columns with numbered episodes.
 
     Args:
-        read: The columns by name.
-        columns: Which is what.
-        rows: The rows they had in the file, from 0; None if they are those.
+        guess: By the columns' names.
+        read: The columns that it uses, by name.
 
     Returns:
-        The values, each of shape (N,), and a note where words became the numbers of episodes.
-
-    Raises:
-        InputError: If one holds words, and is not that of the episodes.
+        The guess, the columns that are left, and a note where texts became the numbers of episodes.
     """
-    singles = columns.singles
-    episode = singles.get("episode")
-    require_numbers(read, [name for name in singles.values() if name != episode], rows)
-    values = {role: read[name].with_gaps for role, name in singles.items()}
-    if episode is None or not read[episode].words:
-        return values, ()
-    _, first, codes = np.unique(values["episode"], return_index=True, return_inverse=True)
-    values["episode"] = np.argsort(np.argsort(first))[codes]  # in the order of the file
-    word = read[episode].words[read[episode].values[0]]
-    return values, (f"the episodes of column {episode!r} are numbered from 0, {word!r} first",)
+    columns = guess.columns
+    timed = [name for name in (*columns.observations, columns.step) if name and read[name].is_time]
+    times = {name: "it is a time" for name in timed if name not in guess.roles}
+    guess = guess.without(times)
+    if columns.step in times:
+        guess = replace(
+            guess,
+            columns=replace(guess.columns, step=None),
+            unused={**guess.unused, columns.step: times[columns.step]},
+        )
+    left = {name: read[name] for name in guess.columns.used}
+    episode = columns.episode
+    if episode is None or not left[episode].words:
+        return guess, left, ()
+    codes, words = left[episode].values, left[episode].words
+    _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+    ranks = np.argsort(np.argsort(first))[places.reshape(-1)]  # in the order of the file
+    left[episode] = TableColumn(ranks, left[episode].missing)
+    note = f"the episodes of column {episode!r} are numbered from 0, {words[codes[0]]!r} first"
+    return guess, left, (note,)
 
 
 def episode_fields(

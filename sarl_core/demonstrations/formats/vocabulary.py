@@ -45,6 +45,9 @@ CONTROLS = re.compile(
     r"|decision|choice|(.*_)?(cmd|command|control|action)"
 )
 
+_CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([ap]m)?\s*(z|utc|[+-]\d{2}:?\d{2})?"
+_DATE = r"(\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](\d{4}|\d{2}(?=[ t])))"
+_TIME = re.compile(rf"{_DATE}([ t]+{_CLOCK})?|{_CLOCK}|\d{{8}}t\d{{6}}z?", re.I)
 _PERHAPS_ACTION = re.compile(r"a|.+_(actions?|acts?)|cmd|commands?|controls?|decision|choice")
 
 _NEXT = ("next", "nxt", "new", "succ", "successor", "future", "prime")
@@ -131,6 +134,11 @@ def is_perhaps_action(name: str) -> bool:
     return _PERHAPS_ACTION.fullmatch(plain(name)) is not None and not (
         says_before(name) or only_next(name)
     )
+
+
+def is_time(word: str) -> bool:
+    """Whether a text is a date, a time of day, or both."""
+    return _TIME.fullmatch(word) is not None
 
 
 def ends_as_action(name: str) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,9 @@ from sarl_core.demonstrations.formats.columns import (
     guess_roles,
 )
 from sarl_core.demonstrations.formats.mapping.roles import ActionKind, ColumnRole, RoleName, Roles
+from sarl_core.demonstrations.formats.tables import Table, TableColumn, without_times
 from sarl_core.demonstrations.requirements import FEW_VALUES, is_whole, without_fraction
 from sarl_core.errors import InputError
-
-if TYPE_CHECKING:
-    from sarl_core.demonstrations.formats.tables import Table, TableColumn
 
 _FIRST = 4  # values that are shown of a column
 _NOTHING = "nothing"
@@ -65,9 +64,7 @@ def previewed(table: Table, roles: Roles) -> tuple[ColumnPreview, ...]:
     """
     guess = guess_roles(table.names, roles)
     read = _readable(table)
-    values = {name: column.values for name, column in read.items()}
-    words = {name for name, column in read.items() if column.words}
-    guess, unclear = _settled(guess, values, words)
+    guess, unclear = _settled(guess, read)
     previews = []
     for name in table.names:
         role = None if name in unclear else _role(guess, name, table)
@@ -94,28 +91,34 @@ def _readable(table: Table) -> dict[str, TableColumn]:
         return read
 
 
-def _settled(
-    guess: Guess, values: dict[str, NDArray[Any]], words: set[str]
-) -> tuple[Guess, dict[str, str]]:
+def _settled(guess: Guess, read: Mapping[str, TableColumn]) -> tuple[Guess, dict[str, str]]:
     """What the values make of a guess, and why some columns are left open."""
-    counted = counters(
-        {name: values[name] for name in guess.unclear if name in values and name not in words}
-    )
+    numbers = {name: one.values for name, one in read.items() if not one.words}
+    counted = counters({name: numbers[name] for name in guess.unclear if name in numbers})
     unclear = {name: "it may be a feature or not" for name in guess.unclear if name not in counted}
-    guess = replace(guess, unclear=(), unused={**guess.unused, **counted})
+    unread = {name: "it cannot be read" for name in guess.columns.used if name not in read}
+    guess = replace(guess, unclear=(), unused={**guess.unused, **counted, **unread})
+    guess = _without(guess, unread)
+    guess, held, _ = without_times(guess, read)
+    words = {name for name, column in held.items() if column.words}
     while True:
-        columns = guess.columns
-        guess = replace(guess, columns=columns.only([n for n in columns.used if n in values]))
         try:
-            held = {name: values[name] for name in guess.columns.used}
-            return settle(guess, held, words), unclear
+            values = {name: held[name].values for name in guess.columns.used}
+            return settle(guess, values, words), unclear
         except UnclearColumnsError as error:
             unclear |= dict.fromkeys(error.columns, str(error).partition(";")[0])
-            columns = guess.columns
-            others = [name for name in columns.used if name not in error.columns]
-            guess = replace(guess, columns=columns.only(others))
+            guess = _without(guess, error.columns)
         except InputError:
             return guess, unclear
+
+
+def _without(guess: Guess, names: Collection[str]) -> Guess:
+    columns = guess.columns
+    return replace(
+        guess,
+        columns=columns.only([name for name in columns.used if name not in names]),
+        reasons={name: why for name, why in guess.reasons.items() if name not in names},
+    )
 
 
 def _role(guess: Guess, name: str, table: Table) -> ColumnRole | None:
@@ -157,7 +160,7 @@ def _kind(column: TableColumn) -> str:
     if not len(values):
         return _NOTHING
     if column.words:
-        return "words"
+        return "times" if column.is_time else "words"
     if values.dtype.kind == "b":
         return "true or false"
     return "whole numbers" if without_fraction(values).all() else "numbers"

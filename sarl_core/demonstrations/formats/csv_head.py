@@ -1,0 +1,181 @@
+"""What stands before the first row of a CSV file: its names, its delimiter, and what is no row."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, cast
+
+from sarl_core.errors import InputError, quoted
+
+Delimiter = Literal[";", "\t", "|", ","]
+_DELIMITERS: tuple[Delimiter, ...] = (";", "\t", "|", ",")  # a comma may be a decimal sign
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
+_FRACTION = re.compile(r"[+-]?\d*[.,]\d*(e[+-]?\d+)?|[+-]?\d+e[+-]?\d+|[+-]?(nan|inf)", re.I)
+_STATED = re.compile(r'"?sep=(.)"?', re.I)  # as Excel writes it
+_COMMENT = re.compile(r'\s*"?(#|%|//)')
+_MAX_LINE = 2**24  # characters of a header
+_LONGEST_UNIT = 24
+_NOTHING = frozenset({"", "-", "--", "?", "na", "n/a", "#n/a", "<na>", "nan", "null", "none"})
+# What stands in a row of units where there is none, or in a row of types.
+_NO_UNITS = _NOTHING | frozenset(
+    {"unitless", "str", "string", "text"}
+    | {"int", "integer", "int64", "float", "float32", "float64", "double", "bool", "boolean"}
+    | {"datetime", "date", "object", "category"}
+)
+
+
+@dataclass(frozen=True)
+class CsvHead:
+    """How a CSV file begins.
+
+    Attributes:
+        names: Of the columns, "column 1"... without a header.
+        named: Whether there is a header.
+        delimiter: Between two fields.
+        units: Of columns, as far as a row below the header gives them.
+        start: Where the first row begins, in bytes.
+        line: Its line, from 1.
+    """
+
+    names: tuple[str, ...]
+    named: bool
+    delimiter: Delimiter
+    units: Mapping[str, str]
+    start: int
+    line: int
+
+
+class _Line(NamedTuple):
+    text: str
+    start: int
+    number: int
+
+
+def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
+    """Find out how a CSV file begins.
+
+    Args:
+        data: The whole file, in UTF-8.
+        delimiter: Between two fields, where that is known.
+
+    Returns:
+        Its names, and where its rows begin. Lines of comments (`#`, `%`, `//`), `sep=;` and a row
+        of units are no rows; the last comment is the header where no other line is.
+
+    Raises:
+        InputError: If there is nothing in it, or its first lines cannot be read.
+    """
+    lines = _lines(data)
+    line = next(lines, None)
+    if line is None:
+        raise InputError("there is nothing but white space in it; give rows of numbers")
+    stated = _STATED.fullmatch(line.text)
+    if stated is not None:
+        if stated[1] not in _DELIMITERS:
+            raise InputError(
+                f"its first line says that {quoted(stated[1])} separates fields; use ; , | or tabs"
+            )
+        delimiter = cast("Delimiter", stated[1])
+        line = next(lines, None)
+    comment = ""
+    while line is not None and (marker := _COMMENT.match(line.text)):
+        comment = line.text[marker.end() :].strip()
+        line = next(lines, None)
+    if line is None:
+        raise InputError(
+            "there are no steps, only a header; give at least two observations with their actions"
+        )
+    delimiter = delimiter or _delimiter(line.text)
+    first = _fields(line.text, delimiter)
+    names = _fields(comment, delimiter)
+    if names and len(names) == len(first) and any(map(_is_number, first)):
+        return CsvHead(_unnamed_told_apart(names), True, delimiter, {}, line.start, line.number)
+    second, third = next(lines, None), next(lines, None)
+    below = _fields(second.text, delimiter) if second is not None else []
+    if not _is_header(first, below):
+        names = [f"column {number}" for number in range(1, len(first) + 1)]
+        return CsvHead(tuple(names), False, delimiter, {}, line.start, line.number)
+    if second is None:
+        raise InputError(
+            "there are no steps, only a header; give at least two observations with their actions"
+        )
+    units: dict[str, str] = {}
+    told_apart = _unnamed_told_apart(first)
+    if third is not None and _gives_units(below, _fields(third.text, delimiter), len(first)):
+        units = {
+            name: unit
+            for name, text in zip(told_apart, below, strict=True)
+            if (unit := _unit(text))
+        }
+        second = third
+    return CsvHead(told_apart, True, delimiter, units, second.start, second.number)
+
+
+def _lines(data: memoryview) -> Iterator[_Line]:
+    """The lines in which something stands."""
+    pattern = re.compile(rb"([^\r\n]*)(\r\n|\r|\n|$)")
+    start, number = 0, 1
+    while start < len(data):
+        match = pattern.match(data, start, start + _MAX_LINE)
+        if match is None or match.end() - start >= _MAX_LINE:
+            raise InputError("its first line is too long; give a CSV file with one row a step")
+        text = bytes(match[1]).decode()
+        if text.strip():
+            yield _Line(text, start, number)
+        start, number = match.end(), number + 1
+
+
+def _delimiter(line: str) -> Delimiter:
+    unquoted = re.sub(r'"(?:[^"]|"")*"', "", line)
+    return next((sign for sign in _DELIMITERS if sign in unquoted), ",")
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise InputError("its first line cannot be read as CSV; check its quotation marks") from (
+            error
+        )
+
+
+def _is_number(field: str) -> bool:
+    return _NUMBER.fullmatch(field.strip()) is not None
+
+
+def _is_header(fields: Sequence[str], below: Sequence[str]) -> bool:
+    """Whether a first line holds names rather than numbers."""
+    stripped = [field.strip() for field in fields]
+    if any(_FRACTION.fullmatch(field) for field in stripped):
+        return False  # one wrong field does not make names of the others
+    if any(field and not _NUMBER.fullmatch(field) for field in stripped):
+        return True
+    # A data frame without names numbers its columns.
+    counted = len(fields) > 1 and stripped == [str(index) for index in range(len(fields))]
+    return counted and any(_FRACTION.fullmatch(field.strip()) for field in below)
+
+
+def _unnamed_told_apart(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, of which only the first may be empty, as that of a counter is."""
+    return tuple(
+        f"unnamed: {number}" if number and not name.strip() else name
+        for number, name in enumerate(names)
+    )
+
+
+def _gives_units(fields: Sequence[str], below: Sequence[str], columns: int) -> bool:
+    """Whether a row is one of units: no number, and text where numbers follow."""
+    if len(fields) != columns or len(below) != columns or any(map(_is_number, fields)):
+        return False
+    numbers = [field for field, under in zip(fields, below, strict=True) if _is_number(under)]
+    telling = [field for field in numbers if field.strip().lower() not in _NOTHING]
+    return bool(telling) and all(len(field.strip()) <= _LONGEST_UNIT for field in numbers)
+
+
+def _unit(text: str) -> str:
+    """The unit that a field of such a row gives, "" for none."""
+    bare = re.sub(r"^[\[(<](.*)[\])>]$", r"\1", text.strip()).strip()
+    return "" if bare.lower() in _NO_UNITS else bare

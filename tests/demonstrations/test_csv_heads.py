@@ -1,0 +1,143 @@
+"""What stands before the rows of a CSV file, and columns that hold times."""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats import preview_columns, read_demonstrations
+from sarl_core.errors import InputError
+
+ROWS = ["0.5,8,0,0", "0.25,7,1,0", "0.1,7,1,1", "0.7,6,0,1"]
+NAMES = "speed,gap,action,episode"
+
+
+def read(*lines: str) -> Demonstrations:
+    return read_demonstrations("\n".join(lines).encode(), "rig.csv")
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        ("# rig 4, recorded 2026-01-01",),
+        ("# rig 4", "# a,b,c,d,e,f", ""),
+        ("% from a script", "% of Matlab"),
+        ("// one", "", "// two"),
+        ('"# quoted, by a spreadsheet"',),
+        ("sep=,",),
+        ("sep=,", "# rig 4"),
+    ],
+)
+def test_what_stands_before_the_header_is_no_header(before: tuple[str, ...]):
+    read_so = read(*before, NAMES, *ROWS)
+    assert read_so.feature_names == ("speed", "gap")
+    assert read_so.episodes.tolist() == [0, 0, 1, 1]
+    with pytest.raises(InputError, match=rf"row 2 \(line {len(before) + 3}\)"):
+        read(*before, NAMES, ROWS[0], "0.25,7,1", *ROWS[2:])
+
+
+def test_a_comment_is_the_header_where_no_other_line_is():
+    assert read(f"# {NAMES}", *ROWS).feature_names == ("speed", "gap")
+    assert read("# rig 4", f"#{NAMES}", *ROWS).feature_names == ("speed", "gap")
+    in_words = [row.replace(",0,", ",hold,").replace(",1,", ",go,") for row in ROWS]
+    assert read(f"# {NAMES}", *in_words).feature_names == ("speed", "gap")
+
+
+@pytest.mark.parametrize("sign", [";", "|", "\t"])
+def test_excel_says_what_separates_fields(sign: str):
+    lines = [line.replace(",", sign) for line in (NAMES, *ROWS)]
+    assert (
+        read(f"sep={sign}", *lines).observations.tolist()
+        == read(NAMES, *ROWS).observations.tolist()
+    )
+    assert read(*lines).feature_names == ("speed", "gap")
+    with pytest.raises(InputError, match="says that ':' separates fields"):
+        read("sep=:", *lines)
+
+
+def test_decimal_commas_beside_what_excel_says():
+    lines = [row.replace(",", ";").replace(".", ",") for row in ROWS]
+    read_so = read("sep=;", NAMES.replace(",", ";"), *lines)
+    assert read_so.observations[0].tolist() == [0.5, 8]
+
+
+def test_a_row_of_units_is_kept_as_units():
+    read_so = read(NAMES, "m/s,[m],-,-", *ROWS)
+    assert read_so.feature_units == ("m/s", "m")
+    assert len(read_so) == 4
+    with_words = [row.replace(",0,", ",hold,").replace(",1,", ",go,") for row in ROWS]
+    assert read("# rig", NAMES, "m/s,m,,", *with_words).feature_units == ("m/s", "m")
+    assert read(NAMES, "float,int,int,int", *ROWS).feature_units == ("", "")
+    (speed, *_) = preview_columns(
+        f"{NAMES}\nm/s,m,-,-\n".encode() + "\n".join(ROWS).encode(), "a.csv"
+    )
+    assert speed.role is not None
+    assert speed.role.unit == "m/s"
+
+
+def test_a_first_row_of_words_is_a_row():
+    names = "valve,shift,action"
+    read_so = read(names, "open,day,hold", "closed,night,vent", "open,night,hold")
+    assert len(read_so) == 3
+    with pytest.raises(InputError, match="'speed'"):
+        read(NAMES, "NA,8,0,0", *ROWS)
+
+
+def test_columns_without_a_name_at_the_end_are_nothing():
+    read_so = read(f",{NAMES},,", *(f"{n},{row},," for n, row in enumerate(ROWS)))
+    assert read_so.feature_names == ("speed", "gap")
+
+
+STARTS = [dt.datetime(2026, 3, 1, 8 + run, 0) for run in (0, 0, 1, 1)]
+TIMES = [dt.datetime(2026, 3, 1, 8 + run, 0, row) for row, run in enumerate((0, 0, 1, 1))]
+FRAME = pd.DataFrame(
+    {
+        "when": TIMES,
+        "t": TIMES,
+        "speed": [0.5, 0.2, 0.1, 0.7],
+        "action": [0, 1, 1, 0],
+        "episode": STARTS,
+    }
+)
+
+
+@pytest.mark.parametrize("extension", ["csv", "parquet", "feather", "xlsx"])
+def test_times_are_no_features_and_may_number_the_episodes(extension: str):
+    out = io.BytesIO()
+    write = {"csv": "to_csv", "parquet": "to_parquet", "feather": "to_feather", "xlsx": "to_excel"}
+    options = {} if extension in ("feather", "parquet") else {"index": False}
+    getattr(FRAME, write[extension])(out, **options)
+    read_so = read_demonstrations(out.getvalue(), f"rig.{extension}")
+    assert read_so.feature_names == ("speed",)
+    assert read_so.episodes.tolist() == [0, 0, 1, 1]
+    assert {use.column: use.why for use in read_so.columns}["when"] == "it is a time"
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        ["01.03.2026 08:00", "01.03.2026 08:01"],
+        ["3/1/2026 8:00:00 AM", "3/1/2026 8:00:01 AM"],
+        ["20260301T080000", "20260301T080001"],
+        ["08:00:00,5", "08:00:01,0"],
+        ["2026-03-01T08:00:00Z", "2026-03-01T08:00:01+01:00"],
+    ],
+)
+def test_times_as_people_write_them_are_no_features(texts: list[str]):
+    frame = FRAME.assign(when=texts * 2, episode=[0, 0, 1, 1]).drop(columns="t")
+    read_so = read_demonstrations(frame.to_csv(index=False).encode(), "rig.csv")
+    assert read_so.feature_names == ("speed",)
+
+
+def test_seconds_since_1970_are_no_feature_however_they_rise():
+    random = np.random.default_rng(1)
+    stamp = 1.77e9 + np.cumsum(random.uniform(0.1, 2, 30))
+    frame = pd.DataFrame({"stamp": stamp, "x": random.random(30), "action": np.arange(30) % 2})
+    for scaled in (1, 1e3, 1e9):
+        content = frame.assign(stamp=stamp * scaled).to_csv(index=False).encode()
+        assert read_demonstrations(content, "rig.csv").feature_names == ("x",)
