@@ -10,11 +10,12 @@ import gymnasium
 import numpy as np
 
 from sarl_core.environments.description import catalogued
-from sarl_core.environments.feature_order import NamedFeatures
+from sarl_core.environments.feature_order import NamedFeatures, shortened
 from sarl_core.environments.naming import key_names
 from sarl_core.environments.observation_layers import Observed, observed
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.rule_order import fitted_rules
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import Shield
 
@@ -213,7 +214,23 @@ def fitted(
     )
     if ordered.rule_set is not rule_set:
         shield = shield.with_rules(ordered.rule_set)
-    return FittedShield(shield.for_space(action_space), ordered.notes)
+    notes = (*ordered.notes, *_label_notes(ordered.rule_set))
+    return FittedShield(shield.for_space(action_space), notes)
+
+
+def _label_notes(rule_set: RuleSet) -> tuple[str, ...]:
+    """Which actions stand for labels that are words of a file, which knew no environment."""
+    if rule_set.source.env_id:
+        return ()
+    return tuple(
+        "the rules do not say of which environment they are; their labels stand for its actions in "
+        + "their order: "
+        + shortened([f"{name!r} for {number}" for number, name in enumerate(action.label_names)])
+        for action in rule_set.actions
+        if not action.is_interval
+        and not action.codes
+        and action.label_names != tuple(map(str, action.actions))
+    )
 
 
 def check_fit(

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -16,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sarl_core import Demonstrations, load_demonstrations, mine_rules
+from sarl_core import Demonstrations, ShieldedEnv, load_demonstrations, mine_rules
 from sarl_core.auditing.audit import audit
 from sarl_core.demonstrations.fields import Indicator
 from sarl_core.demonstrations.formats import read_demonstrations, save_demonstrations
@@ -238,3 +239,11 @@ def test_a_rule_file_with_words_has_version_2_and_others_stay_what_they_were(
     plain = mine_rules(read("obs_x,action\n1,0\n2,1\n"), supp_min=0.0, conf_min=1.0)
     plain.save(tmp_path / "plain.json")
     assert json.loads((tmp_path / "plain.json").read_text())["version"] == 1
+
+
+def test_words_of_an_unknown_environment_are_said_to_stand_for_its_actions() -> None:
+    header = "cart position,cart velocity,pole angle,pole angular velocity,action\n"
+    log = read(header + "0,0,0,1,right\n0,0,0,-1,left\n0,0,0,2,right\n0,0,0,-2,left\n")
+    shield = Shield(mine_rules(log, supp_min=0.0, conf_min=1.0))
+    env = ShieldedEnv(gymnasium.make("CartPole-v1"), shield)
+    assert any("'left' for 0, 'right' for 1" in note for note in env.notes)
