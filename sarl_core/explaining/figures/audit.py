@@ -14,7 +14,6 @@ from sarl_core.explaining.colours import (
     INTERVENTION_COLOUR,
     MUTED_COLOUR,
     OUTSIDE_COLOUR,
-    label_colour,
 )
 from sarl_core.explaining.figures.replay import Timeline, Track
 from sarl_core.explaining.markup import plain
@@ -115,17 +114,21 @@ def feature_lines(
             y=values[:, row],
             yaxis=f"y{axis}",
             mode="lines+markers",
-            line={"width": 1.6, "color": label_colour(0)},
-            marker={
-                "size": np.where(breaks, 6, 1),
-                "color": np.where(breaks, INTERVENTION_COLOUR, MUTED_COLOUR),
-                "opacity": np.where(breaks, 1.0, 0.0),
-                "line": {"width": 0},
-            },
-            # A click selects a step; the line stays as it is.
-            unselected={"marker": {"opacity": 0.0}},
+            line={"width": 1.6, "color": MUTED_COLOUR},  # no action's colour
+            marker={"size": 1, "opacity": 0},
             customdata=np.stack([places, numbers], axis=1),
             hovertemplate="step %{customdata[1]}: %{y:.4g}" + plain(unit) + "<extra></extra>",
+        )
+        # Of their own, so that a step that is selected does not hide them.
+        figure.add_scatter(
+            x=places[breaks],
+            y=values[breaks, row],
+            yaxis=f"y{axis}",
+            mode="markers",
+            marker={"size": 6, "color": INTERVENTION_COLOUR},
+            unselected={"marker": {"opacity": 1}},
+            customdata=np.stack([places, numbers], axis=1)[breaks],
+            hoverinfo="skip",
         )
         top = 1 - row / len(features)
         figure.update_layout(
