@@ -125,6 +125,21 @@ def test_lerobot_columns_are_mapped_by_their_names(tmp_path: Path) -> None:
     assert read.n_episodes == len(LENGTHS)
 
 
+def test_lerobot_with_a_label_in_a_column_of_its_own(tmp_path: Path) -> None:
+    folder = lerobot(tmp_path, files=1)
+    info = folder / "meta" / "info.json"
+    said = json.loads(info.read_text())
+    said["features"]["action"] = {"dtype": "int64", "shape": [1], "names": ["push"]}
+    info.write_text(json.dumps(said))
+    (path,) = (folder / "data").rglob("*.parquet")
+    table = pq.read_table(path)
+    labels = pa.array(np.arange(N) % 3)
+    pq.write_table(table.set_column(table.column_names.index("action"), "action", labels), path)
+    read = load_demonstrations(folder)
+    assert read.actions.tolist() == labels.to_pylist()
+    assert read.action_names == ("push",)
+
+
 def test_lerobot_without_its_data(tmp_path: Path) -> None:
     folder = lerobot(tmp_path)
     shutil.rmtree(folder / "data")

@@ -83,7 +83,7 @@ def open_lerobot(files: FileSet) -> tuple[Table, ColumnMap, tuple[str, ...]]:
     roles = {role: name for role, name in _ROLES.items() if name in table.names}
     # Whoever maps columns sees the names, and not the places in vectors.
     named = {
-        column: f"{word}.{name}"
+        column: column if column in numbers else f"{word}.{name}"
         for word, columns in (("observation", observed), ("action", acted))
         for column, name in columns.items()
     }
