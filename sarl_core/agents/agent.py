@@ -391,7 +391,7 @@ def order_notes(agent: Agent, env_id: EnvironmentOrId) -> tuple[str, ...]:
     )
     own = tuple(name for name, _ in names.features)
     there, where = (one.rsplit(":", 1)[-1] for one in (agent.policy.env_id, str(env_id)))
-    if only_counts(own) and there == where:
+    if only_counts(own) and there == where and len(own) == len(here.feature_names):
         return ()  # trained there, and there the environment names its features itself
     order = line_up(
         NamedFeatures(
