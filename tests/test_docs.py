@@ -49,6 +49,7 @@ WITH_EXAMPLES = [page for page in PAGES if blocks(page)]
 def folder(tmp_path):
     """A folder as that of a reader: shipped data beside, and the command on the path."""
     shutil.copytree(ROOT / "data", tmp_path / "data")
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
     command = tmp_path / "bin" / "sarl"
     command.parent.mkdir()
     # As pip writes it: the folder it is called in is not where Python looks for modules.
@@ -76,7 +77,8 @@ def test_every_guide_and_how_to_that_names_commands_has_examples_that_run():
     told = [
         page
         for page in PAGES
-        if page.parent.name == "how_to" or page.name in ("headless.md", "explaining.md")
+        if page.parent.name == "how_to"
+        or page.name in ("headless.md", "explaining.md", "first_walk.md")
     ]
     assert len(told) >= 8
     assert set(told) <= set(WITH_EXAMPLES)

@@ -14,12 +14,14 @@ PRINTED = {
     "choose_thresholds": r"are right in (\d+)%",
     "scikit_learn": r"right on ([\d.]+) ?%",
     "train_under_shield": r"mean return (\d+)",
+    "crane": r"broke the rules in ([\d.]+)%",
 }
 LEAST = {
     "mine_and_shield": 100,  # alone about 22
     "choose_thresholds": 60,
     "scikit_learn": 85,
     "train_under_shield": 9,
+    "crane": 15,
 }
 
 
