@@ -20,7 +20,7 @@ class Offer(Generic[Result]):
 
     Attributes:
         key: Of everything that its result depends on.
-        start: Begins it; gives None where there is nothing left to be done.
+        start: Begins it.
         about: What it is, beside the button.
         complete: Whether all of it is known already.
         cancelled: What is said where it was called off.
@@ -31,7 +31,7 @@ class Offer(Generic[Result]):
     """
 
     key: object
-    start: Callable[[], Job[Result] | None]
+    start: Callable[[], Job[Result]]
     about: str
     complete: bool
     cancelled: str = "Cancelled. What had been finished is kept; Run goes on from there."
@@ -94,11 +94,11 @@ def watched(place: Place[Any], draw: Callable[[bool], None], *, seconds: float =
         draw: Draws it; told whether the work goes on.
         seconds: Until it is drawn again.
     """
-    at_work = place.at_work
+    job, at_work = place.job, place.at_work
 
     @st.fragment(run_every=seconds if at_work else None)
     def watch() -> None:
-        if at_work != place.at_work:
+        if job is not place.job or at_work != place.at_work:
             st.rerun()  # as a whole: from now on again and again, or no longer
         draw(at_work)
 

@@ -142,13 +142,8 @@ class Place(Generic[Result]):
         job = self.job
         return job is not None and (job.running or bool(self.gathering and job.stopping))
 
-    def begin(self, start: Callable[[], Job[Result] | None]) -> None:
-        """Begin work in the place of the one before, which is called off; for a callback too.
-
-        Args:
-            start: Begins it; gives None where there is nothing left to be done.
-        """
+    def begin(self, start: Callable[[], Job[Result]]) -> None:
+        """Begin work in the place of the one before, which is called off; for a callback too."""
         if self.job is not None:
             self.job.cancel()
-        if (job := start()) is not None:
-            st.session_state[f"_job_{self.name}"] = job
+        st.session_state[f"_job_{self.name}"] = start()

@@ -38,7 +38,7 @@ WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
 MOST_REPLAYS, MOST_COMPARISONS, MOST_FORKS = 6, 8, 8
 _WHOLE, _PLAYED = 1_000, 0.7  # of the work, and the share of it before pictures are encoded
 MOST_PICTURES = 64  # of a replay, some 30 kB each
-_LATEST, _READY = "_replay", "_replay_ready"
+_LATEST = "_replay"
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +190,9 @@ REPLAY = Place[Jump]("replay")
 def arrived() -> Jump | None:
     """The way to a replay that is ready by now, which becomes the latest; each once."""
     job = REPLAY.job
-    jump: Jump | None = st.session_state.pop(_READY, None)
-    if job is not None and job.result is not None:
-        jump, job.result = job.result, None
-    if jump is None:
+    if job is None or job.result is None:
         return None
+    jump, job.result = job.result, None
     st.session_state[_LATEST] = jump.order
     if jump.step is not None:
         st.session_state["step"] = jump.step
@@ -222,22 +220,17 @@ def compared(order: ReplayOrder) -> tuple[ReplayOrder, int] | None:
 # --- running -----------------------------------------------------------------------------------
 
 
-def replaying(jump: Jump) -> Job[Jump] | None:
-    """Run an episode, without the rules and with them, and draw it.
+def replaying(jump: Jump) -> Job[Jump]:
+    """Run an episode, without the rules and with them, and draw it; one that is kept is ready.
 
     Args:
         jump: To the replay.
-
-    Returns:
-        None if the replay is kept: it is arrived at.
     """
     cache, order = replay_cache(), jump.order
-    if order.key in cache:
-        st.session_state[_READY] = jump
-        return None
 
     def work(job: Job[Jump]) -> None:
-        cache.put(order.key, _replay(order, job))
+        if order.key not in cache:
+            cache.put(order.key, _replay(order, job))
         job.result = jump
 
     return Job(order.key, work, _WHOLE)
