@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import streamlit as st
@@ -129,5 +130,7 @@ if absurd := absurd_parameters():
 st.html(style_sheet())
 show_left_out(page.title)
 sidebar(with_thresholds=page.title != "Thresholds")
-page.run()
-settle(page.title)
+try:
+    page.run()
+finally:  # also where the page ends early
+    settle(page.title, len(sys.modules))
