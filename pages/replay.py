@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_dashboard.jobs.replays import REPLAY, arrived, latest
-from sarl_dashboard.views.replay.episodes import comparison
+from sarl_dashboard.views.replay.episodes import comparison, take_up
 from sarl_dashboard.views.replay.film import film, headline
 from sarl_dashboard.views.replay.numbers import numbers
 from sarl_dashboard.views.replay.run import arrive, replay_bar, set_out
@@ -34,6 +34,7 @@ if played is None:
 headline(played.replay, current_order)
 numbers(played.replay)
 film(played.replay)
+take_up(played.order)
 step_by_step(played)
 if jump is not None:
     arrive(jump, played)

@@ -30,12 +30,23 @@ from sarl_dashboard.jobs.replays import (
 )
 
 
+def take_up(order: ReplayOrder) -> None:
+    """Take up a comparison that has been run: the flight recorder has its steps."""
+    first, episodes = _first(order), st.session_state.get("over") or EPISODES[0]
+    if (first.key, episodes) in comparison_cache():
+        st.session_state["_compared"] = (first, episodes)
+
+
+def _first(order: ReplayOrder) -> ReplayOrder:
+    """The order of the first episode of a comparison, whichever is on screen."""
+    ran = compared(order)
+    return order if ran is None else ran[0]
+
+
 def comparison(order: ReplayOrder) -> None:
     """Several episodes instead of one, on request."""
     st.subheader("Over several episodes")
-    ran = compared(order)
-    if ran is not None:
-        order = ran[0]  # that of the first episode, whichever is on screen
+    ran, order = compared(order), _first(order)
     episodes = int(
         st.segmented_control(
             "Episodes",

@@ -29,7 +29,7 @@ from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import switch
-from sarl_dashboard.jobs.replays import Played, ReplayPair, compared, comparison_cache
+from sarl_dashboard.jobs.replays import REPLAY, Played, ReplayPair, compared, comparison_cache
 from sarl_dashboard.views.replay.run import jump_to
 
 CHANGED, OUTSIDE = "changed by the rules", "outside the data"
@@ -93,7 +93,9 @@ def flight_recorder(played: Played, current: int) -> None:
     wanted: Any = {"selection": {"rows": selected, "columns": [], "cells": []}}
     before = st.session_state.get("recorder_table")
     jumped = st.session_state.pop("_jumped", False)
-    if before is not None and (jumped or list(before["selection"]["rows"]) != selected):
+    moved = before is not None and list(before["selection"]["rows"]) != selected
+    # A row of another episode stays chosen until that episode is there.
+    if before is not None and not REPLAY.at_work and (jumped or moved):
         st.session_state["recorder_table"] = wanted
     st.dataframe(
         frame(recorded, on_page),
