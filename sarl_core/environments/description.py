@@ -221,6 +221,23 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
     return env
 
 
+def steps_a_second(env: Any) -> float | None:
+    """How many steps of an environment are a second of what it shows.
+
+    Args:
+        env: A ``gymnasium.Env``.
+
+    Returns:
+        The pictures of a second, one a step; of highway-env its decisions, as it draws the
+        simulator's steps between them too. None where it does not say.
+    """
+    try:
+        return float(env.get_wrapper_attr("config")["policy_frequency"])
+    except (AttributeError, LookupError, TypeError, ValueError):
+        pictures = env.metadata.get("render_fps")
+        return float(pictures) if pictures else None
+
+
 def _wrapped(env: Any, name: str) -> Any:
     """An environment in a wrapper that the caller names."""
     import gymnasium

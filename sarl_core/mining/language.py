@@ -18,6 +18,7 @@ from sarl_core.mining.rules import Bounds, Condition, Rule
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
 _LONGEST = 120
+_IS = " is "
 _FLAG_WORDS = ("contact",)
 # Labels that say nothing without the action that they are of.
 _NO_ACTIONS = {"true", "false", "yes", "no", "on", "off", "none", "t", "f", "y", "n"}
@@ -122,14 +123,14 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
         bounds: What is asked of it.
 
     Returns:
-        True for one bound between 0 and 1 on a feature such as "left leg contact", or on one that
-        says which word a column holds.
+        True for one bound between 0 and 1 on a feature such as "left leg contact" or "gear is 2",
+        or on one that says which word a column holds.
     """
     one = math.isinf(bounds.low) != math.isinf(bounds.high)
     threshold = bounds.high if math.isinf(bounds.low) else bounds.low
     if feature.indicator is not None:
         return one and 0.0 <= threshold < 1.0
-    named = any(word in feature.name.lower().split() for word in _FLAG_WORDS)
+    named = _states(feature) or any(word in feature.name.lower().split() for word in _FLAG_WORDS)
     # A force of contact has values in between, and is asked for more than yes or no.
     binary = feature.splits is None or feature.splits.binary
     return named and binary and one and not feature.unit and 0.0 <= threshold < 1.0
@@ -148,7 +149,14 @@ def flag_text(feature: Feature, bounds: Bounds) -> str:
     holds = math.isinf(bounds.high)
     if feature.indicator is not None:
         return feature.statement(holds)
+    if _states(feature):
+        return feature.name if holds else feature.name.replace(_IS, f"{_IS}not ", 1)
     return f"{'' if holds else 'no '}{feature.name}"
+
+
+def _states(feature: Feature) -> bool:
+    """Whether its name is a statement, as that of an environment's "gear is 2" is."""
+    return feature.indicator is not None or _IS in feature.name
 
 
 def condition_text(bounds: Bounds, feature: Feature, *, beside: Sequence[float] = ()) -> str:
@@ -163,7 +171,7 @@ def condition_text(bounds: Bounds, feature: Feature, *, beside: Sequence[float] 
         As "the pole angle is above 0.02 rad".
     """
     if is_flag(feature, bounds):
-        return f"{'there is' if feature.indicator is None else 'the'} {flag_text(feature, bounds)}"
+        return f"{'the' if _states(feature) else 'there is'} {flag_text(feature, bounds)}"
     unit = f" {feature.unit}" if feature.unit else ""
     limits = limit_texts(bounds, feature, beside=beside)
     if math.isinf(bounds.low):

@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
-from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.description import (
+    describe_environment,
+    make_environment,
+    steps_a_second,
+)
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, WorkError, require_whole
 from sarl_core.rendering.film import Film
@@ -43,7 +47,7 @@ def picture_speed(env_id: EnvironmentOrId, max_steps: int | None = None) -> tupl
     require_whole("max_steps", most, 1)
     describe_environment(env_id)
     env = make_environment(env_id)
-    modes, fps = env.metadata.get("render_modes", []), env.metadata.get("render_fps")
+    modes, fps = env.metadata.get("render_modes", []), steps_a_second(env)
     limit = getattr(env.spec, "max_episode_steps", None) or most
     env.close()
     if "rgb_array" not in modes:
@@ -51,7 +55,7 @@ def picture_speed(env_id: EnvironmentOrId, max_steps: int | None = None) -> tupl
             f"{env_id} draws no pictures (it has no render mode rgb_array); "
             "choose another environment"
         )
-    return float(fps) if fps else _DEFAULT_FPS, min(limit, most)
+    return fps or _DEFAULT_FPS, min(limit, most)
 
 
 def film_episode(

@@ -5,7 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.description import (
+    describe_environment,
+    make_environment,
+    steps_a_second,
+)
 from sarl_core.environments.environment import EnvironmentOrId
 
 _STEPS = 100  # where an environment does not say how fast it runs
@@ -56,6 +60,6 @@ def pace_of(env_id: EnvironmentOrId) -> Pace:
     """
     describe_environment(env_id)
     env = make_environment(env_id)
-    fps = env.metadata.get("render_fps")
+    fps = steps_a_second(env)
     env.close()
-    return Pace(float(fps), "second") if fps else Pace(_STEPS, f"{_STEPS} steps")
+    return Pace(fps, "second") if fps else Pace(_STEPS, f"{_STEPS} steps")

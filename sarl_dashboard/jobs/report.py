@@ -102,7 +102,7 @@ def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:
     if job is None or job.running or job.result is None:
         return None, ""
     arms, finished = [], []
-    rows = [row for row in job.result.rows if row.env_id == env_id]
+    rows = [row for row in job.result.rows if str(row.env_id) == env_id]
     for row, episodes in zip(rows, known(rows, job.result.episodes), strict=True):
         if episodes is not None:
             shield = row.shield()

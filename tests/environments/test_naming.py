@@ -10,7 +10,11 @@ import pytest
 from gymnasium import spaces
 
 from sarl_core import Environment, InputError, Shield, ShieldedEnv, mine_rules, record, rollout
-from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.description import (
+    describe_environment,
+    make_environment,
+    steps_a_second,
+)
 from sarl_core.environments.naming import picture_in, space_names
 
 CRANE = spaces.Dict(
@@ -172,6 +176,12 @@ def test_rules_are_laid_on_the_features_of_a_structured_space_alike_everywhere()
         *_, info = guarded.step(int(rows.proposed[number, 0]))
         np.testing.assert_array_equal(info["shield"].observation, rows.observation[number])
         assert int(info["shield"].executed) == rows.executed[number, 0]
+
+
+def test_a_second_on_the_highway_is_one_decision() -> None:
+    env = make_environment("highway_env:highway-fast-v0")
+    assert (env.metadata["render_fps"], steps_a_second(env)) == (2, 1.0)
+    assert steps_a_second(make_environment("CartPole-v1")) == 50.0
 
 
 def test_highway_env_tells_its_features_and_actions() -> None:

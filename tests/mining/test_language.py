@@ -25,7 +25,12 @@ from sarl_core.mining.tree import Source
 
 INF = math.inf
 ANGLE = Feature("pole angle", "rad")
-FEATURES = (ANGLE, Feature("cart velocity", "m/s"), Feature("left leg contact"))
+FEATURES = (
+    ANGLE,
+    Feature("cart velocity", "m/s"),
+    Feature("left leg contact"),
+    Feature("gear is 2"),
+)
 PUSH = LabelledDimension("push", ("push left", "push right"))
 
 
@@ -104,6 +109,8 @@ def test_a_share_never_rounds_to_all_or_none(share: float) -> None:
         ),
         (Bounds(2, 0.5, INF), "there is left leg contact", "left leg contact"),
         (Bounds(2, -INF, 0.5), "there is no left leg contact", "no left leg contact"),
+        (Bounds(3, 0.5, INF), "the gear is 2", "gear is 2"),
+        (Bounds(3, -INF, 0.5), "the gear is not 2", "gear is not 2"),
         (Bounds(2, 3.0, INF), "the left leg contact is above 3", "left leg contact > 3"),
     ],
 )

@@ -19,6 +19,7 @@ from sarl_dashboard.state.data import (
     raw_demonstrations,
     upload_name,
 )
+from sarl_dashboard.state.environments import offers
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
@@ -53,6 +54,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     wishes = Wishes(
         in_full=choices.in_full,
         frames=choices.frames,
+        env_id=offers().environment(demonstrations.env_id) or "",
         commands=commands(choices, rule_set, demonstrations, named),
         rules_name=named.rules.rsplit("/", 1)[-1],
         demonstrations_name=named.demonstrations.rsplit("/", 1)[-1],
@@ -109,6 +111,7 @@ def commands(
     mined = None
     if choices.rules not in (COMPACT, OWN_FILE):
         mined = mining_command(rule_set, named.rules, named.demonstrations, demonstrations)
+    offered = offers().environment(demonstrations.env_id)
     again = command_line(
         "report",
         named.rules,
@@ -116,6 +119,7 @@ def commands(
             "--demonstrations": named.demonstrations,
             "--comparison": list(named.results),
             "--in-full": None if choices.in_full == Wishes.in_full else choices.in_full,
+            **({} if offered is None else offered.options),
             "--frames": None if choices.frames == Wishes.frames else choices.frames,
             "--out": "report.html",
         },
