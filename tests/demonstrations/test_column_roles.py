@@ -207,3 +207,52 @@ def test_words_are_labels_and_no_amounts():
     assert "holds words" in refusal(content, {"operator": "action:continuous"})
     (preview,) = [one for one in preview_columns(content, "rig.csv") if one.name == "operator"]
     assert (preview.holds, set(preview.first)) == ("words", {"hold", "go"})
+
+
+LEFT, RIGHT = (LANE == 1).astype(int), (LANE == 2).astype(int)
+JOINED = {"action_left+action_right": "action"}
+
+
+def test_columns_that_are_never_both_1_are_offered_and_read_as_one_action():
+    content = table(speed=SPEED, action_left=LEFT, action_right=RIGHT, run=EPISODE)
+    two = read_demonstrations(content, "rig.csv")
+    assert two.actions.shape == (N, 2)
+    assert "--column action_left+action_right=action" in " ".join(two.notes)
+    one = read_demonstrations(content, "rig.csv", columns=JOINED)
+    assert one.action_dimensions[0].labels == ("none", "left", "right")
+    assert one.actions.tolist() == LANE.tolist()
+    assert not any("--column" in note for note in one.notes)
+    (preview,) = [
+        each for each in preview_columns(content, "rig.csv", columns={}) if each.name == "run"
+    ]
+    assert preview.ones is None
+
+
+def test_columns_that_are_both_1_are_no_one_action():
+    content = table(speed=SPEED, action_left=LEFT, action_right=BRAKE | RIGHT, run=EPISODE)
+    row = int(np.argmax(LEFT & BRAKE)) + 1
+    assert f"'action_left', 'action_right' are both 1 in row {row}" in refusal(content, JOINED)
+    assert "--column" not in " ".join(read_demonstrations(content, "rig.csv").notes)
+    amounts = table(speed=SPEED, action_left=LEFT, action_right=PERCENT, run=EPISODE)
+    assert "'action_right' holds something else than 1 and 0" in refusal(amounts, JOINED)
+
+
+@pytest.mark.parametrize(
+    ("columns", "fragment"),
+    [
+        ({"left+right": "feature"}, "can be one action together and nothing else"),
+        ({"left+right": "action:continuous"}, "can be one action together and nothing else"),
+        ({"left+right": "action", "left": "feature"}, "'left' is mapped twice"),
+        ({"left+nothing": "action"}, "no column 'left+nothing'"),
+    ],
+)
+def test_what_is_joined_is_an_action_of_columns_that_are_there(columns, fragment):
+    content = table(speed=SPEED, left=LEFT, right=RIGHT, run=EPISODE)
+    assert fragment in refusal(content, columns)
+
+
+def test_features_stand_in_the_order_in_which_a_person_says_them():
+    content = table(x_2=SPEED, x_10=GAP, lane=LANE, action=BRAKE, run=EPISODE)
+    columns = {"lane": "feature", "x_10": "feature", "x_2": "feature"}
+    read = read_demonstrations(content, "rig.csv", columns=columns)
+    assert read.feature_names == ("lane", "x_10", "x_2")

@@ -2,6 +2,7 @@
 
 from sarl_core.demonstrations.formats.columns import ColumnMap, guess_columns
 from sarl_core.demonstrations.formats.kinds import EXTENSIONS, WRITTEN
+from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview
 from sarl_core.demonstrations.formats.mapping.roles import ColumnRole, load_roles
 from sarl_core.demonstrations.formats.registry import (
     load_demonstrations,
@@ -16,6 +17,7 @@ __all__ = [
     "EXTENSIONS",
     "WRITTEN",
     "ColumnMap",
+    "ColumnPreview",
     "ColumnRole",
     "guess_columns",
     "load_demonstrations",

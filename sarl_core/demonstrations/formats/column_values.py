@@ -99,7 +99,7 @@ def counters(values: Values) -> dict[str, str]:
     """
     return (
         {
-            name: "it rises in every row, as seconds since 1970 do"
+            name: "it never falls and holds numbers as those of seconds since 1970"
             for name, held in values.items()
             if len(held) >= _LEAST_ROWS and _rises_since_1970(held)
         }
@@ -293,10 +293,11 @@ def _followers(
 
 def _rises_since_1970(values: NDArray[Any]) -> bool:
     """Whether a column may be a clock's: seconds, milli-, micro- or nanoseconds of our years."""
-    if values.dtype.kind == "b" or not values[0] > _YEAR_2001:
-        return False
-    scale = 10.0 ** (3 * max(0, min(3, int(np.log10(values[0] / _YEAR_2001) // 3))))
-    return bool(values[-1] < _YEAR_2065 * scale and np.all(np.diff(values.astype(np.float64)) >= 0))
+    first, last = float(values[0]), float(values[-1])
+    known = any(
+        _YEAR_2001 * unit < first <= last < _YEAR_2065 * unit for unit in (1, 1e3, 1e6, 1e9)
+    )
+    return known and bool(np.all(np.diff(values.astype(np.float64)) >= 0))
 
 
 def _counts(values: NDArray[Any], together: NDArray[np.bool_] | None) -> bool:

@@ -10,6 +10,7 @@ from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.mapping.roles import (
     ROLE_WORDS,
+    TOGETHER,
     ColumnRole,
     Roles,
     as_roles,
@@ -270,7 +271,7 @@ def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
     """
     roles = roles or {}
     require_known(roles, names)
-    said = {role: [name for name in names if _role(roles, name) == role] for role in ROLE_WORDS}
+    said = {role: [name for name, one in roles.items() if one.role == role] for role in ROLE_WORDS}
     free = [name for name in names if name not in roles]
     actions = tuple(said["action"]) or _actions(free)
     reasons = dict.fromkeys(actions, _BY_NAME)
@@ -294,21 +295,17 @@ def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
         reasons |= dict.fromkeys(
             (name for name in left if name not in unclear), "no other use fits its name"
         )
-    features = [
-        name
-        for name in names
-        if name in said["feature"] or (name in (prefixed or left) and name not in unclear)
-    ]
+    guessed = [name for name in prefixed or left if name not in unclear]
+    features = tuple(name for name in names if name in said["feature"] or name in guessed)
     columns = ColumnMap.of_roles(
-        _by_number(tuple(features), OBSERVATIONS), _by_number(actions, ACTIONS), singles
+        # Where a person says of each that it is one, so do they stand.
+        _by_number(features, OBSERVATIONS) if guessed else tuple(said["feature"]),
+        tuple(said["action"]) or _by_number(actions, ACTIONS),
+        singles,
     )
     reasons |= dict.fromkeys(roles, _BY_PERSON)
     unused |= dict.fromkeys((*said["ignore"], *said["time"]), _BY_PERSON)
     return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed), roles)
-
-
-def _role(roles: Roles, name: str) -> str | None:
-    return roles[name].role if name in roles else None
 
 
 def _prefixed(names: Sequence[str]) -> list[str]:
@@ -428,7 +425,9 @@ def feature_names(columns: Sequence[str]) -> tuple[str, ...] | None:
 
 def action_names(columns: Sequence[str]) -> tuple[str, ...] | None:
     """What columns say the action dimensions are called; None where they only count them."""
-    if len(columns) == 1 and columns[0].strip().lower() in SINGLE_ACTION:
+    if len(columns) == 1 and (
+        columns[0].strip().lower() in SINGLE_ACTION or TOGETHER in columns[0]
+    ):
         return None
     names = [_own_name(column, ACTIONS) for column in columns]
     return None if all(name.isdecimal() for name in names) else tuple(names)

@@ -29,7 +29,8 @@ from sarl_core.demonstrations.formats.mapping.action_roles import (
     stated_actions,
     with_stated_actions,
 )
-from sarl_core.demonstrations.formats.mapping.roles import Roles
+from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_note
+from sarl_core.demonstrations.formats.mapping.roles import TOGETHER, Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.units import without_units
@@ -150,6 +151,7 @@ def recording_from_table(
         guess = given(columns, "as it was mapped")
         metadata = _without_names(metadata)
     elif columns is not None:
+        table = joined(table, columns)
         guess, guessed = guess_roles(table.names, columns), True
         metadata = _without_names(metadata)
     elif metadata.features and metadata.action_names:
@@ -169,6 +171,9 @@ def recording_from_table(
         words = {name for name, column in read.items() if column.words}
         guess = settle(guess, {name: column.values for name, column in read.items()}, words)
         notes = guess_notes(guess)
+        if not any(name in guess.roles for name in guess.columns.actions):
+            acted = guess.columns.actions
+            notes += one_action_note(acted, [read[name] for name in acted])
     chosen = guess.columns
     read = {name: read[name] for name in chosen.used}
     require_filled({name: read[name] for name in chosen.singles.values()}, rows, chosen.reward)
@@ -216,10 +221,21 @@ def without_times(
 
     Returns:
         The guess, the columns that are left, and a note where texts became the numbers of episodes.
+
+    Raises:
+        InputError: If a column is called a feature, and holds times.
     """
     columns = guess.columns
     timed = [name for name in (*columns.observations, columns.step) if name and read[name].is_time]
-    times = {name: "it is a time" for name in timed if name not in guess.roles}
+    for name in timed:
+        if name != columns.step and (guess.prefixed or name in guess.roles):
+            codes, words = read[name].values, read[name].words
+            row = int(np.argmax(codes >= 0))
+            raise InputError(
+                f"column {quoted(name)} holds {quoted(words[codes[row]])} in row {row + 1}, which "
+                "is a time and no number; write numbers, or leave it out"
+            )
+    times = dict.fromkeys(timed, "it is a time")
     guess = guess.without(times)
     if columns.step in times:
         guess = replace(
@@ -574,7 +590,7 @@ def _unnamed(
 
 def _is_vector(actions: Sequence[str]) -> bool:
     """Whether the names say that an action is a vector, if only of one number."""
-    return len(actions) > 1 or bool(actions[0].startswith("action_"))
+    return len(actions) > 1 or (actions[0].startswith("action_") and TOGETHER not in actions[0])
 
 
 def _without_empty_ends(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Mapping
 
 import streamlit as st
 
 from sarl_core.demonstrations.formats import (
-    ColumnMap,
-    guess_columns,
+    ColumnPreview,
+    ColumnRole,
+    preview_columns,
     read_files,
-    table_columns,
 )
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
@@ -19,8 +20,18 @@ from sarl_dashboard.state.data import chosen_demonstrations, set_upload
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
+from sarl_dashboard.views.demonstrations.mapping import (
+    FEATURES,
+    chosen_roles,
+    fill_in,
+    mapping_form,
+)
 
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
+# What a sentence says to those who type commands.
+_IN_FORM = re.compile(
+    r"say (which|so) with --column .* \(on the page Demonstrations: in the form\)"
+)
 _LOGGER = logging.getLogger(__name__)
 
 
@@ -29,7 +40,7 @@ def uploaded_files() -> list[tuple[memoryview, str]]:
     return [(file.getbuffer(), file.name) for file in st.session_state.get("upload_files") or []]
 
 
-def read_upload(columns: ColumnMap | None = None) -> None:
+def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
     """Read what was uploaded; keep what was chosen before where that fails.
 
     Args:
@@ -81,52 +92,22 @@ def environment() -> Environment | None:
 
 def read_mapped() -> None:
     """Read again, with the columns as they stand in the form."""
-    chosen = st.session_state
-    read_upload(
-        ColumnMap(
-            observations=tuple(chosen["map_observations"]),
-            actions=tuple(chosen["map_actions"]),
-            **{role: chosen[f"map_{role}"] for role in SINGLE_COLUMNS},
-        )
-    )
+    names = [one.name for one in _previews(uploaded_files())]
+    try:
+        roles = chosen_roles(names)
+    except InputError as error:
+        st.session_state["_upload_error"] = str(error)
+        return
+    read_upload(roles)
 
 
-SINGLE_COLUMNS = {
-    "episode": "Episode",
-    "step": "Step",
-    "reward": "Reward",
-    "terminated": "Ended by itself",
-    "truncated": "Ended by a limit",
-}
-
-
-def mapping_form(names: tuple[str, ...]) -> None:
-    """Ask which column is what.
-
-    Args:
-        names: Columns of the uploaded table.
-    """
-    guess = guess_columns(names)
-    with st.form("columns", border=True):
-        st.markdown("**Which column is what?**")
-        st.multiselect(
-            "Observations, in their order",
-            names,
-            default=guess.observations,
-            key="map_observations",
-        )
-        st.multiselect("Actions", names, default=guess.actions, key="map_actions")
-        with st.grid("auto", min_column_width=150):
-            for role, label in SINGLE_COLUMNS.items():
-                guessed = getattr(guess, role)
-                st.selectbox(
-                    label,
-                    names,
-                    key=f"map_{role}",
-                    placeholder="none",
-                    index=names.index(guessed) if guessed in names else None,
-                )
-        st.form_submit_button("Read with these columns", on_click=read_mapped, type="primary")
+def read_new_upload() -> None:
+    """Read what was uploaded just now; offer the form where the columns are not clear."""
+    st.session_state.pop(FEATURES, None)  # the form is filled in anew
+    read_upload()
+    error = st.session_state.get("_upload_error") or ""
+    # An error about a row is not mended by another map; one about columns is.
+    st.session_state["map_columns"] = "column" in error and not re.search(r"\brow \d", error)
 
 
 def upload_section(*, expanded: bool) -> None:
@@ -139,7 +120,7 @@ def upload_section(*, expanded: bool) -> None:
             "A file, several of one kind, or the ZIP of a folder",
             accept_multiple_files=True,
             key="upload_files",
-            on_change=read_upload,
+            on_change=read_new_upload,
             help="Parquet, CSV, TSV, JSON lines, Arrow, Excel, HDF5 (D4RL) or NPZ, text also as "
             ".gz; the pair obs.csv and actions.csv; one file an episode; the ZIP of a folder as "
             "Minari, LeRobot or Hugging Face's datasets write it. A table has one row a step: "
@@ -153,37 +134,44 @@ def upload_section(*, expanded: bool) -> None:
             accept_new_options=True,
             placeholder="none",
             key="upload_env",
-            on_change=read_upload,
+            on_change=_read_again,
             bind="query-params",
             help="Names, units and bounds are taken from it where the file has none. Any id "
             "that Gymnasium knows.",
         )
         error = st.session_state.get("_upload_error")
         if error:
-            refuse(error)
+            refuse(_IN_FORM.sub("say which in the form below", error))
             if chosen_demonstrations() is not None:
                 st.caption("Nothing has changed: the set below is still the one chosen.")
         files = uploaded_files()
-        if files:
-            lacking = error is not None and _LEFT_OUT in error
-            if lacking or st.session_state.get("upload_missing"):
-                st.toggle(
-                    "Leave out the steps that lack a value",
-                    key="upload_missing",
-                    on_change=_read_again,
-                    help="An empty cell, NaN, null or NA among observations, actions and rewards. "
-                    "What is left of an episode keeps its number and the numbers of its steps.",
-                )
-            names = columns_of(files)
-            # An error about a row is not mended by another map; one about columns is.
-            mendable = error is not None and "column" in error and not re.search(r"\brow \d", error)
-            if names and (mendable or st.toggle("Map the columns myself", key="map_columns")):
-                mapping_form(names)
+        lacking = error is not None and _LEFT_OUT in error
+        if files and (lacking or st.session_state.get("upload_missing")):
+            st.toggle(
+                "Leave out the steps that lack a value",
+                key="upload_missing",
+                on_change=_read_again,
+                help="An empty cell, NaN, null or NA among observations, actions and rewards. "
+                "What is left of an episode keeps its number and the numbers of its steps.",
+            )
+        previews = _previews(files)
+        if previews and st.toggle("Map the columns myself", key="map_columns"):
+            if FEATURES not in st.session_state:
+                fill_in(previews)
+            mapping_form(previews, read_mapped)
 
 
-def columns_of(files: list[tuple[memoryview, str]]) -> tuple[str, ...]:
+def _previews(files: list[tuple[memoryview, str]]) -> tuple[ColumnPreview, ...]:
     """Columns of an uploaded table, () where it has none that can be read."""
-    try:
-        return table_columns(list(files))
-    except Exception:  # `read_upload` has said why
+    if not files:
         return ()
+    uploaded = tuple(file.file_id for file in st.session_state["upload_files"])
+    held = st.session_state.get("_previews")
+    if held is None or held[0] != uploaded:
+        try:
+            held = (uploaded, preview_columns(list(files)))
+        except Exception:  # `read_upload` has said why
+            held = (uploaded, ())
+        st.session_state["_previews"] = held
+    previews: tuple[ColumnPreview, ...] = held[1]
+    return previews

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from sarl_core.demonstrations.formats.columns import (
     UnclearColumnsError,
     guess_roles,
 )
+from sarl_core.demonstrations.formats.mapping.joined import joined, ones_of
 from sarl_core.demonstrations.formats.mapping.roles import ActionKind, ColumnRole, RoleName, Roles
 from sarl_core.demonstrations.formats.tables import Table, TableColumn, without_times
 from sarl_core.demonstrations.requirements import FEW_VALUES, is_whole, without_fraction
@@ -35,6 +36,9 @@ class ColumnPreview:
         first: The first few of them.
         role: What it seems to be; None where two readings are possible.
         why: In words.
+        kind_as_action: Whether it would be read as labels or as an amount if it were an action;
+            None where it cannot be an amount.
+        ones: Where it is 1, shape (N,); None if it holds anything but 1 and 0.
     """
 
     name: str
@@ -42,11 +46,19 @@ class ColumnPreview:
     first: tuple[str, ...]
     role: ColumnRole | None
     why: str
+    kind_as_action: ActionKind | None = None
+    ones: NDArray[np.bool_] | None = field(default=None, repr=False, compare=False)
 
     @property
     def document(self) -> dict[str, Any]:
         """The same for JSON."""
-        return asdict(self)
+        return {
+            "name": self.name,
+            "holds": self.holds,
+            "first": list(self.first),
+            "role": None if self.role is None else str(self.role),
+            "why": self.why,
+        }
 
 
 def previewed(table: Table, roles: Roles) -> tuple[ColumnPreview, ...]:
@@ -62,18 +74,21 @@ def previewed(table: Table, roles: Roles) -> tuple[ColumnPreview, ...]:
     Raises:
         InputError: If what was said does not fit the table.
     """
+    table = joined(table, roles)
     guess = guess_roles(table.names, roles)
     read = _readable(table)
     guess, unclear = _settled(guess, read)
     previews = []
     for name in table.names:
         role = None if name in unclear else _role(guess, name, table)
-        if role == ColumnRole("action") and name in read:
-            role = ColumnRole("action", kind=_action_kind(guess, read[name]))
+        kind = _action_kind(guess, read[name]) if name in read else None
+        if role == ColumnRole("action"):
+            role = ColumnRole("action", kind=kind)
         why = unclear.get(name) or guess.reasons.get(name) or guess.unused.get(name, "")
         holds = _kind(read[name]) if name in read else "neither numbers nor words"
         first = _first(read[name]) if name in read else ()
-        previews.append(ColumnPreview(name, holds, first, role, why))
+        ones = ones_of(read[name]) if name in read else None
+        previews.append(ColumnPreview(name, holds, first, role, why, kind, ones))
     return tuple(previews)
 
 

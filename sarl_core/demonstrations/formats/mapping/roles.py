@@ -253,6 +253,12 @@ def save_roles(
     Raises:
         InputError: If it cannot be written.
     """
+    with whole_file(path) as unfinished:
+        unfinished.write_text(roles_document(roles, reasons), encoding="utf-8")
+
+
+def roles_document(roles: Mapping[str, ColumnRole | None], reasons: Mapping[str, str]) -> str:
+    """What `load_roles` reads; arguments as of `save_roles`."""
     columns = {
         name: {"role": UNCLEAR}
         if role is None
@@ -263,10 +269,7 @@ def save_roles(
         if reasons.get(name):
             entry["why"] = reasons[name]
     document = {"format": _FORMAT, "version": _VERSION, "columns": columns}
-    with whole_file(path) as unfinished:
-        unfinished.write_text(
-            json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-        )
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
 
 
 def require_known(roles: Roles, names: Sequence[str]) -> None:
