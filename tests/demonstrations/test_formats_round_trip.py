@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -20,20 +20,32 @@ from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.csv_file import open_csv
 from sarl_core.demonstrations.formats.parquet_file import open_parquet
 from sarl_core.demonstrations.formats.tables import Table
+from sarl_core.errors import InputError
 from tests.bad_inputs import ROWS, csv_bytes, parquet_bytes
 from tests.demonstrations.strategies import SPACES, demonstrations
 
 ARRAYS = ("observations", "actions", "episodes", "steps", "rewards", "terminated", "truncated")
 
 
-def assert_same_arrays(one: Demonstrations, other: Demonstrations) -> None:
-    for name in ARRAYS:
+def assert_same_arrays(
+    one: Demonstrations, other: Demonstrations, names: tuple[str, ...] = ARRAYS
+) -> None:
+    for name in names:
         value, same = getattr(one, name), getattr(other, name)
         assert (value is None) == (same is None), name
         if value is not None:
             assert value.dtype == same.dtype, name
             assert value.shape == same.shape, name
             assert value.tobytes() == same.tobytes(), name
+
+
+def said(demonstrations: Demonstrations) -> list[list[str]]:
+    """The actions by the names of their labels."""
+    columns = demonstrations.action_columns
+    return [
+        [dimension.labels[label] for label in dimension.labels_of(column)]
+        for dimension, column in zip(demonstrations.action_dimensions, columns.T, strict=True)
+    ]
 
 
 def saved(original: Demonstrations, name: str) -> Demonstrations:
@@ -64,8 +76,14 @@ def test_everything_survives(extension: str, space: str, data: st.DataObject) ->
 @given(data=st.data())
 def test_columns_survive_csv(space: str, data: st.DataObject) -> None:
     original = data.draw(demonstrations(space))
-    loaded = saved(original, "demo.csv")
-    assert_same_arrays(original, loaded)
+    try:
+        loaded = saved(original, "demo.csv")
+    except InputError:  # a label "NA" would be read as none
+        reject()
+    in_words = original.is_discrete and not original.env_id
+    assert_same_arrays(original, loaded, ARRAYS[:1] + ARRAYS[2:] if in_words else ARRAYS)
+    if in_words:
+        assert said(loaded) == said(original)
     assert loaded.feature_names == original.feature_names
     if original.actions.ndim == 2:
         assert loaded.action_names == original.action_names

@@ -10,7 +10,6 @@ from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.mapping.roles import (
     ROLE_WORDS,
-    TOGETHER,
     ColumnRole,
     Roles,
     as_roles,
@@ -425,9 +424,7 @@ def feature_names(columns: Sequence[str]) -> tuple[str, ...] | None:
 
 def action_names(columns: Sequence[str]) -> tuple[str, ...] | None:
     """What columns say the action dimensions are called; None where they only count them."""
-    if len(columns) == 1 and (
-        columns[0].strip().lower() in SINGLE_ACTION or TOGETHER in columns[0]
-    ):
+    if len(columns) == 1 and columns[0].strip().lower() in SINGLE_ACTION:
         return None
     names = [_own_name(column, ACTIONS) for column in columns]
     return None if all(name.isdecimal() for name in names) else tuple(names)

@@ -39,6 +39,7 @@ from sarl_core.demonstrations.formats.tables import (
     coarse_notes,
     episode_fields,
     given,
+    is_vector,
     label_words,
     missing_block,
     names_of_features,
@@ -180,7 +181,8 @@ def read_pair(observations: memoryview, actions: memoryview, names: tuple[str, s
         coarse = coarse_notes(table, block)
     with naming(names[1]):
         taken = _actions_of(others)
-        done = action_block(taken.read, taken.guess.columns.actions)
+        chosen = taken.guess.columns.actions
+        done = action_block(taken.read, chosen, is_vector(chosen, taken.read))
     with naming(names[0]):
         _require_half(table, seen, taken, short[1], "observations")
     with naming(names[1]):

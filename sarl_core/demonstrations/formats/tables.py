@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -30,7 +30,7 @@ from sarl_core.demonstrations.formats.mapping.action_roles import (
     with_stated_actions,
 )
 from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_note
-from sarl_core.demonstrations.formats.mapping.roles import TOGETHER, Roles
+from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.units import without_units
@@ -188,10 +188,11 @@ def recording_from_table(
     if names is not None and not chosen.feature_names:
         names, written = without_units(names)
         units = tuple(known or behind for known, behind in zip(units, written, strict=True))
+    vector = is_vector(chosen.actions, read)
     actions = stated_actions(read, chosen.actions, guess.roles, rows)
     return Recording(
         observations=block.values,
-        actions=action_block(actions, chosen.actions),
+        actions=action_block(actions, chosen.actions, vector),
         observation_columns=tuple(f"column {name!r}" for name in block.columns),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
         feature_names=names,
@@ -199,10 +200,11 @@ def recording_from_table(
         indicators=block.indicators,
         action_words=label_words(actions, chosen.actions),
         missing_actions=missing_block(actions, chosen.actions),
-        action_names=chosen.action_names or (action_names(chosen.actions) if named else None),
+        action_names=chosen.action_names
+        or (action_names(chosen.actions) if named and set(chosen.actions) <= set(read) else None),
         **fields,
         rows=rows,
-        guess_labels=actions is read and not _is_vector(chosen.actions),
+        guess_labels=actions is read and not vector,
         names={role: f"column {name!r}" for role, name in chosen.singles.items()},
         metadata=with_stated_actions(metadata, chosen.actions, guess.roles),
         notes=(*notes, *numbered, *marked, *dropped, *coarse),
@@ -503,11 +505,13 @@ def coarse_notes(
     return tuple(notes)
 
 
-def action_block(read: Mapping[str, TableColumn], names: Sequence[str]) -> NDArray[Any]:
-    """Actions of shape (N,), or (N, m) where the columns' names say that they are vectors."""
+def action_block(
+    read: Mapping[str, TableColumn], names: Sequence[str], vector: bool
+) -> NDArray[Any]:
+    """Actions of shape (N,), or (N, m) where they are vectors."""
     columns = [read[name].values for name in names]
     columns = [one.astype(np.int64) if one.dtype.kind == "b" else one for one in columns]
-    return np.stack(columns, axis=1) if _is_vector(names) else columns[0]
+    return np.stack(columns, axis=1) if vector else columns[0]
 
 
 def missing_block(
@@ -588,9 +592,14 @@ def _unnamed(
     )
 
 
-def _is_vector(actions: Sequence[str]) -> bool:
-    """Whether the names say that an action is a vector, if only of one number."""
-    return len(actions) > 1 or (actions[0].startswith("action_") and TOGETHER not in actions[0])
+def is_vector(actions: Sequence[str], table: Container[str]) -> bool:
+    """Whether the names say that an action is a vector, if only of one number.
+
+    Args:
+        actions: The action's columns, or what several of them are together.
+        table: The columns that there are.
+    """
+    return len(actions) > 1 or (actions[0].startswith("action_") and actions[0] in table)
 
 
 def _without_empty_ends(
