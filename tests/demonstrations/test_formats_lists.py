@@ -63,6 +63,17 @@ def test_lists_of_several_lengths_are_refused_with_the_row() -> None:
         read_demonstrations(content, "demo.parquet")
 
 
+def test_a_feature_that_is_a_time_takes_its_name_with_it() -> None:
+    times = pa.array(np.arange(N), pa.timestamp("s"))
+    content = parquet(a=times, b=STATES[:, 0], action=ACTIONS)
+    columns = ColumnMap(("a", "b"), ("action",), feature_names=("clock", "gap"))
+    read = read_demonstrations(content, "demo.parquet", columns=columns)
+    assert read.feature_names == ("gap",)
+    columns = ColumnMap(("a",), ("action",))
+    with pytest.raises(InputError, match="no feature beside 'a', which hold times"):
+        read_demonstrations(content, "demo.parquet", columns=columns)
+
+
 def test_a_list_that_is_missing_is_an_empty_field_of_that_row() -> None:
     content = parquet(obs=[*STATES.tolist(), None], action=np.arange(N + 1) % 2)
     with pytest.raises(InputError, match=r"'obs_0' is empty .* in 1 of 61 rows"):

@@ -21,7 +21,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sarl_core.demonstrations.formats import read_demonstrations
-from sarl_core.demonstrations.formats.parquet_pages import largest_chunk
+from sarl_core.demonstrations.formats.arrow.parquet_pages import largest_chunk
 from sarl_core.errors import InputError
 from sarl_core.limits import READ_LIMIT
 from tests.bad_inputs import good_columns, npy, parquet_bytes

@@ -16,10 +16,10 @@ from sarl_core.demonstrations.formats import (
     read_demonstrations,
     save_demonstrations,
 )
+from sarl_core.demonstrations.formats.arrow.parquet_file import open_parquet
 from sarl_core.demonstrations.formats.columns import ColumnMap
-from sarl_core.demonstrations.formats.csv_file import open_csv
-from sarl_core.demonstrations.formats.parquet_file import open_parquet
-from sarl_core.demonstrations.formats.tables import Table
+from sarl_core.demonstrations.formats.opened_table import Table
+from sarl_core.demonstrations.formats.texts.csv_file import open_csv
 from sarl_core.errors import InputError
 from tests.bad_inputs import ROWS, csv_bytes, parquet_bytes
 from tests.demonstrations.strategies import SPACES, demonstrations

@@ -234,13 +234,13 @@ class Guess:
             The new guess.
         """
         dropped = {name: why for name, why in dropped.items() if name not in self.roles}
-        observations = tuple(name for name in self.columns.observations if name not in dropped)
-        return replace(
-            self,
-            columns=replace(self.columns, observations=observations),
-            reasons={name: why for name, why in self.reasons.items() if name not in dropped},
-            unused={**self.unused, **dropped},
-        )
+        seen, names = self.columns.observations, self.columns.feature_names
+        left = [place for place, name in enumerate(seen) if name not in dropped]
+        columns = replace(self.columns, observations=tuple(seen[place] for place in left))
+        if names is not None:
+            columns = replace(columns, feature_names=tuple(names[place] for place in left))
+        reasons = {name: why for name, why in self.reasons.items() if name not in dropped}
+        return replace(self, columns=columns, reasons=reasons, unused={**self.unused, **dropped})
 
 
 def guess_columns(names: Sequence[str]) -> ColumnMap:

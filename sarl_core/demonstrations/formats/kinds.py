@@ -11,16 +11,16 @@ from pathlib import PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats.arrow.parquet_file import MAGIC, open_parquet, write_parquet
 from sarl_core.demonstrations.formats.arrow.table import FILE_MAGIC, STREAM_MAGIC, open_arrow
-from sarl_core.demonstrations.formats.csv_file import open_csv, write_csv
-from sarl_core.demonstrations.formats.excel_file import open_excel
 from sarl_core.demonstrations.formats.hdf5.content import MAGIC as HDF5_MAGIC
 from sarl_core.demonstrations.formats.hdf5.layouts import read_hdf5
-from sarl_core.demonstrations.formats.json_file import open_json, open_json_lines
 from sarl_core.demonstrations.formats.npz_file import read_npz, write_npz
-from sarl_core.demonstrations.formats.parquet_file import MAGIC, open_parquet, write_parquet
+from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.recording import Recording
-from sarl_core.demonstrations.formats.tables import Table
+from sarl_core.demonstrations.formats.texts.csv_file import open_csv, write_csv
+from sarl_core.demonstrations.formats.texts.excel_file import open_excel
+from sarl_core.demonstrations.formats.texts.json_file import open_json, open_json_lines
 from sarl_core.errors import InputError
 from sarl_core.limits import require_memory
 

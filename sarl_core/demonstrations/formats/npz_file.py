@@ -26,8 +26,8 @@ from sarl_core.demonstrations.formats.metadata import (
     decode_metadata,
     encode_metadata,
 )
+from sarl_core.demonstrations.formats.opened_table import MAX_COLUMNS
 from sarl_core.demonstrations.formats.recording import Recording
-from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
 from sarl_core.demonstrations.words import coded
 from sarl_core.errors import InputError
 from sarl_core.limits import require_memory, table_memory

@@ -27,14 +27,12 @@ from sarl_core.demonstrations.formats.columns import (
     listed,
     require_clear,
 )
-from sarl_core.demonstrations.formats.csv_file import CsvTable, open_csv
 from sarl_core.demonstrations.formats.mapping.roles import settled_by
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.tables import (
-    Table,
-    TableColumn,
     action_block,
     coarse_notes,
     episode_fields,
@@ -50,6 +48,7 @@ from sarl_core.demonstrations.formats.tables import (
     units_of,
     without_times,
 )
+from sarl_core.demonstrations.formats.texts.csv_file import CsvTable, open_csv
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action, plain
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError

@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import BinaryIO
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats.arrow.parquet_file import ParquetTable, whole_table
 from sarl_core.demonstrations.formats.arrow.table import ArrowTable
 from sarl_core.demonstrations.formats.columns import ColumnMap, Columns, stated
 from sarl_core.demonstrations.formats.hubs.hub import OpenedTable, open_hub
@@ -25,6 +26,7 @@ from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview, prev
 from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming, naming_both
+from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.pair import (
     alone_note,
     fits,
@@ -35,7 +37,6 @@ from sarl_core.demonstrations.formats.pair import (
     partner_names,
     read_pair,
 )
-from sarl_core.demonstrations.formats.parquet_file import ParquetTable, whole_table
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.sets.episode_rows import keys_of_rows, recording_of_rows
 from sarl_core.demonstrations.formats.sets.file_set import (
@@ -46,7 +47,7 @@ from sarl_core.demonstrations.formats.sets.file_set import (
     files_in_folder,
 )
 from sarl_core.demonstrations.formats.sets.table_set import open_tables
-from sarl_core.demonstrations.formats.tables import Table, recording_from_table
+from sarl_core.demonstrations.formats.tables import recording_from_table
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.fields import TRUTH, Indicator
-from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
     ColumnMap,
@@ -21,7 +20,6 @@ from sarl_core.demonstrations.formats.columns import (
     guess_notes,
     guess_roles,
     listed,
-    refuse_doubled,
     require_clear,
     unclear_columns,
 )
@@ -32,6 +30,7 @@ from sarl_core.demonstrations.formats.mapping.action_roles import (
 from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_note
 from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
+from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
@@ -39,93 +38,7 @@ from sarl_core.demonstrations.words import Coded, indicated, indicators_of
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
-MAX_COLUMNS = 4096
-MAX_NAME = 300  # characters of a column's name; a person has to read it in every rule
 _OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
-
-
-class Table(Protocol):
-    """A file with named columns, opened and not yet read."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns."""
-
-    @property
-    def named(self) -> bool:
-        """Whether those names stand in the file."""
-
-    @property
-    def metadata(self) -> Metadata:
-        """What the file says besides."""
-
-    def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
-        """Numbers of the columns that a map uses."""
-
-
-@dataclass(frozen=True)
-class TableColumn:
-    """Numbers of one column, or words by number.
-
-    Attributes:
-        values: Shape (N,), bool, integers or floats; NaN or 0 where missing. Of words their
-            numbers, int64; -1 where missing.
-        missing: Shape (N,), where the column is empty, or None if it is nowhere.
-        words: What the numbers stand for, in their order; () where they are numbers.
-    """
-
-    values: NDArray[Any]
-    missing: NDArray[np.bool_] | None = None
-    words: tuple[str, ...] = ()
-
-    @classmethod
-    def of_words(cls, coded: Coded) -> TableColumn:
-        """A column of words; one without any is empty."""
-        missing = coded.codes < 0
-        if not coded.words:
-            return cls(np.full(len(missing), np.nan), missing)
-        return cls(coded.codes, missing if missing.any() else None, coded.words)
-
-    @property
-    def with_gaps(self) -> NDArray[Any]:
-        """The values, not a number where missing."""
-        if self.missing is None or self.values.dtype.kind == "f":
-            return self.values
-        return np.where(self.missing, np.nan, self.values)
-
-    @property
-    def is_time(self) -> bool:
-        """Whether each of its words is a date, a time of day, or both."""
-        return bool(self.words) and all(map(vocabulary.is_time, self.words))
-
-    def at(self, rows: NDArray[np.int64]) -> TableColumn:
-        """The same column in some of its rows."""
-        missing = None if self.missing is None else self.missing[rows]
-        return replace(self, values=self.values[rows], missing=missing)
-
-
-def as_float32(column: TableColumn) -> TableColumn:
-    """A column in the numbers that rules compare; words, and true and false, stay as they are."""
-    if column.words or column.values.dtype.kind == "b":
-        return column
-    with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
-        return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
-
-
-def check_names(names: Sequence[str]) -> None:
-    """Refuse a table with too many columns, a name nobody can read, or two of one name."""
-    if len(names) > MAX_COLUMNS:
-        raise InputError(
-            f"there are {len(names):,} columns, more than the {MAX_COLUMNS:,} that rules a person "
-            "reads could use; keep fewer"
-        )
-    long = next((name for name in names if len(name) > MAX_NAME), None)
-    if long is not None:
-        raise InputError(
-            f"the column {quoted(long)} has a name of {len(long):,} characters; give it one of "
-            f"{MAX_NAME} at most"
-        )
-    refuse_doubled(names)
 
 
 def recording_from_table(
@@ -144,7 +57,7 @@ def recording_from_table(
     Raises:
         InputError: If roles are unclear, a column is missing, or a value is no number.
     """
-    metadata = table.metadata
+    metadata, of_the_file = table.metadata, set(table.names)
     guessed = False
     notes: tuple[str, ...] = ()
     if isinstance(columns, ColumnMap):
@@ -188,7 +101,7 @@ def recording_from_table(
     if names is not None and not chosen.feature_names:
         names, written = without_units(names)
         units = tuple(known or behind for known, behind in zip(units, written, strict=True))
-    vector = is_vector(chosen.actions, read)
+    vector = is_vector(chosen.actions, of_the_file)
     actions = stated_actions(read, chosen.actions, guess.roles, rows)
     return Recording(
         observations=block.values,
@@ -201,7 +114,11 @@ def recording_from_table(
         action_words=label_words(actions, chosen.actions),
         missing_actions=missing_block(actions, chosen.actions),
         action_names=chosen.action_names
-        or (action_names(chosen.actions) if named and set(chosen.actions) <= set(read) else None),
+        or (
+            action_names(chosen.actions)
+            if named and of_the_file.issuperset(chosen.actions)
+            else None
+        ),
         **fields,
         rows=rows,
         guess_labels=actions is read and not vector,
@@ -225,7 +142,7 @@ def without_times(
         The guess, the columns that are left, and a note where texts became the numbers of episodes.
 
     Raises:
-        InputError: If a column is called a feature, and holds times.
+        InputError: If a column is called a feature and holds times, or no feature is left.
     """
     columns = guess.columns
     timed = [name for name in (*columns.observations, columns.step) if name and read[name].is_time]
@@ -239,6 +156,11 @@ def without_times(
             )
     times = dict.fromkeys(timed, "it is a time")
     guess = guess.without(times)
+    if columns.observations and not guess.columns.observations:
+        raise InputError(
+            f"there is no feature beside {listed(times)}, which hold times; choose columns of "
+            "numbers or of words"
+        )
     if columns.step in times:
         guess = replace(
             guess,

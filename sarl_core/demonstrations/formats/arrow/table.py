@@ -14,10 +14,10 @@ from sarl_core.demonstrations.formats.arrow.nested import (
     refuse_nested,
     values_in,
 )
+from sarl_core.demonstrations.formats.arrow.parquet_file import column_from_arrow, refusing_damage
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import KEY, Metadata, decode_metadata
-from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, refusing_damage
-from sarl_core.demonstrations.formats.tables import TableColumn, as_float32, check_names
+from sarl_core.demonstrations.formats.opened_table import TableColumn, as_float32, check_names
 from sarl_core.errors import InputError
 from sarl_core.limits import require_memory, table_memory
 

@@ -8,9 +8,9 @@ from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.hubs.hugging_face import hugging_face_root, open_hugging_face
 from sarl_core.demonstrations.formats.hubs.lerobot import INFO, open_lerobot
 from sarl_core.demonstrations.formats.hubs.minari import minari_root, read_minari
+from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
-from sarl_core.demonstrations.formats.tables import Table
 
 
 @dataclass(frozen=True)

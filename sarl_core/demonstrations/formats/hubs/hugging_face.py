@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from sarl_core.demonstrations.formats.arrow.table import arrow_table, table_of_stream
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.sets.episode_rows import recording_of_rows
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
-from sarl_core.demonstrations.formats.tables import Table
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import msgspec
 
+from sarl_core.demonstrations.formats.arrow.parquet_file import ParquetTable
 from sarl_core.demonstrations.formats.columns import ColumnMap, listed
 from sarl_core.demonstrations.formats.naming import naming
-from sarl_core.demonstrations.formats.parquet_file import ParquetTable
+from sarl_core.demonstrations.formats.opened_table import Table, check_names
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
 from sarl_core.demonstrations.formats.sets.table_set import TableSet, open_tables
-from sarl_core.demonstrations.formats.tables import Table, check_names
 from sarl_core.documents import Count, MisfitError, conformed, parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.checks import MAX_LABELS
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.formats.arrow.parquet_file import open_parquet
 from sarl_core.demonstrations.formats.arrow.table import open_arrow
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.hdf5.content import Hdf5Content, opened_hdf5
@@ -28,10 +29,9 @@ from sarl_core.demonstrations.formats.hubs.spaces import (
 )
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
-from sarl_core.demonstrations.formats.parquet_file import open_parquet
+from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.sets.file_set import FileSet, natural_order
-from sarl_core.demonstrations.formats.tables import Table
 from sarl_core.documents import MisfitError, conformed, parse_json
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import numbered

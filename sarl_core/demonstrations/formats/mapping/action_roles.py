@@ -15,7 +15,7 @@ from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from sarl_core.demonstrations.formats.tables import TableColumn
+    from sarl_core.demonstrations.formats.opened_table import TableColumn
 
 
 def stated_actions(

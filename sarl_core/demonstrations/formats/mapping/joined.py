@@ -18,7 +18,7 @@ from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from sarl_core.demonstrations.formats.tables import Table, TableColumn
+    from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 
 _NONE = ("none", "nothing", "none of them")  # what a label is called where no column is 1
 

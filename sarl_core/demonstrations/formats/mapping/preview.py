@@ -18,7 +18,8 @@ from sarl_core.demonstrations.formats.columns import (
 )
 from sarl_core.demonstrations.formats.mapping.joined import joined, ones_of
 from sarl_core.demonstrations.formats.mapping.roles import ActionKind, ColumnRole, RoleName, Roles
-from sarl_core.demonstrations.formats.tables import Table, TableColumn, without_times
+from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
+from sarl_core.demonstrations.formats.tables import without_times
 from sarl_core.demonstrations.requirements import FEW_VALUES, is_whole, without_fraction
 from sarl_core.errors import InputError
 

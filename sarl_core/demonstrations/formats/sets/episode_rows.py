@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.formats.arrow.parquet_file import refusing_damage
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.npz_file import ARRAY_KEYS, recording_of_arrays
-from sarl_core.demonstrations.formats.parquet_file import refusing_damage
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory

@@ -15,8 +15,8 @@ from sarl_core.demonstrations.formats.columns import SINGLES, ColumnMap, guess_r
 from sarl_core.demonstrations.formats.kinds import FORMATS, extension_of, format_of, unpacked
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
-from sarl_core.demonstrations.formats.tables import Table, TableColumn
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory
 

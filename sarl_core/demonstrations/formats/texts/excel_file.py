@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from sarl_core.archives import entry_content, opened
-from sarl_core.demonstrations.formats.csv_file import CsvTable, open_csv
-from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
+from sarl_core.demonstrations.formats.opened_table import MAX_COLUMNS
+from sarl_core.demonstrations.formats.texts.csv_file import CsvTable, open_csv
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory
 

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from sarl_core.demonstrations.formats.arrow.table import ArrowTable, arrow_table
-from sarl_core.demonstrations.formats.tables import MAX_COLUMNS
+from sarl_core.demonstrations.formats.opened_table import MAX_COLUMNS
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory

@@ -13,16 +13,12 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import TRUTH
+from sarl_core.demonstrations.formats.arrow.parquet_file import column_from_arrow, is_text
 from sarl_core.demonstrations.formats.columns import ColumnMap
-from sarl_core.demonstrations.formats.csv_head import Delimiter, read_head
 from sarl_core.demonstrations.formats.metadata import Metadata
-from sarl_core.demonstrations.formats.parquet_file import column_from_arrow, is_text
+from sarl_core.demonstrations.formats.opened_table import TableColumn, as_float32, check_names
 from sarl_core.demonstrations.formats.saved_columns import columns_in_words
-from sarl_core.demonstrations.formats.tables import (
-    TableColumn,
-    as_float32,
-    check_names,
-)
+from sarl_core.demonstrations.formats.texts.csv_head import Delimiter, read_head
 from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory

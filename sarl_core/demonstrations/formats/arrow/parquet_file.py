@@ -20,6 +20,11 @@ from sarl_core.demonstrations.formats.arrow.nested import (
     refuse_nested,
     values_in,
 )
+from sarl_core.demonstrations.formats.arrow.parquet_pages import (
+    MOST_FOOTER,
+    footer_size,
+    largest_chunk,
+)
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import (
     KEY,
@@ -27,13 +32,8 @@ from sarl_core.demonstrations.formats.metadata import (
     decode_metadata,
     encode_metadata,
 )
-from sarl_core.demonstrations.formats.parquet_pages import (
-    MOST_FOOTER,
-    footer_size,
-    largest_chunk,
-)
+from sarl_core.demonstrations.formats.opened_table import MAX_NAME, TableColumn, check_names
 from sarl_core.demonstrations.formats.saved_columns import columns_of
-from sarl_core.demonstrations.formats.tables import MAX_NAME, TableColumn, check_names
 from sarl_core.demonstrations.words import Coded, in_order
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import read_limit, require_memory, table_memory

@@ -48,7 +48,7 @@ class CsvHead:
     line: int
 
 
-class _Line(NamedTuple):
+class _HeadLine(NamedTuple):
     text: str
     start: int
     number: int
@@ -92,7 +92,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
     first = _fields(line.text, delimiter)
     names = _fields(comment, delimiter)
     if names and len(names) == len(first) and any(map(_is_number, first)):
-        return CsvHead(_unnamed_told_apart(names), True, delimiter, {}, line.start, line.number)
+        return CsvHead(_with_all_names(names), True, delimiter, {}, line.start, line.number)
     second, third = next(lines, None), next(lines, None)
     below = _fields(second.text, delimiter) if second is not None else []
     if not _is_header(first, below):
@@ -103,18 +103,18 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
             "there are no steps, only a header; give at least two observations with their actions"
         )
     units: dict[str, str] = {}
-    told_apart = _unnamed_told_apart(first)
+    names_of_all = _with_all_names(first)
     if third is not None and _gives_units(below, _fields(third.text, delimiter), len(first)):
         units = {
             name: unit
-            for name, text in zip(told_apart, below, strict=True)
+            for name, text in zip(names_of_all, below, strict=True)
             if (unit := _unit(text))
         }
         second = third
-    return CsvHead(told_apart, True, delimiter, units, second.start, second.number)
+    return CsvHead(names_of_all, True, delimiter, units, second.start, second.number)
 
 
-def _lines(data: memoryview) -> Iterator[_Line]:
+def _lines(data: memoryview) -> Iterator[_HeadLine]:
     """The lines in which something stands."""
     pattern = re.compile(rb"([^\r\n]*)(\r\n|\r|\n|$)")
     start, number = 0, 1
@@ -124,7 +124,7 @@ def _lines(data: memoryview) -> Iterator[_Line]:
             raise InputError("its first line is too long; give a CSV file with one row a step")
         text = bytes(match[1]).decode()
         if text.strip():
-            yield _Line(text, start, number)
+            yield _HeadLine(text, start, number)
         start, number = match.end(), number + 1
 
 
@@ -158,7 +158,7 @@ def _is_header(fields: Sequence[str], below: Sequence[str]) -> bool:
     return counted and any(_FRACTION.fullmatch(field.strip()) for field in below)
 
 
-def _unnamed_told_apart(names: Sequence[str]) -> tuple[str, ...]:
+def _with_all_names(names: Sequence[str]) -> tuple[str, ...]:
     """The names, of which only the first may be empty, as that of a counter is."""
     return tuple(
         f"unnamed: {number}" if number and not name.strip() else name
