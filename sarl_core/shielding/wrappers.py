@@ -214,23 +214,35 @@ def fitted(
     )
     if ordered.rule_set is not rule_set:
         shield = shield.with_rules(ordered.rule_set)
-    notes = (*ordered.notes, *_label_notes(ordered.rule_set))
+    inner = observed.owner.partition(" behind ")[0]  # no wrapper renames what is done
+    d, m = len(rule_set.source.features), len(rule_set.actions)
+    labels = observed.names.labels or catalogued(inner, d, m, discrete=discrete).labels
+    notes = (*ordered.notes, *_label_notes(ordered.rule_set, labels))
     return FittedShield(shield.for_space(action_space), notes)
 
 
-def _label_notes(rule_set: RuleSet) -> tuple[str, ...]:
+def _label_notes(rule_set: RuleSet, known: tuple[tuple[str, ...], ...]) -> tuple[str, ...]:
     """Which actions stand for labels that are words of a file, which knew no environment."""
     if rule_set.source.env_id:
         return ()
-    return tuple(
-        "the rules do not say of which environment they are; their labels stand for its actions in "
-        + "their order: "
-        + shortened([f"{name!r} for {number}" for number, name in enumerate(action.label_names)])
-        for action in rule_set.actions
-        if not action.is_interval
-        and not action.codes
-        and action.label_names != tuple(map(str, action.actions))
-    )
+    notes = []
+    for place, action in enumerate(rule_set.actions):
+        own, theirs = action.label_names, known[place] if place < len(known) else ()
+        numbered = own == tuple(map(str, action.actions))
+        if action.is_interval or action.codes or numbered or own == theirs:
+            continue
+        if {*own} <= {*theirs} and own != theirs[: len(own)]:
+            raise InputError(
+                f"the rules number their labels {shortened(own)} otherwise than the environment "
+                f"numbers its actions {shortened(theirs)}; mine them with --env, which tells the "
+                "numbers"
+            )
+        stand = shortened([f"{name!r} for {number}" for number, name in enumerate(own)])
+        notes.append(
+            "the rules do not say of which environment they are; their labels stand for its "
+            f"actions in their order: {stand}"
+        )
+    return tuple(notes)
 
 
 def check_fit(

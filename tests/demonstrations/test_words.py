@@ -247,3 +247,7 @@ def test_words_of_an_unknown_environment_are_said_to_stand_for_its_actions() -> 
     shield = Shield(mine_rules(log, supp_min=0.0, conf_min=1.0))
     env = ShieldedEnv(gymnasium.make("CartPole-v1"), shield)
     assert any("'left' for 0, 'right' for 1" in note for note in env.notes)
+    swapped = replace(log, label_names=(("push right", "push left"),))
+    shield = Shield(mine_rules(swapped, supp_min=0.0, conf_min=1.0))
+    with pytest.raises(InputError, match=r"otherwise than the environment numbers .* --env"):
+        ShieldedEnv(gymnasium.make("CartPole-v1"), shield)
