@@ -35,7 +35,7 @@ def test_the_rules_in_force_are_rounded_and_no_decision_changes() -> None:
     assert int(found["Thresholds rounded"]) > 0
     threshold = rules.rules[0].conditions[0].threshold
     assert f'"threshold": {threshold!r}' in code(app)
-    assert "The first 120 of" in texts(app)
+    assert "The first 150 of" in texts(app)
     assert labels(app) == ["Download .json", "Test vectors"]
 
 

@@ -22,7 +22,7 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.export.settings import ExportSettings
 
-LINES = 120
+LINES = 150
 
 
 @cached(show_spinner="Rounding, and counting what changes …")
