@@ -17,7 +17,7 @@ def test_demonstrations_are_found_at_both_addresses(screen: Page, path: str) -> 
     assert parameters(screen)["data"] == "cartpole"
     assert urlsplit(screen.url).path == "/"
     expect(screen.get_by_role("dialog")).to_have_count(0)
-    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(16)
+    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(18)
     no_trace(screen)
 
 
@@ -25,5 +25,5 @@ def test_the_page_export_is_found_at_the_address_it_once_had(screen: Page) -> No
     visit(screen, "/carry?data=cartpole&carry=compact", "Export")
     assert urlsplit(screen.url).path == "/export"
     assert parameters(screen) == {"data": "cartpole", "carry": "compact"}
-    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(16)
+    expect(screen.get_by_test_id("stSidebarNavLink")).to_have_count(18)
     no_trace(screen)
