@@ -351,7 +351,7 @@ def _describe(env_id: str, env: Any, d: int) -> EnvironmentDescription:
     try:
         there = int(spaces.utils.flatdim(made.observation_space))
     except (NotImplementedError, ValueError):
-        there = d
+        there = d  # no vector before it was wrapped, so no catalogue knows its length
     names = catalogued(env_id, there, m, discrete=low is None)
     features = names.features if plain else [(name, "") for name in numbered(d)]
     units = [""] * d if own.features else [unit for _, unit in features]
