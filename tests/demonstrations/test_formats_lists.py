@@ -63,15 +63,15 @@ def test_lists_of_several_lengths_are_refused_with_the_row() -> None:
         read_demonstrations(content, "demo.parquet")
 
 
-def test_a_feature_that_is_a_time_takes_its_name_with_it() -> None:
+def test_a_time_is_no_feature_and_refused_where_it_is_called_one() -> None:
     times = pa.array(np.arange(N), pa.timestamp("s"))
     content = parquet(a=times, b=STATES[:, 0], action=ACTIONS)
+    assert read_demonstrations(content, "demo.parquet").feature_names == ("b",)
     columns = ColumnMap(("a", "b"), ("action",), feature_names=("clock", "gap"))
-    read = read_demonstrations(content, "demo.parquet", columns=columns)
-    assert read.feature_names == ("gap",)
-    columns = ColumnMap(("a",), ("action",))
-    with pytest.raises(InputError, match="no feature beside 'a', which hold times"):
+    with pytest.raises(InputError, match=r"'a' holds '1970-01-01 .*' in row 1, which is a time"):
         read_demonstrations(content, "demo.parquet", columns=columns)
+    with pytest.raises(InputError, match="no feature beside 'a', which hold times"):
+        read_demonstrations(parquet(a=times, action=ACTIONS), "demo.parquet")
 
 
 def test_a_list_that_is_missing_is_an_empty_field_of_that_row() -> None:

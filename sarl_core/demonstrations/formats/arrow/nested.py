@@ -31,6 +31,27 @@ class Leaf:
     widths: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class TableOfLeaves:
+    """A table of Arrow, whose columns always have names.
+
+    Attributes:
+        leaves: Where each column stands in it: itself, or in a list or an object in one.
+    """
+
+    leaves: Mapping[str, Leaf]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.leaves)
+
+    @property
+    def named(self) -> bool:
+        """Always."""
+        return True
+
+
 def leaves_of(column: str, kind: Any, first: Any = None) -> dict[str, Leaf]:
     """The columns of single values in a column.
 

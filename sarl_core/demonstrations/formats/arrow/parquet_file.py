@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.arrow.nested import (
     Leaf,
+    TableOfLeaves,
     few_leaves,
     has_lists,
     leaf_type,
@@ -44,30 +45,18 @@ _COPIES = 4  # that Arrow has of a long text while it reads it
 
 
 @dataclass(frozen=True)
-class ParquetTable:
+class ParquetTable(TableOfLeaves):
     """An opened Parquet file.
 
     Attributes:
-        leaves: Where each column stands in the file: itself, or in a list or an object in one.
         metadata: What the file says besides.
         file: The ``pyarrow.parquet.ParquetFile``.
         data: The whole file.
     """
 
-    leaves: Mapping[str, Leaf]
     metadata: Metadata
     file: Any
     data: memoryview
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.leaves)
-
-    @property
-    def named(self) -> bool:
-        """Columns of Parquet always have names."""
-        return True
 
     def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.

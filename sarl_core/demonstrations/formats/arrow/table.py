@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from sarl_core.demonstrations.formats.arrow.messages import unpacked_size
 from sarl_core.demonstrations.formats.arrow.nested import (
     Leaf,
+    TableOfLeaves,
     few_leaves,
     leaves_of,
     refuse_nested,
@@ -27,28 +27,16 @@ _FILE_START = 8  # bytes before the stream that a file holds
 
 
 @dataclass(frozen=True)
-class ArrowTable:
+class ArrowTable(TableOfLeaves):
     """A table of Arrow that is in memory.
 
     Attributes:
-        leaves: Where each column stands in it: itself, or in a list or an object in one.
         table: The ``pyarrow.Table``.
         metadata: What the file says besides.
     """
 
-    leaves: Mapping[str, Leaf]
     table: Any
     metadata: Metadata
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return tuple(self.leaves)
-
-    @property
-    def named(self) -> bool:
-        """Columns of Arrow always have names."""
-        return True
 
     def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.
