@@ -16,8 +16,8 @@ from sarl_core import (
     load_demonstrations,
     mine_rules,
 )
-from sarl_core.agents.agent import make_agent
 from sarl_core.agents.mlp_policy import MlpPolicy
+from sarl_core.rollouts.agents import make_agent
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO

@@ -1,5 +1,4 @@
 # The public names, each with its home: what is loaded when, and what type checkers see.
-from .agents.agent import make_agent as make_agent
 from .auditing.audit import Audit as Audit
 from .auditing.audit import audit as audit
 from .demonstrations.dataset import Demonstrations as Demonstrations
@@ -21,6 +20,7 @@ from .mining.thresholds.landscape import threshold_landscape as threshold_landsc
 from .mining.tree import PolicyTree as PolicyTree
 from .mining.tree import grow_policy_trees as grow_policy_trees
 from .rendering.replay import render_episode as render_episode
+from .rollouts.agents import make_agent as make_agent
 from .rollouts.episodes import Episodes as Episodes
 from .rollouts.episodes import rollout as rollout
 from .rollouts.recording import record as record

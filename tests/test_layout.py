@@ -100,7 +100,8 @@ def test_what_tests_and_benchmarks_import_is_pinned():
 def test_the_lower_ends_that_are_tested_are_those_of_the_ranges():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    ranges = [*project["dependencies"], *extras["learning"], *extras["onnx"], *extras["video"]]
+    del extras["dashboard"]  # there is one Streamlit
+    ranges = [*project["dependencies"], *(line for extra in extras.values() for line in extra)]
     lowest = pins("requirements-lowest.txt")
     for line in ranges:
         name, least = re.match(r"([\w-]+)(?:\[\w+\])?>=([\d.]+)", line).groups()
@@ -205,6 +206,19 @@ def test_no_folder_holds_more_files_than_one_finds_something_in():
     counts = Counter(folder.as_posix() for folder, _ in things)
     assert len(counts) > 40
     assert {name: count for name, count in counts.items() if count > 20} == {}
+
+
+def test_one_loop_steps_environments():
+    """The player's; what a wrapper passes on is no loop."""
+    stepping = {
+        path.relative_to(ROOT).as_posix()
+        for path in python_files()
+        if path.relative_to(ROOT).parts[0] in PRODUCT
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        if re.fullmatch(r"(.+\.)?env\.step", ast.unparse(node.func))
+    }
+    assert stepping == {"sarl_core/rollouts/player.py", "sarl_core/shielding/wrappers.py"}
 
 
 PAGES = [path for path in sorted((ROOT / "pages").glob("*.py")) if path.name != "_router.py"]

@@ -6,15 +6,15 @@ not depend on what runs beside it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.driver import Driver
-from sarl_core.agents.mlp_policy import MlpPolicy, Normalisation
+from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
@@ -22,12 +22,12 @@ from sarl_core.environments.feature_order import NamedFeatures, line_up, only_co
 from sarl_core.errors import InputError, require
 from sarl_core.shipped import DATA
 
+if TYPE_CHECKING:
+    from sarl_core.agents.sb3_normalisation import TrainingEnd
+
 EXPERT_FOLDER = DATA / "experts"
 _SCRIPTED = {"Driving-v0": Driver}
 
-_FAR = 8.0  # standard deviations
-_ODD_SHARE = 0.1  # of the states; features that hardly vary in training may jump now and then
-_TRIED_EPISODES, _TRIED_STEPS = 4, 50
 _SMALLEST_UNIFORM = 1e-12  # the quantile of 0 would be infinite
 
 
@@ -81,6 +81,7 @@ class PolicyAgent:
             without a distribution (DQN, TD3) always does the same.
         label_first: Action that label 0 stands for, shape (m,).
         notes: Sentences on how its file was read, and on what looks odd in it.
+        doubt: What leaves open whether its observations were normalised in its training, or None.
     """
 
     name: str
@@ -88,6 +89,7 @@ class PolicyAgent:
     stochastic: bool
     label_first: NDArray[np.int64]
     notes: tuple[str, ...] = ()
+    doubt: TrainingEnd | None = None
 
     @property
     def n_uniforms(self) -> int:
@@ -156,7 +158,7 @@ class UniformAgent:
         return cast(NDArray[np.float32], np.clip(actions, self.low, self.high))
 
 
-def make_agent(
+def untried_agent(
     spec: str | Path | Agent,
     env_id: EnvironmentOrId,
     *,
@@ -164,18 +166,14 @@ def make_agent(
     seed: int = 0,
     normalise: str | Path | None = None,
 ) -> Agent:
-    """Make the agent that a name or a file stands for.
+    """Make the agent that a name or a file stands for, without a step in its environment.
 
     Args:
-        spec: ``novice`` (uniform random actions), ``untrained`` (fresh PPO weights, sampled),
-            ``expert`` (the shipped one of this environment), the path of an `.npz` policy or
-            of a Stable-Baselines3 `.zip` with an `MlpPolicy`; an agent is given back as it is.
+        spec: As in `rollouts.agents.make_agent`, like the rest.
         env_id: What ``gymnasium.make`` takes.
         stochastic: Whether a trained policy is sampled.
-        seed: Of the untrained weights; the same seed gives the same weights.
-        normalise: Of a `.zip` that was trained under `VecNormalize`: the `.pkl` with its
-            statistics, or ``none`` where its observations were not normalised. Found beside
-            the `.zip` where not given and the name leaves no doubt.
+        seed: Of the untrained weights.
+        normalise: The statistics of a `.zip`, or ``none``.
 
     Returns:
         The agent.
@@ -205,23 +203,21 @@ def make_agent(
     if spec == "untrained":
         return PolicyAgent("untrained", _untrained(env_id, seed), True, first)
     notes: tuple[str, ...] = ()
+    doubt = None
     if spec == "expert":
         if scripted := _SCRIPTED.get(_own_id(env_id)):
             return scripted()
         name, policy = "expert", _expert(str(env_id))
     else:
         name = Path(spec).stem
-        policy, notes = _policy_from(Path(spec), env_id, normalise)
+        policy, notes, doubt = _policy_from(Path(spec), env_id, normalise)
     _check_fit(str(spec), policy, env_id)
     if stochastic and policy.noise_by_state:
         raise InputError(
             f"the policy {spec} explored by noise that hangs on the state (gSDE), which is not "
             "read; leave out --stochastic"
         )
-    agent = PolicyAgent(name, policy, stochastic, first, notes)
-    if policy.normalisation is not None and spec != "expert":
-        return replace(agent, notes=(*notes, *_unlike(agent, policy.normalisation, env_id)))
-    return agent
+    return PolicyAgent(name, policy, stochastic, first, notes, doubt)
 
 
 def shipped_experts(folder: Path = EXPERT_FOLDER) -> dict[str, Path]:
@@ -304,7 +300,7 @@ def _expert(env_id: str) -> MlpPolicy:
 
 def _policy_from(
     path: Path, env_id: EnvironmentOrId, normalise: str | Path | None
-) -> tuple[MlpPolicy, tuple[str, ...]]:
+) -> tuple[MlpPolicy, tuple[str, ...], TrainingEnd | None]:
     if path.suffix.lower() not in (".npz", ".zip"):
         raise InputError(
             f"there is no agent {str(path)!r}; give novice, untrained, expert, or the path of "
@@ -313,56 +309,12 @@ def _policy_from(
     if not path.is_file():
         raise InputError(f"the policy {path} does not exist; check the path")
     if path.suffix.lower() == ".npz":
-        return MlpPolicy.load(path), ()
+        return MlpPolicy.load(path), (), None
     from sarl_core.agents.sb3_zip import load_sb3_zip
 
     env = make_environment(env_id)
     try:
         return load_sb3_zip(path, env, str(env_id), normalise=normalise)
-    finally:
-        env.close()
-
-
-def _unlike(
-    agent: PolicyAgent, normalisation: Normalisation, env_id: EnvironmentOrId
-) -> tuple[str, ...]:
-    """Say so where the first states that a policy meets are unlike those of its statistics."""
-    states = _first_states(agent, env_id)
-    far = np.abs(normalisation.deviations(states)) > _FAR
-    share = float(far.any(axis=1).mean())
-    if not share > _ODD_SHARE:
-        return ()
-    i = int(far.mean(axis=0).argmax())
-    names = describe_environment(env_id).feature_names
-    return (
-        f"the policy {agent.name} meets states in {env_id} unlike those that it was trained on: "
-        f"{share:.0%} of its first {len(states)} lie more than {_FAR:g} standard deviations from "
-        f"the mean of its training (most often in {names[i]}); check that its statistics and "
-        "this environment belong to it",
-    )
-
-
-def _first_states(agent: PolicyAgent, env_id: EnvironmentOrId) -> NDArray[np.float32]:
-    """Some states that an agent meets, from the start of a few episodes, shape (n, d)."""
-    from sarl_core.agents.spaces import adapt
-
-    env = make_environment(env_id)
-    try:
-        adapter, rows = adapt(env), []
-        for seed in range(_TRIED_EPISODES):
-            observation, over = env.reset(seed=seed)[0], False
-            for _ in range(_TRIED_STEPS):
-                rows.append(adapter.flat(observation))
-                if over or not np.isfinite(rows[-1]).all():
-                    break
-                chosen = agent.policy.act(rows[-1][None]) + (
-                    agent.label_first if agent.policy.is_discrete else 0
-                )
-                observation, _, terminated, truncated, _ = env.step(
-                    adapter.native(adapter.shaped(chosen)[0])
-                )
-                over = terminated or truncated
-        return np.array(rows, dtype=np.float32)
     finally:
         env.close()
 

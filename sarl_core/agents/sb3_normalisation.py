@@ -8,6 +8,7 @@ with a buffer keeps the last observations and those before them, and these show 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,49 +23,59 @@ from sarl_core.errors import InputError
 
 AS_THEY_ARE = "none"  # in the place of statistics: observations were not normalised
 
-_TRIED_EPISODES, _TRIED_STEPS = 4, 50
-_LONGEST = 4.0  # a step in training, in the longest of some random ones
-_SPREAD = 4.0  # of most normalised values, from one side to the other
-_BY_CHANCE = 0.02
+
+@dataclass(frozen=True, eq=False)
+class TrainingEnd:
+    """What a model met last, where nothing else tells whether its observations were normalised.
+
+    Attributes:
+        path: The model.
+        before: Its last observations but one, shape (environments, d); None where not known.
+        last: The next ones, likewise.
+    """
+
+    path: Path
+    before: NDArray[np.float64] | None
+    last: NDArray[np.float64] | None
 
 
 def find_statistics(
-    path: Path, training: TrainingRecord, given: str | Path | None, env: Any
-) -> tuple[Normalisation | None, str]:
+    path: Path, training: TrainingRecord, given: str | Path | None, space: Any
+) -> tuple[Normalisation | None, str, TrainingEnd | None]:
     """Find the statistics of a model's observations.
 
     Args:
         path: The model.
         training: What it tells.
         given: The file with its statistics, ``none`` where it had none, or None to look for it.
-        env: The environment; some steps are made in it where that helps to tell.
+        space: The environment's observations.
 
     Returns:
-        The statistics, or None; and a sentence on where they are from or what is not clear, or "".
+        The statistics, or None; a sentence on where they are from, or ""; and, where neither the
+        model nor a file tells whether there are any, what leaves it open.
 
     Raises:
         InputError: If it had statistics and they are not there, or if a file cannot be read.
     """
     if given is not None and str(given) == AS_THEY_ARE:
-        return None, ""
-    normalised = _is_normalised(training, env.observation_space)
+        return None, "", None
+    normalised = _is_normalised(training, space)
     if given is not None:
         statistics = load_statistics(Path(given))
         if statistics is None:
-            return None, f"{given} says that the observations of {path} were not normalised"
+            return None, f"{given} says that the observations of {path} were not normalised", None
         unasked = normalised is False or (
             normalised is None and not _explains(statistics, training)
         )
-        return statistics, (
+        note = (
             f"{path} does not look as if it was trained under this VecNormalize; observations "
             f"are normalised by {given} all the same"
-            if unasked
-            else ""
         )
+        return statistics, note if unasked else "", None
     if normalised is False:
-        return None, ""
+        return None, "", None
     if normalised is None:
-        return _explaining(path, training, env)
+        return _explaining(path, training)
     file = _beside(path)
     if file is None:
         raise InputError(
@@ -74,12 +85,14 @@ def find_statistics(
         )
     statistics = load_statistics(file)
     if statistics is None:
-        return None, f"{file} says that the observations of {path} were not normalised"
-    return statistics, f"observations are normalised by {file}, which lies beside {path.name}"
+        return None, f"{file} says that the observations of {path} were not normalised", None
+    return statistics, _beside_text(file, path), None
 
 
 def _is_normalised(training: TrainingRecord, space: Any) -> bool | None:
     """Whether a model was trained under a VecNormalize; None where it does not tell."""
+    from gymnasium.spaces import Box
+
     if not training.originals:
         return False
     if training.policy_class is not None and training.policy_class not in WITH_BUFFER:
@@ -92,33 +105,29 @@ def _is_normalised(training: TrainingRecord, space: Any) -> bool | None:
         return None
     if np.array_equal(training.last, training.original):
         return False
+    if not isinstance(space, Box) and training.last.shape[1:] == space.shape:
+        return False  # a VecNormalize takes boxes only
     beyond = [outside(rows, space) for rows in (training.last, training.original)]
     if beyond[0] is not None and beyond[1] is None:
         return True
     return None
 
 
-def _explaining(path: Path, training: TrainingRecord, env: Any) -> tuple[Normalisation | None, str]:
+def _explaining(
+    path: Path, training: TrainingRecord
+) -> tuple[Normalisation | None, str, TrainingEnd | None]:
     """The statistics beside a model that make of its last observations what it says it saw."""
     for file in (*_own_names(path), *_shared_names(path)):
         if not file.is_file():
             continue
         statistics = load_statistics(file)
         if statistics is not None and _explains(statistics, training):
-            return (
-                statistics,
-                f"observations are normalised by {file}, which lies beside {path.name}",
-            )
-    likely = _is_a_step(training, env)
-    if likely:
-        return None, ""
-    advice = (
-        "if it was trained under a VecNormalize, it acts wrongly here: give the .pkl that "
-        f"VecNormalize.save() wrote (--normalise FILE; {AS_THEY_ARE} if it was not)"
-    )
-    if likely is None:
-        return None, f"{path} does not tell whether its observations were normalised; {advice}"
-    return None, f"{path}: what it saw last in its training is no step of this one; {advice}"
+            return statistics, _beside_text(file, path), None
+    return None, "", TrainingEnd(path, training.original, training.last)
+
+
+def _beside_text(file: Path, path: Path) -> str:
+    return f"observations are normalised by {file}, which lies beside {path.name}"
 
 
 def _explains(statistics: Normalisation, training: TrainingRecord) -> bool:
@@ -130,49 +139,6 @@ def _explains(statistics: Normalisation, training: TrainingRecord) -> bool:
         return False
     made = np.clip(statistics.deviations(original), -statistics.clip, statistics.clip)
     return bool((np.abs(made - last) <= 0.1 + 0.05 * np.abs(last)).all())
-
-
-def _is_a_step(training: TrainingRecord, env: Any) -> bool | None:
-    """Whether a model's last observation but one and its last are a step of an environment.
-
-    A step is not much longer than the longest of some random ones, in each feature, or leads to
-    where episodes start. None where normalised values would often pass for one.
-    """
-    last, before = training.last, training.original
-    if last is None or before is None or last.shape != before.shape or last.ndim != 2:
-        return None
-    if last.shape[1:] != env.observation_space.shape:
-        return None
-    starts, steps = _random_steps(env)
-    reach = _LONGEST * np.max(steps, axis=0) + 1e-3
-    low, high = np.min(starts, axis=0), np.max(starts, axis=0)
-    width = high - low + 1e-3
-    starting = ((last >= low - width) & (last <= high + width)).all(axis=1)
-    stepping = (np.abs(last - before) <= reach).all(axis=1)
-    if not (starting | stepping).all():
-        return False
-    by_chance = np.where(
-        stepping,
-        np.minimum(1.0, 2.0 * reach / _SPREAD).prod(),
-        np.minimum(1.0, 3.0 * width / _SPREAD).prod(),
-    )
-    return True if by_chance.prod() <= _BY_CHANCE else None
-
-
-def _random_steps(env: Any) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-    """Where episodes start, and how far random actions lead in a step, feature by feature."""
-    env.action_space.seed(0)
-    starts, steps = [], []
-    for seed in range(_TRIED_EPISODES):
-        now, over = np.array(env.reset(seed=seed)[0], np.float64), False
-        starts.append(now)
-        for _ in range(_TRIED_STEPS):
-            if over:
-                break
-            observed, _, terminated, truncated, _ = env.step(env.action_space.sample())
-            now, then, over = np.array(observed, np.float64), now, terminated or truncated
-            steps.append(np.abs(now - then))
-    return starts, steps
 
 
 def _own_names(path: Path) -> list[Path]:

@@ -18,7 +18,7 @@ from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.agents.plain_pickle import MAX_BYTES
 from sarl_core.agents.policy_files import MAX_POLICY_BYTES, check_unpacked_size
 from sarl_core.agents.sb3_data import check_actions, odd_observations, read_data
-from sarl_core.agents.sb3_normalisation import find_statistics
+from sarl_core.agents.sb3_normalisation import TrainingEnd, find_statistics
 from sarl_core.agents.sb3_settings import read_settings
 from sarl_core.agents.sb3_weights import policy_from_state
 from sarl_core.agents.spaces import label_counts
@@ -31,7 +31,7 @@ _MAX_STRUCTURE = 2**20  # bytes that say which weights there are; some kilobytes
 
 def load_sb3_zip(
     path: str | Path, env: Any, env_id: str, *, normalise: str | Path | None = None
-) -> tuple[MlpPolicy, tuple[str, ...]]:
+) -> tuple[MlpPolicy, tuple[str, ...], TrainingEnd | None]:
     """Read the policy of a `.zip` that Stable-Baselines3 or its contrib saved.
 
     Args:
@@ -42,7 +42,8 @@ def load_sb3_zip(
             were not normalised; looked for beside the file where not given.
 
     Returns:
-        The policy, in NumPy; and sentences on what was found, and on what looks odd.
+        The policy, in NumPy; sentences on what was found, and on what looks odd; and what leaves
+        open whether its observations were normalised, or None.
 
     Raises:
         InputError: If the file is no such zip, is too large, holds anything but weights where
@@ -78,7 +79,7 @@ def load_sb3_zip(
             f"{path} does not name the class of its policy; it was read as the one whose weights "
             "have these names"
         )
-    statistics, note = find_statistics(source, training, normalise, env)
+    statistics, note, doubt = find_statistics(source, training, normalise, env.observation_space)
     if statistics is not None and len(statistics.mean) != policy.n_features:
         raise InputError(
             f"{path} takes {policy.n_features} features, and the statistics given with it or "
@@ -86,7 +87,7 @@ def load_sb3_zip(
         )
     odd = odd_observations(training, env.observation_space, env_id)
     notes += [each for each in (note, f"{path}: {odd}" if odd else "") if each]
-    return replace(policy, normalisation=statistics), tuple(notes)
+    return replace(policy, normalisation=statistics), tuple(notes), doubt
 
 
 def _entries(path: Path) -> tuple[bytes, bytes]:

@@ -39,8 +39,9 @@ def read_agent(
     Raises:
         InputError: If there is no such agent, or it does not fit the environment.
     """
-    from sarl_core.agents.agent import PolicyAgent, make_agent
+    from sarl_core.agents.agent import PolicyAgent
     from sarl_core.agents.own import is_own, own_agent
+    from sarl_core.rollouts.agents import make_agent
 
     if is_own(agent) and normalise is None:
         return own_agent(agent, env_id, stochastic=stochastic)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.environment import EnvironmentOrId
@@ -32,6 +32,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.choices import check_choice, mean_score, scores
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
 from sarl_core.rollouts.player import EpisodeFaultError

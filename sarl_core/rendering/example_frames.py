@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
@@ -24,6 +24,7 @@ from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rendering.camera import no_display, picture_of, picture_speed
 from sarl_core.rendering.film import Palette
 from sarl_core.rendering.repeating import Repeating
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout, run_seeds
 from sarl_core.rollouts.player import View, check_environment
 from sarl_core.rollouts.seeds import FRESH

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, require_whole
@@ -26,6 +26,7 @@ from sarl_core.rendering.film import Film, Palette
 from sarl_core.rendering.gif_and_mp4 import gif_bytes
 from sarl_core.rendering.overlay import Caption, Panel, side_by_side_picture
 from sarl_core.rendering.replay import DescribeRule, Replay, sentences
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
 from sarl_core.shielding.shield import BatchDecision, Shield

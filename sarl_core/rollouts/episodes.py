@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, EpisodicAgent, make_agent
+from sarl_core.agents.agent import Agent, EpisodicAgent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import ends_tell, failed
 from sarl_core.errors import SarlError, require_whole
@@ -26,6 +26,7 @@ from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.failures import safety_facts
 from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
 from sarl_core.rollouts.statistics import (

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, require_whole
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.player import EpisodeArrays, EpisodeFaultError, play
 from sarl_core.rollouts.statistics import rate_of

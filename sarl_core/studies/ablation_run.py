@@ -13,11 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require_whole
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use

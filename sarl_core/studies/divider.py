@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.agents.spaces import Actions
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -31,6 +31,7 @@ from sarl_core.mining.quantisation import (
     snap,
 )
 from sarl_core.progress import Progress, report
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, rollout
 
 

@@ -14,16 +14,11 @@ import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.agents import agent as library
-from sarl_core.agents.agent import (
-    EXPERT_FOLDER,
-    Agent,
-    PolicyAgent,
-    make_agent,
-    shipped_experts,
-)
+from sarl_core.agents.agent import EXPERT_FOLDER, Agent, PolicyAgent, shipped_experts
 from sarl_core.agents.own import OwnAgent, own_agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, quoted
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.shielding.shield import Projection
 from sarl_dashboard.cache import cached

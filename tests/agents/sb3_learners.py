@@ -9,7 +9,8 @@ import sb3_contrib
 import stable_baselines3
 import torch
 
-from sarl_core.agents.agent import PolicyAgent, make_agent
+from sarl_core.agents.agent import PolicyAgent
+from sarl_core.rollouts.agents import make_agent
 
 CART, PENDULUM = "CartPole-v1", "Pendulum-v1"
 SMALL = {"net_arch": [16, 16]}

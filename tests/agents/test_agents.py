@@ -5,10 +5,11 @@ import gymnasium
 import numpy as np
 import pytest
 
-from sarl_core.agents.agent import make_agent, shipped_experts
+from sarl_core.agents.agent import shipped_experts
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 
 

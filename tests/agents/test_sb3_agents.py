@@ -17,10 +17,11 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import FlattenExtractor
 
 from sarl_core.agents.activations import TORCH_CLASSES
-from sarl_core.agents.agent import PolicyAgent, make_agent
+from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError
 from sarl_core.learning.experts import export_policy
+from sarl_core.rollouts.agents import make_agent
 from tests.agents.sb3_learners import (
     CART,
     OFF_POLICY,

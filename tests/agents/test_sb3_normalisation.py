@@ -9,9 +9,10 @@ import pytest
 from gymnasium.wrappers import NormalizeObservation, RescaleAction
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from sarl_core.agents.agent import PolicyAgent, make_agent
+from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import make_agent
 from tests.agents.sb3_learners import (
     CART,
     OFF_POLICY,
@@ -144,13 +145,27 @@ def test_a_learner_with_a_buffer_without_its_statistics_does_not_pass_in_silence
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("env_id", [CART, "MountainCar-v0", "LunarLander-v3"])
+@pytest.mark.parametrize("env_id", [CART, "MountainCar-v0", "LunarLander-v3", "FrozenLake-v1"])
 def test_a_learner_with_a_buffer_that_saw_what_there_was_is_read_without_a_word(
     env_id: str, seed: int, tmp_path: Path
 ) -> None:
     idle = {**OFF_POLICY, "learning_starts": 1000}
     model = learner("DQN", env_id, steps=150 + 40 * seed, **idle)
     assert read(model, tmp_path, env_id).notes == ()
+
+
+def test_an_environment_that_fails_says_so_where_it_is_played_in(tmp_path: Path) -> None:
+    """And not where an agent is tried in it."""
+    idle = {**OFF_POLICY, "learning_starts": 1000}
+    model = learner("DQN", normalising(CART), steps=150, **idle)
+    gymnasium.register("toy/FallsAtOnce-v0", lambda: Fails(gymnasium.make(CART)))
+    notes = read(model, tmp_path, "toy/FallsAtOnce-v0").notes
+    assert any("does not tell whether its observations were normalised" in one for one in notes)
+
+
+class Fails(gymnasium.Wrapper[Any, Any, Any, Any]):
+    def step(self, action: Any) -> Any:
+        raise OSError("the track is closed")
 
 
 def test_statistics_of_another_task_are_refused_or_said(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import pytest
 import torch
 from stable_baselines3 import DQN, PPO
 
-from sarl_core.agents.agent import make_agent
 from sarl_core.errors import InputError
+from sarl_core.rollouts.agents import make_agent
 
 
 class Boom:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarl_core.agents.agent import make_agent
 from sarl_core.agents.driver import Driver
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.rendering.camera import no_display, picture_of
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 
 NAMES = describe_environment("Driving-v0").feature_names

@@ -119,7 +119,7 @@ def environment() -> Any:
 def read_model(data: bytes) -> None:
     with tempfile.NamedTemporaryFile(suffix=".zip") as file:
         Path(file.name).write_bytes(data)
-        policy, _ = load_sb3_zip(file.name, environment(), "CartPole-v1")
+        policy, _, _ = load_sb3_zip(file.name, environment(), "CartPole-v1")
     with np.errstate(over="ignore", invalid="ignore"):
         policy.act(np.zeros((2, policy.n_features), np.float32), None)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sarl_core import InputError, load_demonstrations
-from sarl_core.agents.agent import EXPERT_FOLDER, make_agent
+from sarl_core.agents.agent import EXPERT_FOLDER
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
@@ -18,6 +18,7 @@ from sarl_core.improving.refinement import _ranks, refine
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import REPORT, ROUNDS
 from sarl_core.shielding.shield import Shield

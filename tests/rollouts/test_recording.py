@@ -3,9 +3,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sarl_core.agents.agent import make_agent
 from sarl_core.errors import InputError
 from sarl_core.progress import CancelledError
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.recording import record
 

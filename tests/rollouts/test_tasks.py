@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, make_agent
+from sarl_core.agents.agent import Agent
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.processes import Processes
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.tasks import Task, run_tasks

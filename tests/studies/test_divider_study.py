@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sarl_core.agents.agent import make_agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.quantisation import quantise
 from sarl_core.progress import CancelledError
+from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.recording import record
 from sarl_core.studies.divider import DividerStudy, snapped_agents, study_divider

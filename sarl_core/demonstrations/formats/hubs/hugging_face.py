@@ -18,7 +18,6 @@ from sarl_core.errors import InputError
 
 STATE = "state.json"
 INFO = "dataset_info.json"
-_SPLITS = "dataset_dict.json"
 
 
 def hugging_face_root(files: FileSet) -> str | None:
