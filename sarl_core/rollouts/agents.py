@@ -59,7 +59,7 @@ def make_agent(
     notes = agent.notes
     if agent.doubt is not None:
         notes += _undecided(agent.doubt, env_id)
-    if agent.policy.normalisation is not None:
+    if agent.policy.normalisation is not None and spec != "expert":  # whose environment is known
         notes += _unlike(agent, agent.policy.normalisation, env_id)
     return replace(agent, notes=notes, doubt=None)
 
