@@ -14,7 +14,7 @@ from sarl_dashboard.state.compact_set import chosen_compact
 from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
-from sarl_dashboard.views.thresholds.controls import NARROW_JUMPS, show_controls
+from sarl_dashboard.views.thresholds.controls import show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
 from sarl_dashboard.views.thresholds.divider import show_divider
 from sarl_dashboard.views.thresholds.maps import show_maps, show_surfaces
@@ -26,7 +26,6 @@ demonstrations = require_demonstrations()
 trees = grown_trees(demonstrations, chosen_divider())
 compact = chosen_compact(demonstrations)
 take_over()
-st.html(NARROW_JUMPS)
 st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "
     "have done the same in at least a certain share of those (confidence)."

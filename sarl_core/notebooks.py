@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 MOST_ROWS = 30
 """Of a table in a notebook; what is more is counted."""
-
-_TABLE = """\
-<p>{{ caption }}</p>
-<table>
-<thead><tr>{% for name in header %}<th>{{ name }}</th>{% endfor %}</tr></thead>
-<tbody>
-{% for row in rows %}<tr>{% for cell in row %}<td>{{ cell }}</td>{% endfor %}</tr>
-{% endfor %}</tbody>
-</table>
-{% if more %}<p>and {{ "{:,}".format(more) }} more</p>
-{% endif %}"""
 
 
 def table_html(
@@ -33,7 +28,12 @@ def table_html(
     Returns:
         HTML.
     """
+    return _template().render(caption=caption, header=header, rows=rows, more=more)
+
+
+@cache
+def _template() -> Template:
     from jinja2 import Environment
 
-    table = Environment(autoescape=True).from_string(_TABLE)
-    return table.render(caption=caption, header=header, rows=rows, more=more)
+    text = Path(__file__).with_suffix(".html.j2").read_text(encoding="utf-8")
+    return Environment(autoescape=True).from_string(text)

@@ -75,14 +75,7 @@ class Offers:
     @classmethod
     def from_text(cls, text: str) -> Offers:
         """Read what `to_text` wrote; nothing is offered by an empty text."""
-        document = json.loads(text) if text else {"environments": [], "agents": []}
-        return cls(
-            tuple(
-                Environment(**{**one, "wrappers": tuple(one["wrappers"])})
-                for one in document["environments"]
-            ),
-            tuple((name, spec) for name, spec in document["agents"]),
-        )
+        return conformed(parse_json(text), cls) if text else cls()
 
     @classmethod
     def of_process(cls) -> Offers:

@@ -86,7 +86,7 @@ class Environment:
     @property
     def keywords(self) -> dict[str, Any]:
         """The arguments, as ``gymnasium.make`` takes them."""
-        return dict(json.loads(self.arguments))
+        return dict(parse_json(self.arguments))
 
 
 EnvironmentOrId: TypeAlias = str | Environment

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.figures.replay import Timeline
 from sarl_core.explaining.html.step_card import legend
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text
+from sarl_dashboard.components.places import placed
 
 
 def show_legend(dimensions: tuple[LabelledDimension, ...], *, marks: str = "") -> None:
@@ -46,22 +48,16 @@ def clicked_step(key: str) -> int | None:
     return int(step["0"] if isinstance(step, dict) else step[0])
 
 
-def mark_style(timeline: Timeline) -> str:
-    """The mark over the figures, where `at_step` puts it."""
-    return (
-        "<style>"
-        ".st-key-timeline { position: relative; }"
-        ".st-key-timeline::after { content: ''; position: absolute; z-index: 2; top: 0;"
-        f" bottom: {timeline.bottom}px; width: 2px; pointer-events: none;"
-        f" left: calc({timeline.left - 1}px"
-        f" + (100% - {timeline.left + timeline.right}px) * var(--step-x, 0));"
-        # Of the page's ink, with a rim, so that it is seen on every colour.
-        " background: currentColor;"
-        " box-shadow: 0 0 0 1px rgba(140, 150, 160, 0.6); }"
-        "</style>"
+def mark_room(timeline: Timeline) -> Markup:
+    """The room that the mark over the figures has, where `mark_at` puts it."""
+    return placed(
+        "timeline",
+        left=f"{timeline.left}px",
+        right=f"{timeline.right}px",
+        bottom=f"{timeline.bottom}px",
     )
 
 
-def mark_at(timeline: Timeline, step: int) -> str:
-    """Style that puts the mark of `mark_style` over a step."""
-    return f"<style>.st-key-timeline {{ --step-x: {timeline.place(step):.5f}; }}</style>"
+def mark_at(timeline: Timeline, step: int) -> Markup:
+    """Style that puts the mark over a step."""
+    return placed("timeline", across=f"{timeline.place(step):.5f}")

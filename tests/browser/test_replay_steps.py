@@ -75,7 +75,7 @@ def expect_step(screen: Page, step: int, steps: StepTable) -> None:
         for which in ("with rules", "without")
     ]
     mark = screen.locator(".st-key-timeline").evaluate(
-        "box => getComputedStyle(box).getPropertyValue('--step-x')"
+        "box => getComputedStyle(box).getPropertyValue('--mark-across')"
     )
     assert float(mark) == pytest.approx((step + 0.5) / max(lengths), abs=1e-4)
     chosen = screen.locator(".st-key-recorder_table tr[aria-selected='true']")

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import ast
 import re
+from pathlib import Path
 
 import jinja2
 import pytest
@@ -28,3 +30,47 @@ def test_the_style_stays_when_the_page_is_cleaned() -> None:
     found = re.fullmatch(r"\s*<style>(.*)</style>\s*", style_sheet(), re.DOTALL)
     assert found
     assert "<" not in found[1]
+
+
+ROOT = Path(__file__).resolve().parents[2]
+PRODUCT = [
+    path
+    for folder in ("sarl_core", "sarl_dashboard", "pages")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+]
+# What Plotly knows in its texts on hovering, and Streamlit in Markdown, is no HTML of ours.
+ELEMENT = re.compile(
+    r"</?(?!b>|br>|extra>)(a|div|span|p|i|b|u|em|small|style|script|table|t[dhr]|h\d|img|svg)\b[^<]*>|style=[\"']"
+)
+
+
+def test_html_stands_in_templates_and_not_in_python() -> None:
+    """But for docstrings, which say what comes out."""
+    within = {
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in PRODUCT
+        for node in ast.walk(without_docstrings(ast.parse(path.read_text(encoding="utf-8"))))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if ELEMENT.search(node.value)
+    }
+    assert within == set()
+
+
+def without_docstrings(tree: ast.Module) -> ast.Module:
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [  # type: ignore[attr-defined]
+                one
+                for one in body
+                if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))
+            ]
+    return tree
+
+
+def test_nothing_is_escaped_by_hand() -> None:
+    for path in PRODUCT:
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"unsafe_allow_html|html\.escape|markupsafe import .*escape", text), (
+            path
+        )

@@ -16,7 +16,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.log_step import show_step
-from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_style, show_legend
+from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.state.compact_set import in_force
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT
@@ -129,7 +129,7 @@ def _figures(held: Audit, rows: slice, current: int) -> None:
     show_legend(held.rule_set.actions, marks="broken")
     tracks = audit_tracks(held, rows)
     timeline = Timeline.of(tracks, rows.stop - rows.start)
-    st.html(mark_style(timeline) + mark_at(timeline, current - rows.start))
+    st.html(mark_room(timeline) + mark_at(timeline, current - rows.start))
     with st.container(key="timeline", gap="xxsmall"):
         st.plotly_chart(
             intervention_strip(tracks, step_texts(held, rows), timeline),

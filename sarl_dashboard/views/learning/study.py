@@ -14,6 +14,7 @@ from sarl_core.explaining.figures.learning import (
     curves_figure,
     outcome_figure,
 )
+from sarl_core.explaining.html.headings import term
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
 from sarl_core.learning.study_files import LearningStudy, policy_path
 from sarl_core.learning.summary import best, summarise_study
@@ -78,10 +79,7 @@ def show_study(study: LearningStudy, name: str) -> None:
     with arms:
         for summary in summaries:
             arm = summary.arm
-            st.markdown(
-                f'<span style="color:{arm_colour(arm)}">■</span> **{arm.title}.** {arm.what}',
-                unsafe_allow_html=True,
-            )
+            st.html(term(arm_colour(arm), arm.title, arm.what))
 
 
 def show_curves(study: LearningStudy, name: str) -> None:

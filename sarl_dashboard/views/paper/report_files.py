@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.errors import SarlError
+from sarl_core.explaining.templates import render
 from sarl_core.paper.report import REPORT, Entry, PaperReport, read_report
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.study import FULL_MINUTES, Drawing
@@ -109,6 +111,6 @@ def whole_page(entry: Entry) -> str:
     from sarl_core.paper.sheets import SCRIPT
 
     text = (FOLDER / entry.files["page"]).read_text(encoding="utf-8")
-    return text.replace(
-        f'<script src="{SCRIPT}"></script>', f"<script>{get_plotlyjs()}</script>", 1
-    )
+    beside = render("parts/script", source=SCRIPT, code="")
+    within = render("parts/script", source=None, code=Markup(get_plotlyjs()))
+    return text.replace(beside, within, 1)

@@ -18,6 +18,7 @@ from sarl_core.explaining.figures.replay import (
     return_figure,
     tracks,
 )
+from sarl_core.explaining.html.headings import aside
 from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.html.step_card import picture, step_card
 from sarl_core.explaining.words.replay import StepView, step_texts, step_view
@@ -25,7 +26,7 @@ from sarl_core.mining.language import counted, number_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import pace_of_played
-from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_style, show_legend
+from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.views.replay.fork import fork_section
@@ -73,7 +74,7 @@ def step_by_step(played: Played) -> None:
     if shielded:
         lines.insert(0, ReturnLine(WITH, np.cumsum(steps.reward), SHIELDED_COLOUR))
     timeline = Timeline.of(rows, max(len(line.returns) for line in lines))
-    st.html(mark_style(timeline))
+    st.html(mark_room(timeline))
     with st.container(key="timeline", gap="xxsmall"):
         st.plotly_chart(
             intervention_strip(
@@ -138,7 +139,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
             replay.png(step)
 
 
-def changes(replay: ReplayPair, current: int, mark: str) -> None:
+def changes(replay: ReplayPair, current: int, mark: Markup) -> None:
     """Ways to the changes before and after a step, and how many there are.
 
     Args:
@@ -165,10 +166,8 @@ def changes(replay: ReplayPair, current: int, mark: str) -> None:
             disabled=not len(after),
             key="next",
         )
-        st.html(
-            f'{mark}<span style="opacity:0.7;font-size:0.875rem">{len(changed):,} of '
-            f"{len(replay.steps):,} steps were changed. {flips_text(replay.main_episode)}</span>"
-        )
+        count = f"{len(changed):,} of {len(replay.steps):,} steps were changed."
+        st.html(mark + aside(f"{count} {flips_text(replay.main_episode)}"))
 
 
 def flips_text(episodes: Episodes) -> str:

@@ -19,6 +19,7 @@ from sarl_core.mining.thresholds.steps import (
     with_step,
 )
 from sarl_dashboard.components.elsewhere import elsewhere_notice
+from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
@@ -33,12 +34,6 @@ from sarl_dashboard.views.thresholds.moves import (
     use_compact,
 )
 from sarl_dashboard.views.thresholds.numbers import show_numbers
-
-# Where the sliders share a narrow row, the words between two buttons stand above them.
-NARROW_JUMPS = (
-    "<style>@media (min-width: 641px) and (max-width: 1200px) {"
-    " [class*='st-key-jumps_'] > :nth-child(2) { order: -1; flex-basis: 100%; } }</style>"
-)
 
 
 @st.fragment(key="controls")
@@ -102,9 +97,8 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
     across, down = mark_place(landscape, thresholds.support, thresholds.confidence)
-    st.html(f"<style>.st-key-maps {{ --mark-x: {across:.5f}; --mark-y: {down:.5f}; }}</style>")
-    if display.compact is not None:
-        st.html("<style>.st-key-maps [class*='st-key-box_']::after { display: none; }</style>")
+    ring = "block" if display.compact is None else "none"
+    st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))
     if table is not None:
         with table.container():
             show_largest(display, thresholds, int(point.rule_count[0, 0]))

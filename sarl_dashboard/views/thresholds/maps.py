@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import streamlit as st
 
-from sarl_core.explaining.colours import MARKER_COLOUR
 from sarl_core.explaining.figures import thresholds as figures
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape
+from sarl_dashboard.components.places import placed
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
 BARE = {"displayModeBar": False, "scrollZoom": False}
-MARK_RADIUS = 9
 
 
 def show_maps(display: Display, landscape: Landscape) -> None:
@@ -25,19 +24,13 @@ def show_maps(display: Display, landscape: Landscape) -> None:
     """
     margin = figures.MARGIN
     st.html(
-        "<style>"
-        ".st-key-maps [class*='st-key-box_'] { position: relative; }"
-        ".st-key-maps [class*='st-key-box_']::after { content: ''; position: absolute; z-index: 2;"
-        f" pointer-events: none; width: {2 * MARK_RADIUS}px; height: {2 * MARK_RADIUS}px;"
-        f" left: calc({margin['l'] - MARK_RADIUS}px"
-        f" + (100% - {margin['l'] + margin['r']}px) * var(--mark-x));"
-        f" top: calc({margin['t'] - MARK_RADIUS}px"
-        f" + {figures.HEIGHT - margin['t'] - margin['b']}px * var(--mark-y));"
-        # In a layer of its own, so that the map beneath is not painted again when it moves.
-        f" will-change: transform; border: 3px solid {MARKER_COLOUR};"
-        " box-sizing: border-box; border-radius: 50%;"
-        " box-shadow: 0 0 0 1.5px #ffffff; }"
-        "</style>"
+        placed(
+            "maps",
+            left=f"{margin['l']}px",
+            right=f"{margin['r']}px",
+            top=f"{margin['t']}px",
+            height=f"{figures.HEIGHT - margin['t'] - margin['b']}px",
+        )
     )
     with st.container(key="maps"):
         for column, layer in zip(st.columns(2), display.layers, strict=True):

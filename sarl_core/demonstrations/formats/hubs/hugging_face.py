@@ -7,17 +7,27 @@ names.
 
 from __future__ import annotations
 
+import msgspec
+
 from sarl_core.demonstrations.formats.arrow.table import arrow_table, table_of_stream
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.opened_table import Table
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.sets.episode_rows import recording_of_rows
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
-from sarl_core.documents import parse_json
+from sarl_core.documents import MisfitError, conformed, parse_json
 from sarl_core.errors import InputError
 
 STATE = "state.json"
 INFO = "dataset_info.json"
+
+
+class _DataFile(msgspec.Struct):
+    filename: str
+
+
+class _State(msgspec.Struct):
+    files: list[_DataFile] = msgspec.field(name="_data_files")
 
 
 def hugging_face_root(files: FileSet) -> str | None:
@@ -67,19 +77,13 @@ def _listed(content: memoryview) -> list[str]:
     """The files with the rows, in their order."""
     with naming(STATE):
         try:
-            said = parse_json(bytes(content))
-        except InputError:
-            raise
+            names = [one.filename for one in conformed(parse_json(bytes(content)), _State).files]
+        except MisfitError as error:
+            raise InputError("it lists no files; save the data set again") from error
         except ValueError as error:
             raise InputError(f"it is no JSON ({error}); save the data set again") from error
-        entries = said.get("_data_files") if isinstance(said, dict) else None
-        names = (
-            [entry.get("filename") if isinstance(entry, dict) else None for entry in entries or ()]
-            if isinstance(entries, list)
-            else []
-        )
-        if not names or not all(isinstance(name, str) for name in names):
+        if not names:
             raise InputError("it lists no files; save the data set again")
         if len(set(names)) < len(names):
             raise InputError("it lists a file twice; save the data set again")
-        return [str(name) for name in names]
+        return names

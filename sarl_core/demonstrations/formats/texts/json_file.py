@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import json
 import re
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
@@ -20,6 +19,9 @@ _BLOCK = 2**14  # rows that are brought into their final form at once
 _MOST_LINE = 2**24  # bytes
 _DEEPEST = 6  # objects within one another
 _NUMBER = 8  # bytes
+
+_DECODER = msgspec.json.Decoder()
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def open_json_lines(data: memoryview) -> ArrowTable:
@@ -99,17 +101,19 @@ def _rows_of_lines(data: memoryview) -> Iterator[list[Any]]:
 
 def _decoded(lines: Sequence[bytes], first: int) -> list[Any]:
     try:
-        return list(msgspec.json.Decoder().decode_lines(b"\n".join(lines)))
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        rows = []
-        for number, line in enumerate(lines, first):
-            try:  # which takes NaN too, as many programs write it
-                rows.append(json.loads(line))
-            except (ValueError, RecursionError) as error:
-                raise InputError(
-                    f"row {number} is no JSON object; write one object a line"
-                ) from error
-        return rows
+        return list(_DECODER.decode_lines(b"\n".join(lines)))
+    except _UNREADABLE:
+        return [_row(line, number) for number, line in enumerate(lines, first)]
+
+
+def _row(line: bytes, number: int) -> Any:
+    try:
+        return _DECODER.decode(line)
+    except _UNREADABLE:
+        try:  # which takes NaN too, as many programs write it
+            return parse_json(line, finite=False)
+        except ValueError as error:
+            raise InputError(f"row {number} is no JSON object; write one object a line") from error
 
 
 def _table(blocks: Iterator[list[Any]], size: int) -> ArrowTable:
