@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.figures.replay import SHIELDED_COLOUR
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import action_text, conditions_text, counted
 from sarl_core.studies.ablation import VERDICTS, Ablation, RuleEffect, Verdict
@@ -182,7 +182,14 @@ def ablation_figure(ablation: Ablation, effects: Sequence[RuleEffect]) -> go.Fig
             text=[_hover(ablation, effects[row]) for row in rows],
             hovertemplate="%{text}<extra></extra>",
         )
-    figure.update_layout(**_layout(len(effects)))
+    figure.update_layout(
+        **figure_layout(
+            max(_ROW_HEIGHT * len(effects) + 96, 180),
+            margin={"r": 24, "t": 30},
+            showlegend=True,
+            legend={"orientation": "h", "x": 0, "y": 1, "xanchor": "left", "yanchor": "bottom"},
+        )
+    )
     figure.update_xaxes(
         title={"text": "change of the return without the rule", "standoff": 2},
         fixedrange=True,
@@ -215,16 +222,3 @@ def _hover(ablation: Ablation, effect: RuleEffect) -> str:
         failed = f"{effect.failures} episodes fail without it, {ablation.base_failures} with it"
         lines.insert(2, failed)
     return "<br>".join(lines)
-
-
-def _layout(rows: int) -> dict[str, Any]:
-    return {
-        "height": max(_ROW_HEIGHT * rows + 96, 180),
-        "margin": {"l": 8, "r": 24, "t": 30, "b": 8},
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-        "showlegend": True,
-        "legend": {"orientation": "h", "x": 0, "y": 1, "xanchor": "left", "yanchor": "bottom"},
-    }

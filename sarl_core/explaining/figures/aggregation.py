@@ -15,6 +15,7 @@ from sarl_core.documents import Count, MisfitError, NotNegative, Number, Share, 
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.mining.language import share_text
 
@@ -265,8 +266,9 @@ def _mark_chosen(
 
 
 def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int) -> None:
-    figure.update_layout(**_layout(_ROUNDS_HEIGHT), showlegend=False)
-    figure.update_layout(margin={"l": 8, "r": 16, "t": 26, "b": 8})
+    figure.update_layout(
+        **figure_layout(_ROUNDS_HEIGHT, margin={"r": 16, "t": 26}, showlegend=False)
+    )
     figure.update_xaxes(
         range=[0.5, max(last, 2) + 0.5],
         tickformat="d",
@@ -343,7 +345,7 @@ def budget_figure(points: Sequence[BudgetPoint]) -> go.Figure:
         hovertemplate="at most %{x} rules: mean <b>%{y:,.1f}</b><extra></extra>",
     )
     figure.update_layout(
-        **_layout(_BUDGET_HEIGHT),
+        **figure_layout(_BUDGET_HEIGHT, margin={"r": 24}),
         showlegend=True,
         legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
     )
@@ -360,14 +362,3 @@ def budget_figure(points: Sequence[BudgetPoint]) -> go.Figure:
         title={"text": "return", "standoff": 4}, fixedrange=True, nticks=6, zeroline=False
     )
     return figure
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 24, "t": 8, "b": 8},
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

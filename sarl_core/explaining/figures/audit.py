@@ -16,6 +16,7 @@ from sarl_core.explaining.colours import (
     OUTSIDE_COLOUR,
 )
 from sarl_core.explaining.figures.replay import Timeline, Track
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import label_text
 
@@ -153,20 +154,18 @@ def feature_lines(
             showarrow=False,
         )
     figure.update_layout(
-        height=height + 8 + timeline.bottom,
-        margin={
-            "l": timeline.left,
-            "r": timeline.right,
-            "t": 8,
-            "b": timeline.bottom,
-            "autoexpand": False,
-        },
-        showlegend=False,
-        hovermode="closest",
-        hoverdistance=-1,
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+        **figure_layout(
+            height + 8 + timeline.bottom,
+            margin={
+                "l": timeline.left,
+                "r": timeline.right,
+                "t": 8,
+                "b": timeline.bottom,
+                "autoexpand": False,
+            },
+            showlegend=False,
+            hoverdistance=-1,
+        )
     )
     ticks = np.unique(np.linspace(0, len(values) - 1, min(7, len(values))).round().astype(int))
     figure.update_xaxes(

@@ -10,6 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import LABEL_COLOURS, faded
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import at_least_text
 from sarl_core.rollouts.episodes import Episodes
@@ -115,7 +116,7 @@ def returns_figure(
         )
     longest = max((len(episodes) for episodes in comparison.episodes), default=1)
     figure.update_layout(
-        **_layout(height),
+        **figure_layout(height, margin={"r": 24}),
         showlegend=True,
         legend={
             "orientation": "h",
@@ -184,7 +185,9 @@ def typical_figure(
             ),
         )
     rows = len(comparison.arms)
-    figure.update_layout(**_layout(height or 60 + _ROW_HEIGHT * rows), showlegend=False)
+    figure.update_layout(
+        **figure_layout(height or 60 + _ROW_HEIGHT * rows, margin={"r": 24}, showlegend=False)
+    )
     figure.update_xaxes(
         title={"text": "typical return (IQM, 95 % interval)", "standoff": 2},
         fixedrange=True,
@@ -218,14 +221,3 @@ def _drawn(comparison: Comparison, styles: Sequence[ArmStyle] | None) -> zip[Any
         styles or arm_styles(comparison.arms),
         strict=True,
     )
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 24, "t": 8, "b": 8},
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

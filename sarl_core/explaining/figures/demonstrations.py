@@ -13,6 +13,7 @@ from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.figures.distributions import EpisodeSeries, Histogram
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
@@ -53,7 +54,9 @@ def feature_figure(
             customdata=texts,
             hovertemplate=f"%{{customdata}}<br>{name}: %{{y:.2f}} % of the steps<extra></extra>",
         )
-    figure.update_layout(**_layout(FEATURE_HEIGHT), barmode="stack", bargap=0)
+    figure.update_layout(
+        **figure_layout(FEATURE_HEIGHT, showlegend=False), barmode="stack", bargap=0
+    )
     figure.update_xaxes(
         nticks=5,
         fixedrange=True,
@@ -89,7 +92,7 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
             hovertemplate="%{y}: %{customdata:,} steps<extra></extra>",
         )
         height = 40 + 34 * dimension.n_labels
-        figure.update_layout(**_layout(min(height, 900)))
+        figure.update_layout(**figure_layout(min(height, 900), showlegend=False))
         figure.update_xaxes(
             visible=False, range=[0, max(float(shares.max()), 1.0) * 1.25], fixedrange=True
         )
@@ -112,7 +115,9 @@ def action_figure(histogram: Histogram, dimension: LabelledDimension) -> go.Figu
         )
     for edge in dimension.inner_edges:
         figure.add_vline(x=edge, line={"color": MUTED_COLOUR, "width": 1, "dash": "dot"})
-    figure.update_layout(**_layout(ACTION_HEIGHT), barmode="stack", bargap=0)
+    figure.update_layout(
+        **figure_layout(ACTION_HEIGHT, showlegend=False), barmode="stack", bargap=0
+    )
     figure.update_xaxes(fixedrange=True, range=[histogram.edges[0], histogram.edges[-1]])
     figure.update_yaxes(nticks=4, rangemode="tozero", ticksuffix=" %", fixedrange=True)
     return figure
@@ -163,7 +168,7 @@ def episode_figure(series: EpisodeSeries, name: str, colour: str) -> go.Figure:
         text=texts,
         hovertemplate="%{text}<extra></extra>",
     )
-    figure.update_layout(**_layout(EPISODE_HEIGHT))
+    figure.update_layout(**figure_layout(EPISODE_HEIGHT, showlegend=False))
     figure.update_xaxes(title={"text": "episode", "standoff": 4}, nticks=6, fixedrange=True)
     figure.update_yaxes(nticks=5, fixedrange=True)
     if float(series.low.min()) == float(series.high.max()):
@@ -187,15 +192,3 @@ def _bin_texts(histogram: Histogram, feature: Feature) -> list[str]:
         f"{number_text(low, apart_from=high)} to {number_text(high, apart_from=low)}{suffix}"
         for low, high in pairwise(histogram.edges.tolist())
     ]
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 8, "t": 8, "b": 8},
-        "showlegend": False,
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

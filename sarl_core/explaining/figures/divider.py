@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.figures.thresholds import layer_scale
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import number_text, share_text
 from sarl_core.mining.quantisation import SNAPPINGS, Quantisation, Snapping
@@ -88,7 +88,9 @@ def occupancy_figure(divided: Sequence[Quantisation], *, dark: bool = False) -> 
             ),
         )
     first = divided[0].dimension
-    figure.update_layout(**_layout(64 + _ROW_HEIGHT * len(divided)), barmode="overlay")
+    figure.update_layout(
+        **figure_layout(64 + _ROW_HEIGHT * len(divided), showlegend=False), barmode="overlay"
+    )
     figure.update_xaxes(
         title={"text": plain(first.name), "standoff": 2},
         range=[first.edges[0], first.edges[-1]],
@@ -260,7 +262,7 @@ def _cells(
         },
         hoverinfo="skip",
     )
-    figure.update_layout(**_layout(44 + row_height * len(rows)))
+    figure.update_layout(**figure_layout(44 + row_height * len(rows), showlegend=False))
     figure.update_xaxes(side="bottom", fixedrange=True, showgrid=False, zeroline=False)
     figure.update_yaxes(
         autorange="reversed",
@@ -280,15 +282,3 @@ def _ink(place: float, *, dark: bool) -> str:
 
 def _intervals(divider: int) -> str:
     return f"{divider} intervals"
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 8, "t": 8, "b": 8},
-        "showlegend": False,
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

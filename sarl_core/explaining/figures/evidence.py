@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import plotly.graph_objects as go
@@ -14,6 +14,7 @@ from sarl_core.explaining.colours import (
     faded,
 )
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.validation.contradictions import EpisodeContradictions
 from sarl_core.mining.validation.learning_curve import MiningCurve
@@ -118,15 +119,7 @@ def contradictions_figure(episodes: Sequence[EpisodeContradictions]) -> go.Figur
 
 
 def _plain(figure: go.Figure, height: int) -> None:
-    layout: dict[str, Any] = {
-        "height": height,
-        "margin": {"l": 62, "r": 14, "t": 8, "b": 48},
-        "showlegend": False,
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }
-    figure.update_layout(**layout)
+    margin = {"l": 62, "r": 14, "b": 48}
+    figure.update_layout(**figure_layout(height, margin=margin, showlegend=False))
     figure.update_xaxes(fixedrange=True, zeroline=False)
     figure.update_yaxes(fixedrange=True, zeroline=False)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.improving.gaps import Gaps
 from sarl_core.mining.language import number_text, share_text
@@ -110,15 +111,13 @@ def gap_figure(histogram: GapHistogram, feature: Feature) -> go.Figure:
             hovertemplate=f"%{{customdata}}<br>%{{hovertext}} of the {name}<extra></extra>",
         )
     figure.update_layout(
-        height=_HEIGHT,
-        margin={"l": 44, "r": 10, "t": 6, "b": 40},
-        barmode="overlay",
-        bargap=0,
-        showlegend=False,
-        hovermode="closest",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+        **figure_layout(
+            _HEIGHT,
+            margin={"l": 44, "r": 10, "t": 6, "b": 40},
+            barmode="overlay",
+            bargap=0,
+            showlegend=False,
+        )
     )
     figure.update_xaxes(
         range=[float(edges[0]), float(edges[-1])],

@@ -14,6 +14,7 @@ from plotly.subplots import make_subplots
 from sarl_core.decimals import rounded_text
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import LearningArm
 from sarl_core.learning.study_files import LearningRun, LearningStudy
@@ -75,9 +76,8 @@ def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
             x = edges if row == 2 else (edges[:-1] + edges[1:]) / 2
             _line(figure, arm, x, values, row)
     figure.update_layout(
-        **_layout(height),
+        **figure_layout(height, margin={"r": 16}),
         showlegend=True,
-        hovermode="closest",
         legend={
             "orientation": "h",
             "x": 0,
@@ -176,7 +176,7 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
                 f"%{{y:,.0f}}<br>mean of {len(one.seeds)}<extra></extra>"
             ),
         )
-    figure.update_layout(**_layout(height), showlegend=False, hovermode="closest")
+    figure.update_layout(**figure_layout(height, margin={"r": 16}, showlegend=False))
     figure.update_xaxes(
         title={"text": "crashes while learning", "standoff": 2},
         range=[-0.02 * width, width],
@@ -249,9 +249,8 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
             )
     rows = len(summaries)
     figure.update_layout(
-        **_layout(84 + _ROW_HEIGHT * rows),
+        **figure_layout(84 + _ROW_HEIGHT * rows, margin={"r": 16}),
         showlegend=True,
-        hovermode="closest",
         legend={"orientation": "h", "x": 0, "y": 1.01, "xanchor": "left", "yanchor": "bottom"},
     )
     figure.update_xaxes(
@@ -376,13 +375,3 @@ def _places(summaries: Sequence[ArmSummary], span: float, width: float) -> list[
         options = [f"middle {side}", f"top {side}", f"bottom {side}", "bottom center"]
         places.append(next((place for place in options if place not in near), options[0]))
     return places
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 16, "t": 8, "b": 8},
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

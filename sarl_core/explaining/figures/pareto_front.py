@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.figures.thresholds import layer_scale
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.pareto import ParetoPoint
 
@@ -112,14 +113,12 @@ def front_figure(
             },
         )
     figure.update_layout(
-        height=360,
-        margin={"l": 58, "r": 20, "t": 8, "b": 50},
-        showlegend=False,
-        hovermode="closest",
-        clickmode="event+select",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+        **figure_layout(
+            360,
+            margin={"l": 58, "r": 20, "b": 50},
+            showlegend=False,
+            clickmode="event+select",
+        )
     )
     figure.update_xaxes(
         title={"text": "Number of rules"}, type="log", dtick=1, tickformat=",d", fixedrange=True

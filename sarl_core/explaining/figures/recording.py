@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import faded
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import counted, share_text
 from sarl_core.rollouts.statistics import MeanInterval
@@ -91,13 +92,11 @@ def recordings_figure(
     rows = len(values)
     axis = {"range": [-0.04, 1.06], **share_ticks(0, 1)} if share else {"nticks": 6}
     figure.update_layout(
-        height=330,
-        margin={"l": 8, "r": 24, "t": 8, "b": 8},
-        hovermode="closest",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        showlegend=False,
+        **figure_layout(
+            330,
+            margin={"r": 24},
+            showlegend=False,
+        )
     )
     figure.update_xaxes(
         title={"text": title, "standoff": 2}, fixedrange=True, zeroline=False, **axis

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.learning.relevance import Relevance
 from sarl_core.mining.language import share_text
@@ -159,13 +160,11 @@ def _numbers(values: Floats) -> NDArray[np.str_]:
 
 def _finish(figure: go.Figure, title: str, height: int, *, share: bool) -> None:
     figure.update_layout(
-        height=height,
-        margin={"l": 8, "r": 24, "t": 8, "b": 8},
-        hovermode="closest",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+        **figure_layout(
+            height,
+            margin={"r": 24},
+            legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
+        )
     )
     figure.update_xaxes(
         title={"text": "steps learned", "standoff": 2},

@@ -16,6 +16,7 @@ from sarl_core.explaining.colours import (
     OUTSIDE_COLOUR,
     label_colour,
 )
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.rollouts.steps import StepTable
@@ -214,7 +215,9 @@ def intervention_strip(
         text=list(texts) * len(tracks),
         hovertemplate="%{text}<extra></extra>",
     )
-    figure.update_layout(**_layout(_ROW_HEIGHT * len(tracks) + 12), hoverdistance=-1)
+    figure.update_layout(
+        **figure_layout(_ROW_HEIGHT * len(tracks) + 12, showlegend=False, hoverdistance=-1)
+    )
     figure.update_layout(margin=_margin(timeline, top=4, bottom=8))
     figure.update_xaxes(
         range=timeline.range,
@@ -264,7 +267,7 @@ def return_figure(lines: Sequence[ReturnLine], timeline: Timeline) -> go.Figure:
             marker={"color": line.colour, "size": 8},
             hovertemplate=f"{plain(line.name)} ends at step %{{x}} with %{{y:,.1f}}<extra></extra>",
         )
-    figure.update_layout(**_layout(176))
+    figure.update_layout(**figure_layout(176, showlegend=False))
     figure.update_layout(
         showlegend=len(lines) > 1,
         margin=_margin(timeline, top=26 if len(lines) > 1 else 8, bottom=timeline.bottom),
@@ -325,7 +328,7 @@ def comparison_figure(rows: Sequence[ReturnRow]) -> go.Figure:
                 "<extra></extra>"
             ),
         )
-    figure.update_layout(**_layout(70 + 62 * len(rows)))
+    figure.update_layout(**figure_layout(70 + 62 * len(rows), margin={"r": 12}, showlegend=False))
     figure.update_xaxes(
         title={"text": "return of an episode", "standoff": 2},
         fixedrange=True,
@@ -363,15 +366,3 @@ def _steps_of_colour(track: Track, n_labels: int) -> list[list[Any]]:
 def _margin(timeline: Timeline, *, top: int, bottom: int) -> dict[str, Any]:
     """Fixed, so that a mark laid over the figure stands where it should."""
     return {"l": timeline.left, "r": timeline.right, "t": top, "b": bottom, "autoexpand": False}
-
-
-def _layout(height: int) -> dict[str, Any]:
-    return {
-        "height": height,
-        "margin": {"l": 8, "r": 12, "t": 8, "b": 8},
-        "showlegend": False,
-        "hovermode": "closest",
-        "dragmode": False,
-        "paper_bgcolor": "rgba(0,0,0,0)",
-        "plot_bgcolor": "rgba(0,0,0,0)",
-    }

@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.figures.comparison import arm_style
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import share_text
 
@@ -65,20 +66,18 @@ def settings_figure(
             ],
         )
     figure.update_layout(
-        height=90 + _ROW_HEIGHT * len(names),
-        margin={"l": 8, "r": 24, "t": 8, "b": 8},
-        hovermode="closest",
-        dragmode=False,
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        legend={
-            "orientation": "h",
-            "x": 0,
-            "y": 1.02,
-            "xanchor": "left",
-            "yanchor": "bottom",
-            "itemwidth": 30,
-        },
+        **figure_layout(
+            90 + _ROW_HEIGHT * len(names),
+            margin={"r": 24},
+            legend={
+                "orientation": "h",
+                "x": 0,
+                "y": 1.02,
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "itemwidth": 30,
+            },
+        )
     )
     axis = (
         {"range": [-0.03, 1.06], **share_ticks(0, 1)}

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
 from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import number_text, share_text
 from sarl_core.mining.thresholds.landscape import Landscape
@@ -123,16 +124,14 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         showlegend=False,
     )
     figure.update_layout(
-        height=HEIGHT,
-        margin=MARGIN,
-        hoverdistance=-1,
-        hovermode="closest",
-        dragmode=False,
-        clickmode="event+select",
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
-        font={"size": 12},
-        showlegend=False,
+        **figure_layout(
+            HEIGHT,
+            margin=MARGIN,
+            hoverdistance=-1,
+            clickmode="event+select",
+            font={"size": 12},
+            showlegend=False,
+        )
     )
     figure.update_xaxes(**_axis("Minimum support", landscape.supports))
     figure.update_yaxes(**_axis("Minimum confidence", landscape.confidences))

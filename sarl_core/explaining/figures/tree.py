@@ -11,6 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
+from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.digits import limit_text
 from sarl_core.mining.language import label_text, query_text, share_text
@@ -66,16 +67,15 @@ def tree_figure(
     _add_path(figure, tree, path, dark=dark)
     bottom = int(tree.depth.max()) + 1
     figure.update_layout(
-        height=420,
-        shapes=[_boxes(tree, nodes, *look) for nodes, *look in kinds if len(nodes)],
-        margin={"l": 50, "r": 10, "t": 8, "b": 44},
-        showlegend=False,
-        hovermode="closest",
-        hoverdistance=30,
-        dragmode="zoom",
-        paper_bgcolor="rgba(0,0,0,0)",
-        plot_bgcolor="rgba(0,0,0,0)",
+        **figure_layout(
+            420,
+            shapes=[_boxes(tree, nodes, *look) for nodes, *look in kinds if len(nodes)],
+            margin={"l": 50, "r": 10, "b": 44},
+            showlegend=False,
+            hoverdistance=30,
+        )
     )
+    figure.update_layout(dragmode="zoom")
     figure.update_xaxes(
         range=[0, 1],
         title={"text": "Share of the states"},
