@@ -76,7 +76,7 @@ def _run(app: typer.Typer, arguments: Sequence[str]) -> int:
                 warnings.simplefilter("ignore")  # libraries warn who calls them, not the user
             code = app(
                 [argument for argument in arguments if argument != "--debug"],
-                prog_name="python -m sarl_core",
+                prog_name="sarl" if Path(sys.argv[0]).stem == "sarl" else "python -m sarl_core",
                 standalone_mode=False,
             )
         return _code(code)

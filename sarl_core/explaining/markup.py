@@ -1,4 +1,4 @@
-"""Text from outside in figures: Plotly takes every text for markup."""
+"""Lengths in markup; and texts from outside in figures, where Plotly takes all text for markup."""
 
 from __future__ import annotations
 
@@ -15,3 +15,15 @@ def plain(text: str) -> str:
         The text with "&", "<" and ">" as entities, and nothing that a template would fill in.
     """
     return escape(text, quote=False).replace("%{", "%&#123;")
+
+
+def percent(share: float) -> str:
+    """A length in CSS or SVG.
+
+    Args:
+        share: Of the whole.
+
+    Returns:
+        As "12.50%".
+    """
+    return f"{100 * share:.2f}%"

@@ -6,12 +6,13 @@ import numpy as np
 from markupsafe import Markup
 
 from sarl_core.explaining.colours import label_colour, layer_colour
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.difference import kinds_text, said_text
 from sarl_core.mining.language import counted
 from sarl_core.shielding.disagreement import Disagreement
 
-_WIDTH = 88  # percent of the table that the columns share
+_WIDTH = 0.88  # of the table, which the columns share
 
 
 def confusion_html(
@@ -54,7 +55,7 @@ def confusion_html(
         names=names,
         labels=heads,
         rows=rows,
-        width=f"{_WIDTH / size:.2f}%",  # all as wide, whatever they are called
+        width=percent(_WIDTH / size),  # all as wide, whatever they are called
         title=f"What {names[0]} says against what {names[1]} says, in numbers of states",
         caption=_caption(disagreement, dimension, names),
     )

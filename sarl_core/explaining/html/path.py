@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.tables.rule_evidence import PathStep
 from sarl_core.explaining.templates import render
 from sarl_core.mining.labels import LabelledDimension
@@ -48,7 +49,7 @@ def path_table(
             share_text(step.support),
             share_text(step.confidence) if step.samples else "–",
             [
-                (f"{name}: {share_text(share)}", f"width:{100 * share:.2f}%;background:{colour}")
+                (f"{name}: {share_text(share)}", f"width:{percent(share)};background:{colour}")
                 for (name, colour), share in zip(labels, step.shares, strict=True)
                 if share > 0
             ],

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 
 
@@ -28,11 +29,11 @@ class Scale(NamedTuple):
 
     def place(self, value: float) -> str:
         """Where a number stands, as "12.5%"."""
-        return f"{100 * (value - self.low) / (self.high - self.low):.2f}%"
+        return percent((value - self.low) / (self.high - self.low))
 
     def length(self, first: float, last: float) -> str:
         """How far it is from one number to a larger one, likewise."""
-        return f"{100 * (last - first) / (self.high - self.low):.2f}%"
+        return percent((last - first) / (self.high - self.low))
 
 
 class Axis(NamedTuple):
@@ -121,9 +122,7 @@ def area(
         For `plot`.
     """
     height = upwards.high - upwards.low
-    points = [
-        f"{across.place(x)} {100 - 100 * (y - upwards.low) / height:.2f}%" for x, y in corners
-    ]
+    points = [f"{across.place(x)} {percent(1 - (y - upwards.low) / height)}" for x, y in corners]
     first, last = across.place(corners[0][0]), across.place(corners[-1][0])
     outline = ",".join([f"{first} 100%", *points, f"{last} 100%"])
     return Part("area", f"background:{colour};clip-path:polygon({outline})")

@@ -21,6 +21,7 @@ from sarl_core.explaining.figures.tree import (
     path_queries,
     window_around,
 )
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.mining.language import counted, label_text
@@ -69,7 +70,7 @@ def place_html(
         description=f"The tree around the rule: {counted(len(path) - 1, 'condition')} lead to "
         f"{counted(int(tree.samples[node]), 'state')}, {label}",
         rows=[
-            f"top:{_share(depth - top, height)};height:{_share(_BOX, height)};"
+            f"top:{percent((depth - top) / height)};height:{percent(_BOX / height)};"
             f"background:{_gradient(tree, nodes[tree.depth[nodes] == depth], colours, window)}"
             for depth in range(top, bottom)
         ],
@@ -80,11 +81,12 @@ def place_html(
         boxes=_boxes(tree, nodes, window),
         queries=_queries(tree, path, window),
         levels=[
-            (_share(depth - top + _BOX / 2, height), depth)
+            (percent((depth - top + _BOX / 2) / height), depth)
             for depth in range(top, bottom, -(-height // _LEVELS))
         ],
         shares=[
-            (_share(tick - low, high - low), tick_text(tick)) for tick in round_ticks(low, high, 5)
+            (percent((tick - low) / (high - low)), tick_text(tick))
+            for tick in round_ticks(low, high, 5)
         ],
         note=note,
     )
@@ -129,7 +131,8 @@ def _gradient(
     stops, at = [], "0.00%"
     for begun, ended, mix in boxes:
         first_place, last_place = (
-            _share(min(max(place, left), right) - left, right - left) for place in (begun, ended)
+            percent((min(max(place, left), right) - left) / (right - left))
+            for place in (begun, ended)
         )
         if first_place != at:
             stops.append(f"#0000 0 {first_place}")
@@ -183,10 +186,10 @@ def _boxes(
         boxes.append(
             (
                 "\n".join(node_lines(tree, node)),
-                f"left:{_share(start - left, right - left)};"
-                f"width:{_share(end - start, right - left)};"
-                f"top:{_share(int(tree.depth[node]) - top, bottom - top)};"
-                f"height:{_share(_BOX, bottom - top)}",
+                f"left:{percent((start - left) / (right - left))};"
+                f"width:{percent((end - start) / (right - left))};"
+                f"top:{percent((int(tree.depth[node]) - top) / (bottom - top))};"
+                f"height:{percent(_BOX / (bottom - top))}",
             )
         )
     return boxes
@@ -217,10 +220,6 @@ def _point(tree: PolicyTree, node: int, window: tuple[int, int, int, int]) -> tu
     middle = int(tree.sample_start[node]) + int(tree.samples[node]) / 2
     down = int(tree.depth[node]) - top + _BOX / 2
     return 100 * (middle - left) / (right - left), 100 * down / (bottom - top)
-
-
-def _share(part: float, whole: float) -> str:
-    return f"{100 * part / whole:.2f}%"
 
 
 def _signed(pixels: float) -> str:

@@ -12,6 +12,7 @@ from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.path import label_key
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
@@ -125,7 +126,7 @@ def _row(
         feature.name,
         f"{now}: {_described(parts, value, feature, labels)}",
         now,
-        f"{100 * (value - low) / (high - low):.2f}%",
+        percent((value - low) / (high - low)),
         [_part(part, ends, feature, labels) for part in widest_first],
         ["no", "yes"]
         if feature.indicator is not None
@@ -147,13 +148,11 @@ def _part(
     low, high = ends
     # What ends with the bar hangs at its right, so that it stays within it however narrow it is.
     side = (
-        f"left:{100 * (start - low) / (high - low):.2f}%"
-        if end < high or start == low
-        else "right:0"
+        f"left:{percent((start - low) / (high - low))}" if end < high or start == low else "right:0"
     )
     colour = label_colour(label) if ruled else faded(label_colour(label), _PALE)
     between = f"{feature.name} {_between(start, end, feature)}"
-    width = f"{100 * (end - start) / (high - low):.2f}%"
+    width = percent((end - start) / (high - low))
     return f"{between}: {_done(part, labels)}", f"{side};width:{width};background:{colour}"
 
 

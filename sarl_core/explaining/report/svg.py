@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
+from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 
 # Of the page's own style, light or dark. The colours of actions stay those of actions.
@@ -176,34 +177,30 @@ def dot_and_interval(
     if zero and scale.low < 0 < scale.high:
         parts.append(_line(scale.place(0.0), 0, 16, "axis"))
     parts.append(_across(scale.place(low), scale.place(high), 8, "wide", colour))
-    places = {"cx": _percent(scale.place(value)), "cy": "8", "r": "4.5"}
+    places = {"cx": percent(scale.place(value)), "cy": "8", "r": "4.5"}
     parts.append(_shape("circle", places, "dot", f"fill:{colour}"))
     return _picture("bar", 16, parts)
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2f}%"
 
 
 def _box(
     start: float, end: float, y: float, height: float, css: str = "", *, fill: str = ""
 ) -> Shape:
     places = {
-        "x": _percent(start),
+        "x": percent(start),
         "y": f"{y:g}",
-        "width": _percent(max(end - start, 0.0)),
+        "width": percent(max(end - start, 0.0)),
         "height": f"{height:g}",
     }
     return _shape("rect", places, css, f"fill:{fill}" if fill else "")
 
 
 def _line(at: float, top: float, bottom: float, css: str) -> Shape:
-    place = _percent(at)
+    place = percent(at)
     return _shape("line", {"x1": place, "x2": place, "y1": f"{top:g}", "y2": f"{bottom:g}"}, css)
 
 
 def _across(start: float, end: float, y: float, css: str, colour: str = "") -> Shape:
-    places = {"x1": _percent(start), "x2": _percent(end), "y1": f"{y:g}", "y2": f"{y:g}"}
+    places = {"x1": percent(start), "x2": percent(end), "y1": f"{y:g}", "y2": f"{y:g}"}
     return _shape("line", places, css, f"stroke:{colour}" if colour else "")
 
 
