@@ -66,9 +66,10 @@ def faded(colour: str, opacity: float) -> str:
         opacity: 0 to 1.
 
     Returns:
-        As "#0072B24C".
+        As "rgba(0,114,178,0.3)", which Plotly and CSS both know.
     """
-    return f"{colour}{round(255 * opacity):02X}"
+    red, green, blue = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 def layer_colour(share: float) -> tuple[str, str]:

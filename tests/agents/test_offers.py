@@ -9,7 +9,6 @@ import pytest
 
 from sarl_core import Environment, InputError
 from sarl_core.agents.offers import Offers, read_offers
-from sarl_core.cli.app import main
 
 SETTINGS = """
 [[environments]]
@@ -78,21 +77,3 @@ def test_settings_that_say_something_else_are_refused(tmp_path: Path, text: str,
     path.write_text(text)
     with pytest.raises(InputError, match=said):
         read_offers(path)
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--env", "no_such_task:Crane-v0"], "No module named 'no_such_task'"),
-        (["--agent", "operator"], "must be NAME=module:name"),
-        (["--agent", "operator=no_such_task:operator"], "cannot be imported"),
-        (["--env", "CartPole-v1", "--env", "Pendulum-v1", "--env-args", "{}"], "belong to one"),
-        (["--env", "CartPole-v1", "--wrapper", "math:pi"], "cannot be called"),
-        (["--settings", "nothing.toml"], "cannot be read"),
-    ],
-)
-def test_what_cannot_be_offered_is_said_before_a_server_starts(
-    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["app", *options]) == 2
-    assert said in capsys.readouterr().err

@@ -9,6 +9,7 @@ import pytest
 
 from sarl_core import Environment
 from sarl_core.agents.offers import VARIABLE, Offers
+from sarl_core.cli.app import main
 from sarl_dashboard.state.environments import offers
 from tests.app.screens import errors, finished, html, metrics, open_page, run_through
 
@@ -64,3 +65,21 @@ def test_nothing_is_imported_that_is_not_offered(tmp_path: Path) -> None:
     assert f"start it with `sarl app --env {CRANE.id}`" in sentence
     app = open_page("replay", env="CartPole-v1", agent="offered_task:operator", rules="none")
     assert app.selectbox(key="agent").value == "novice"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--env", "no_such_task:Crane-v0"], "No module named 'no_such_task'"),
+        (["--agent", "operator"], "must be NAME=module:name"),
+        (["--agent", "operator=no_such_task:operator"], "cannot be imported"),
+        (["--env", "CartPole-v1", "--env", "Pendulum-v1", "--env-args", "{}"], "belong to one"),
+        (["--env", "CartPole-v1", "--wrapper", "math:pi"], "cannot be called"),
+        (["--settings", "nothing.toml"], "cannot be read"),
+    ],
+)
+def test_what_cannot_be_offered_is_said_before_a_server_starts(
+    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["app", *options]) == 2
+    assert said in capsys.readouterr().err

@@ -43,7 +43,10 @@ def test_each_number_of_a_list_is_a_column(states: Any) -> None:
 
 def test_each_entry_of_an_object_is_a_column_by_its_name() -> None:
     cars = [{"speed": float(a), "gap": {"ahead": float(b)}} for a, b, _ in STATES]
-    demonstrations = read_demonstrations(parquet(obs=cars, action=ACTIONS), "demo.parquet")
+    # Older versions of pyarrow would put what they make of objects into the order of the alphabet.
+    gap = pa.struct({"ahead": pa.float64()})
+    states = pa.array(cars, pa.struct({"speed": pa.float64(), "gap": gap}))
+    demonstrations = read_demonstrations(parquet(obs=states, action=ACTIONS), "demo.parquet")
     assert demonstrations.feature_names == ("speed", "gap.ahead")
     assert demonstrations.observations.tolist() == STATES[:, :2].tolist()
 

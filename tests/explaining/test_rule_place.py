@@ -26,7 +26,7 @@ def rows(html: str) -> list[list[tuple[str, float, float]]]:
     """Colour, from and to of each box, row by row; in percent from the left."""
     found = []
     for row in re.findall(r"background:(?:none|linear-gradient\(90deg,(.*?),#0000 0\))\"", html):
-        stops = [stop.split(" 0 ") for stop in row.split(",")] if row else []
+        stops = [stop.split(" 0 ") for stop in re.split(r",(?![^(]*\))", row)] if row else []
         ends = [0.0, *(float(end.removesuffix("%")) for _, end in stops)]
         assert ends == sorted(ends)
         found.append(
