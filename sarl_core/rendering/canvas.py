@@ -92,7 +92,16 @@ PAPER_INDEX, TRACK_INDEX = 0, 1
 
 
 @lru_cache(maxsize=16)
-def _font(size: int, bold: bool) -> Any:
+def shipped_font(size: int, bold: bool = False) -> Any:
+    """The font that pictures are lettered with.
+
+    Args:
+        size: In pixels.
+        bold: Whether its letters are.
+
+    Returns:
+        One of Pillow's; it has the characters of `ALPHABET`.
+    """
     from PIL import ImageFont
 
     name = f"DejaVuSansCondensed{'-Bold' if bold else ''}.ttf"
@@ -105,7 +114,7 @@ class _Advances(dict[str, float]):
 
     def __init__(self, size: int, bold: bool) -> None:
         super().__init__()
-        self._font = _font(size, bold)
+        self._font = shipped_font(size, bold)
 
     def __missing__(self, character: str) -> float:
         advance: float = self._font.getlength(_written(character))
@@ -199,7 +208,7 @@ def _mask(text: str, size: int, bold: bool) -> NDArray[np.uint8]:
     """Coverage of a line of text, (height, width), 0 to 255."""
     from PIL import Image, ImageDraw
 
-    font = _font(size, bold)
+    font = shipped_font(size, bold)
     picture = Image.new("L", (text_width(text, size, bold=bold) + 2, sum(font.getmetrics()) + 2))
     ImageDraw.Draw(picture).text((0, 0), "".join(map(_written, text)), fill=255, font=font)
     return np.asarray(picture)

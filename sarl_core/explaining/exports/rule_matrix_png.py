@@ -9,6 +9,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
 from sarl_core.mining.language import label_text, number_text, one_line, share_text
 from sarl_core.mining.rules import Rule
+from sarl_core.rendering.canvas import shipped_font
 
 _SCALE = 2  # pixels a unit, for sharp print
 _ROW, _CELL, _TEXT = 20, 96, 11
@@ -26,7 +27,7 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
     Returns:
         A PNG file.
     """
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageDraw
 
     first = _MARGIN + _ACTION + _STATES + _AGREES
     width = first + _CELL * len(matrix.columns) + _MARGIN
@@ -34,8 +35,8 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
     height = 2 * _MARGIN + _HEAD + _ROW * (len(rules) + placed)
     picture = Image.new("RGB", (width * _SCALE, height * _SCALE), _GROUND)
     pen = ImageDraw.Draw(picture)
-    font = ImageFont.load_default(size=_TEXT * _SCALE)
-    small = ImageFont.load_default(size=(_TEXT - 2) * _SCALE)
+    font = shipped_font(_TEXT * _SCALE)
+    small = shipped_font((_TEXT - 2) * _SCALE)
 
     def write(
         left: float, top: float, text: str, room: float, *, right: bool = False, muted: bool = False
@@ -74,7 +75,7 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
         label += "" if rule.enabled else ", off"
         write(_MARGIN + 14, top + 4, label, _ACTION - 22)
         write(_MARGIN + _ACTION, top + 4, f"{rule.samples:,}", _STATES - 8, right=True)
-        share = share_text(rule.confidence) if rule.samples else "-"  # its font has no dash
+        share = share_text(rule.confidence) if rule.samples else "–"
         write(_MARGIN + _ACTION + _STATES, top + 4, share, _AGREES - 8, right=True)
         bars = matrix.bars(rule)
         for place, column in enumerate(matrix.columns):

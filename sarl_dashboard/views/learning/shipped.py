@@ -12,6 +12,7 @@ from sarl_core.learning.arms import ARMS
 from sarl_core.learning.study_files import LearningStudy, load_study
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_dashboard.cache import cached
 from sarl_dashboard.jobs import learning
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
 from sarl_dashboard.state.rule_files import RULES_FOLDER
@@ -19,7 +20,7 @@ from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.study import show_study
 
 
-@st.cache_resource(show_spinner="Reading the study …")
+@cached(show_spinner="Reading the study …")
 def shipped(folder: Path, stamp: int) -> LearningStudy:
     """A study that is shipped."""
     return load_study(folder)
@@ -101,7 +102,7 @@ def commands(study: LearningStudy) -> list[str]:
     ]
 
 
-@st.cache_data(show_spinner=False)
+@cached()
 def shipped_rules() -> dict[str, str]:
     """The shipped rule files, by what tells their rules from others."""
     files = {}
