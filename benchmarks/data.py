@@ -17,7 +17,7 @@ from sarl_core import (
     mine_rules,
 )
 from sarl_core.agents.mlp_policy import MlpPolicy
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO

@@ -102,7 +102,7 @@ def ablation(quick: bool) -> Iterable[Row]:
 
 def _frames(count: int) -> list[np.ndarray]:
     """What the expert's episodes look like."""
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.rollouts.trial import make_agent
 
     agent, env = (
         make_agent("expert", data.ENV_ID),

@@ -20,10 +20,10 @@ from .mining.thresholds.landscape import threshold_landscape as threshold_landsc
 from .mining.tree import PolicyTree as PolicyTree
 from .mining.tree import grow_policy_trees as grow_policy_trees
 from .rendering.replay import render_episode as render_episode
-from .rollouts.agents import make_agent as make_agent
 from .rollouts.episodes import Episodes as Episodes
 from .rollouts.episodes import rollout as rollout
 from .rollouts.recording import record as record
+from .rollouts.trial import make_agent as make_agent
 from .shielding.shield import Decision as Decision
 from .shielding.shield import Shield as Shield
 from .shielding.vec_env import ShieldedVecEnv as ShieldedVecEnv

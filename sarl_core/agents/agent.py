@@ -169,7 +169,7 @@ def untried_agent(
     """Make the agent that a name or a file stands for, without a step in its environment.
 
     Args:
-        spec: As in `rollouts.agents.make_agent`, like the rest.
+        spec: As in `rollouts.trial.make_agent`, like the rest.
         env_id: What ``gymnasium.make`` takes.
         stochastic: Whether a trained policy is sampled.
         seed: Of the untrained weights.

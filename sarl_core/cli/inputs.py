@@ -41,7 +41,7 @@ def read_agent(
     """
     from sarl_core.agents.agent import PolicyAgent
     from sarl_core.agents.own import is_own, own_agent
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.rollouts.trial import make_agent
 
     if is_own(agent) and normalise is None:
         return own_agent(agent, env_id, stochastic=stochastic)

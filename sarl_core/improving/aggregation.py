@@ -32,12 +32,12 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.choices import check_choice, mean_score, scores
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, cut_text, rollout
 from sarl_core.rollouts.player import EpisodeFaultError
 from sarl_core.rollouts.seeds import RunSeeds
 from sarl_core.rollouts.statistics import Rate
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 _FIRST_VALIDATION = 16

@@ -14,9 +14,9 @@ from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 

@@ -24,11 +24,11 @@ from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rendering.camera import no_display, picture_of, picture_speed
 from sarl_core.rendering.film import Palette
 from sarl_core.rendering.repeating import Repeating
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout, run_seeds
 from sarl_core.rollouts.player import View, check_environment
 from sarl_core.rollouts.seeds import FRESH
 from sarl_core.rollouts.steps import StepTable
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 FIRST_SEED = FRESH

@@ -26,9 +26,9 @@ from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
 from sarl_core.rendering.gif_and_mp4 import encode_gif, encode_mp4, gif_bytes
 from sarl_core.rendering.overlay import Panel, side_by_side_picture
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
+from sarl_core.rollouts.trial import make_agent
 
 if TYPE_CHECKING:
     from sarl_core.mining.rule_set import RuleSet

@@ -26,7 +26,6 @@ from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.failures import safety_facts
 from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
 from sarl_core.rollouts.statistics import (
@@ -39,6 +38,7 @@ from sarl_core.rollouts.statistics import (
     worst_tenth,
 )
 from sarl_core.rollouts.steps import StepTable, concatenate
+from sarl_core.rollouts.trial import make_agent
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,11 +13,11 @@ from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, require_whole
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.player import EpisodeArrays, EpisodeFaultError, play
 from sarl_core.rollouts.statistics import rate_of
 from sarl_core.rollouts.steps import concatenate
+from sarl_core.rollouts.trial import make_agent
 
 SHIPPED = {
     "CartPole-v1": "cartpole",

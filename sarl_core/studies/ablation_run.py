@@ -18,11 +18,11 @@ from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require_whole
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.rule_use import RuleUse, join_use, rule_use
 from sarl_core.rollouts.tasks import Task, TaskPiece, run_tasks
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import MOST_RULES, Ablation, rules_to_take_out
 

@@ -31,8 +31,8 @@ from sarl_core.mining.quantisation import (
     snap,
 )
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.trial import make_agent
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.rendering.forking import Fork, Rest, fork
+from sarl_core.rendering.fork import Fork, Rest, fork
 from sarl_core.rendering.replay import Replay as Film
 from sarl_core.rendering.replay import render_episode, side_by_side
 from sarl_core.rollouts.episodes import Episodes, rollout

@@ -18,8 +18,8 @@ from sarl_core.agents.agent import EXPERT_FOLDER, Agent, PolicyAgent, shipped_ex
 from sarl_core.agents.own import OwnAgent, own_agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, quoted
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.seeds import FRESH
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Projection
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.environments import environment_of, offers

@@ -10,7 +10,7 @@ import stable_baselines3
 import torch
 
 from sarl_core.agents.agent import PolicyAgent
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 
 CART, PENDULUM = "CartPole-v1", "Pendulum-v1"
 SMALL = {"net_arch": [16, 16]}

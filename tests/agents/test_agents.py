@@ -9,8 +9,8 @@ from sarl_core.agents.agent import shipped_experts
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.trial import make_agent
 
 
 def states(env_id: str, count: int) -> np.ndarray:

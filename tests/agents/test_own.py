@@ -228,7 +228,7 @@ def test_an_expert_of_ones_own_answers(capsys: pytest.CaptureFixture[str]) -> No
 
 def test_only_the_caller_names_a_module(folder: Path) -> None:
     """What a file or a link says goes to `make_agent`, which imports nothing."""
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.rollouts.trial import make_agent
 
     with pytest.raises(InputError, match="there is no agent 'broken_agents:any'"):
         make_agent("broken_agents:any", "CartPole-v1")

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError
 from sarl_core.learning.experts import export_policy
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 
 LEARNERS = [
     ("PPO", "CartPole-v1", {"n_steps": 64, "batch_size": 64}, 128),

@@ -21,7 +21,7 @@ from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError
 from sarl_core.learning.experts import export_policy
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 from tests.agents.sb3_learners import (
     CART,
     OFF_POLICY,

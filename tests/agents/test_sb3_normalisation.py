@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 from sarl_core.agents.agent import PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.errors import InputError
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 from tests.agents.sb3_learners import (
     CART,
     OFF_POLICY,

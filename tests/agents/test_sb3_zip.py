@@ -13,7 +13,7 @@ import torch
 from stable_baselines3 import DQN, PPO
 
 from sarl_core.errors import InputError
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 
 
 class Boom:

@@ -12,7 +12,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
-from sarl_core.rendering.forking import fork
+from sarl_core.rendering.fork import fork
 from sarl_core.rollouts.episodes import Episodes
 from tests.app.screens import errors, finished, html, metrics, open_page, run_through, texts
 

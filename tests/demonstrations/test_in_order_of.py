@@ -9,7 +9,7 @@ from sarl_core import InputError, load_demonstrations
 from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
 from sarl_core.improving.questions import Answers
-from sarl_core.rollouts.agents import make_agent
+from sarl_core.rollouts.trial import make_agent
 from tests.cli.conftest import CART, ROOT
 
 WALKER = ROOT / "data" / "demonstrations" / "bipedal_walker.parquet"

@@ -8,8 +8,8 @@ import pytest
 from sarl_core.agents.driver import Driver
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.rendering.camera import no_display, picture_of
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.trial import make_agent
 
 NAMES = describe_environment("Driving-v0").feature_names
 

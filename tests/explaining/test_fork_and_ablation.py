@@ -16,7 +16,7 @@ from sarl_core.explaining.figures.ablation import (
     left_out_text,
 )
 from sarl_core.explaining.words.fork import ending_text, fork_text
-from sarl_core.rendering.forking import fork
+from sarl_core.rendering.fork import fork
 from sarl_core.studies.ablation import Ablation
 from sarl_core.studies.ablation_run import ablate
 

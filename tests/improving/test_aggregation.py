@@ -18,9 +18,9 @@ from sarl_core.improving.refinement import _ranks, refine
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import REPORT, ROUNDS
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 DATA = EXPERT_FOLDER.parent / "demonstrations"

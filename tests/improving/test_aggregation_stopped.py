@@ -141,7 +141,7 @@ def test_stopped_in_the_report_the_choice_stands(cart, finished, tmp_path):
 
 
 def _expert():
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.rollouts.trial import make_agent
 
     return make_agent("expert", "CartPole-v1")
 

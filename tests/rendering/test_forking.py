@@ -9,7 +9,7 @@ from PIL import Image
 
 from sarl_core import InputError, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.progress import CancelledError
-from sarl_core.rendering.forking import Fork, Rest, endings, fork
+from sarl_core.rendering.fork import Fork, Rest, endings, fork
 from sarl_core.rollouts.steps import StepTable
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"

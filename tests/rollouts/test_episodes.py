@@ -8,10 +8,10 @@ from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts import episodes as episodes_module
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout, run_seeds
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.steps import StepTable
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 from sarl_core.shielding.wrappers import ShieldedEnv
 

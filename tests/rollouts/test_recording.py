@@ -5,9 +5,9 @@ import pytest
 
 from sarl_core.errors import InputError
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.recording import record
+from sarl_core.rollouts.trial import make_agent
 
 
 def test_records_exactly_as_many_steps_as_asked() -> None:

@@ -15,10 +15,10 @@ from sarl_core.agents.agent import Agent
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.processes import Processes
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.tasks import Task, run_tasks
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 COLUMNS = ("seeds", "returns", "lengths", "interventions", "covered", "terminated", "last_rewards")

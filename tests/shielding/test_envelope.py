@@ -213,7 +213,7 @@ def test_the_records_of_all_ways_to_play_agree(cart, outside):
     from sarl_core import rollout
     from sarl_core.rendering.camera import film_episode
     from sarl_core.rendering.film import Film, Palette
-    from sarl_core.rollouts.agents import make_agent
+    from sarl_core.rollouts.trial import make_agent
 
     shield = Shield(cart, outside=outside)
     played = rollout("CartPole-v1", "novice", shield=shield, episodes=3, seed=5)

@@ -18,9 +18,9 @@ from sarl_core.agents.agent import Agent
 from sarl_core.errors import WorkError
 from sarl_core.processes import Processes
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.rule_use import RuleUse, rule_use
 from sarl_core.rollouts.tasks import Task, TaskPiece, run_tasks
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.studies.ablation import Ablation, rules_to_take_out
 from sarl_core.studies.ablation_run import AblationRecord, ablate
 

@@ -9,9 +9,9 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.quantisation import quantise
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.recording import record
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.studies.divider import DividerStudy, snapped_agents, study_divider
 
 PENDULUM = "Pendulum-v1"

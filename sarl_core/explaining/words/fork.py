@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.decimals import rounded_text
 from sarl_core.mining.language import counted
-from sarl_core.rendering.forking import Branch, Ending, Fork, Rest
+from sarl_core.rendering.fork import Branch, Ending, Fork, Rest
 
 # What a failure and another end are called, by the beginning of an environment's name.
 _ENDS: dict[str, tuple[str, str]] = {

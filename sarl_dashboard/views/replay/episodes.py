@@ -12,7 +12,7 @@ from sarl_core.explaining.figures.replay import (
 )
 from sarl_core.explaining.words.fork import ending_text
 from sarl_core.mining.language import share_text
-from sarl_core.rendering.forking import endings
+from sarl_core.rendering.fork import endings
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart

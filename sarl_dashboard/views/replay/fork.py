@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.words.fork import REST_TEXT, fork_text
-from sarl_core.rendering.forking import Fork, Rest
+from sarl_core.rendering.fork import Fork, Rest
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.replays import FORK, Played, fork_cache, forking

@@ -26,9 +26,9 @@ from sarl_core.rendering.film import Film, Palette
 from sarl_core.rendering.gif_and_mp4 import gif_bytes
 from sarl_core.rendering.overlay import Caption, Panel, side_by_side_picture
 from sarl_core.rendering.replay import DescribeRule, Replay, sentences
-from sarl_core.rollouts.agents import make_agent
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
+from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import BatchDecision, Shield
 
 Rest = Literal["shielded", "alone"]

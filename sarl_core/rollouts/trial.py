@@ -1,4 +1,4 @@
-"""Agents for an environment: made by name or from a file, and tried in it where that tells more."""
+"""Agents made by name or from a file, with a trial in their environment where that tells more."""
 
 from __future__ import annotations
 
