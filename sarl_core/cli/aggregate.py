@@ -97,6 +97,13 @@ def aggregate(
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
+    report: Annotated[
+        int,
+        typer.Option(
+            "--report-episodes",
+            help="Fresh episodes, which nothing was chosen by, to report the best on.",
+        ),
+    ] = 100,
     choose: ChoiceName = "return",
     seed: Seed = 0,
     max_steps: MaxSteps = None,
@@ -129,6 +136,7 @@ def aggregate(
             projection=projection,
             generations=refine,
             validation=validation,
+            report=report,
             seed=seed,
             max_steps=max_steps,
             choose=choose,

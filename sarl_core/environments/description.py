@@ -78,10 +78,9 @@ _LUNAR_LANDER_FEATURES = (
 )
 
 _TRAFFIC = tuple(
-    (f"{quantity} {direction} on the {side}", unit)
+    (f"{what} on the {side}", unit)
     for side in ("left", "right")
-    for direction in ("ahead", "behind")
-    for quantity, unit in (("gap", "m"), ("time to collision", "s"))
+    for what, unit in (("gap ahead", "m"), ("room", "m"), ("time to collision", "s"))
 )
 
 _CATALOGUE: dict[str, EnvironmentNames] = {
@@ -150,9 +149,6 @@ _CATALOGUE: dict[str, EnvironmentNames] = {
     "Driving": EnvironmentNames(
         (
             ("speed", "m/s"),
-            ("distance to the lane aimed at", "m"),
-            ("lanes to the left", ""),
-            ("lanes to the right", ""),
             ("gap ahead", "m"),
             ("time to collision ahead", "s"),
             *_TRAFFIC,
@@ -163,7 +159,7 @@ _CATALOGUE: dict[str, EnvironmentNames] = {
 }
 
 # Ours, registered as other people's are, by the module that Gymnasium imports first.
-_OWN_MODULES = {"Driving-v0": "sarl_core.environments.driving"}
+OWN_MODULES = {"Driving-v0": "sarl_core.environments.driving"}
 
 _UNKNOWN = re.compile(r"unexpected keyword argument '(\w+)'")
 
@@ -186,7 +182,7 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
 
     environment = as_environment(environment)
     env_id, parameters = environment.id, environment.keywords
-    module = _OWN_MODULES.get(env_id)
+    module = OWN_MODULES.get(env_id)
     if render_mode is not None:  # an environment that draws nothing need not take the parameter
         parameters["render_mode"] = render_mode
     try:
@@ -206,9 +202,10 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
         because = text.splitlines()[0] if text else type(error).__name__
         lacking = isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled))
         if lacking and ":" not in env_id:  # else it may be the named module that does not exist
+            how = "pip install 'sarl-explorer[driving]'" if module else "install it"
             raise InputError(
                 f"the environment {env_id!r} needs a package that is not installed "
-                f"({because.rstrip('.')}); install it, or choose another environment"
+                f"({because.rstrip('.')}); {how}, or choose another environment"
             ) from error
         raise InputError(
             f"the environment {env_id!r} cannot be made"

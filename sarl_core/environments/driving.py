@@ -7,7 +7,7 @@ vx"; here the same scene is told as gaps and times to collision in the three lan
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 ENV_ID = "Driving-v0"
 
-N_FEATURES = 14
+N_FEATURES = 9
 FAR = 100.0  # metres; further away is nobody
 LONG = 20.0  # seconds; later is never
 _VEHICLE_LENGTH = 5.0
@@ -25,12 +25,12 @@ _VEHICLE_LENGTH = 5.0
 class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any]):
     """Gaps and times to collision in the own lane and in the lanes beside it.
 
-    The features are called as `describe_environment("Driving-v0")` says, shape (14,): speed,
-    distance to the lane aimed at, number of lanes to the left and to the right, then gap and time
-    to collision ahead, and ahead and behind on the left, and on the right.
+    The features are called as `describe_environment("Driving-v0")` says, shape (9,): speed, gap and
+    time to collision ahead; then, on the left and on the right, the gap ahead, the room (the
+    smaller of the gaps ahead and behind) and the time to collision (the sooner of the two).
 
     A gap is counted from bumper to bumper, up to 100 m; a time to collision is the gap over the
-    speed at which it closes, up to 20 s. Where there is no lane, all four are 0. While the vehicle
+    speed at which it closes, up to 20 s. Where there is no lane, all three are 0. While the vehicle
     changes lanes, "ahead" is the nearer of who is ahead in the lane that it leaves and in the lane
     that it aims at.
     """
@@ -42,9 +42,10 @@ class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any
             env: As ``gymnasium.make("highway_env:highway-fast-v0")``.
         """
         super().__init__(env)
-        gaps = [FAR, LONG] * ((N_FEATURES - 4) // 2)
-        high = np.array([np.inf, np.inf, np.inf, np.inf, *gaps], dtype=np.float32)
-        self.observation_space = spaces.Box(np.minimum(-high, 0.0) * np.isinf(high), high)
+        beside = [FAR, FAR, LONG]
+        high = np.array([np.inf, FAR, LONG, *beside, *beside], dtype=np.float32)
+        low = np.array([-np.inf, *[0.0] * (N_FEATURES - 1)], dtype=np.float32)
+        self.observation_space = spaces.Box(low, high)
 
     def observation(self, observation: Any) -> NDArray[np.float32]:
         """The features of the present scene, shape (14,), whatever the simulator's own table."""
@@ -52,28 +53,29 @@ class TrafficFeatures(gymnasium.ObservationWrapper[NDArray[np.float32], Any, Any
         start, end, aimed_at = own.target_lane_index
         lanes = road.network.graph[start][end]
 
-        def traffic(lane: int) -> list[float]:
-            """Gap and time to collision ahead, then behind."""
-            if not 0 <= lane < len(lanes):
-                return [0.0] * 4
+        def traffic(lane: int) -> tuple[_Gap, _Gap]:
+            """Who is ahead, and who is behind."""
             ahead, behind = _neighbours(road, own, (start, end, lane))
-            return [*_gap(own, ahead), *_gap(behind, own)]
+            return _gap(own, ahead), _gap(behind, own)
 
-        leaves = own.lane_index[2]
-        ahead = np.minimum(traffic(leaves)[:2], traffic(aimed_at)[:2])
-        aside = abs(lanes[aimed_at].local_coordinates(own.position)[1])
+        def beside(lane: int) -> list[float]:
+            """Gap ahead, room, time to collision."""
+            if not 0 <= lane < len(lanes):
+                return [0.0] * 3
+            ahead, behind = traffic(lane)
+            return [ahead.metres, *map(min, ahead, behind)]
+
+        ahead = map(min, traffic(own.lane_index[2])[0], traffic(aimed_at)[0])
         return np.array(
-            [
-                own.speed,
-                aside,
-                aimed_at,
-                len(lanes) - 1 - aimed_at,
-                *ahead,
-                *traffic(aimed_at - 1),
-                *traffic(aimed_at + 1),
-            ],
-            dtype=np.float32,
+            [own.speed, *ahead, *beside(aimed_at - 1), *beside(aimed_at + 1)], dtype=np.float32
         )
+
+
+class _Gap(NamedTuple):
+    """Between two vehicles: from bumper to bumper, and until it is closed (s)."""
+
+    metres: float
+    seconds: float
 
 
 def _neighbours(road: Any, own: Any, index: tuple[str, str, int]) -> tuple[Any, Any]:
@@ -96,15 +98,14 @@ def _neighbours(road: Any, own: Any, index: tuple[str, str, int]) -> tuple[Any, 
     return ahead, behind
 
 
-def _gap(follower: Any, leader: Any) -> tuple[float, float]:
-    """The gap between two vehicles (m), and the time until it is closed (s)."""
+def _gap(follower: Any, leader: Any) -> _Gap:
     if follower is None or leader is None:
-        return FAR, LONG
-    gap = max(float(leader.position[0] - follower.position[0]) - _VEHICLE_LENGTH, 0.0)
+        return _Gap(FAR, LONG)
+    metres = max(float(leader.position[0] - follower.position[0]) - _VEHICLE_LENGTH, 0.0)
     closing = float(follower.speed - leader.speed)
-    if gap >= FAR or closing <= 0.0:
-        return min(gap, FAR), LONG
-    return gap, min(gap / closing, LONG)
+    if metres >= FAR or closing <= 0.0:
+        return _Gap(min(metres, FAR), LONG)
+    return _Gap(metres, min(metres / closing, LONG))
 
 
 def make_driving(**arguments: Any) -> gymnasium.Env[Any, Any]:

@@ -71,7 +71,7 @@ class Plan:
             ("number of episodes a round", self.episodes, 1, MOST_EPISODES_A_ROUND),
             ("number of generations", self.generations, 0, _MOST_GENERATIONS),
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
-            ("number of report episodes", self.report, 1, None),
+            ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),
             ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, None),
         ):

@@ -25,6 +25,7 @@ SHIPPED_SETS = {
     "pendulum": ("Pendulum", "Pendulum-v1"),
     "bipedal_walker": ("Bipedal Walker", "BipedalWalker-v3"),
     "lunar_lander_continuous": ("Lunar Lander, continuous", "LunarLanderContinuous-v3"),
+    "driving": ("Driving", "Driving-v0"),
 }
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"

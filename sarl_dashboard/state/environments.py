@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cache
 
 from sarl_core.agents.offers import Offers
-from sarl_core.environments.description import describe_environment
+from sarl_core.environments.description import OWN_MODULES, describe_environment
 from sarl_core.environments.environment import Environment, EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
@@ -44,7 +44,7 @@ def registered(env_id: str) -> Environment:
             "for those it was started with; give an id that Gymnasium knows by itself, such as "
             f"CartPole-v1, or start it with `sarl app --env {env_id}`"
         )
-    if env_id not in gymnasium.registry:
+    if env_id not in gymnasium.registry and env_id not in OWN_MODULES:
         raise InputError(
             f"Gymnasium knows no environment {env_id!r}; give an id with its version, such as "
             "CartPole-v1"

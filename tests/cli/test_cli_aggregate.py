@@ -28,10 +28,14 @@ def test_rules_and_their_card_are_written(run, tmp_path):
     assert f"{card['reported']['mean']:.1f}" in printed
 
 
-def test_json_is_the_card(run, tmp_path):
+def test_json_is_the_card_of_as_many_episodes_as_were_ordered(run, tmp_path):
     out = tmp_path / "compact.json"
-    document = json.loads(run("aggregate", CART, *QUICK, "--out", out, "--json"))
+    arguments = (*QUICK, "--report-episodes", 7)
+    document = json.loads(run("aggregate", CART, *arguments, "--out", out, "--json"))
     assert document.pop("notes") == []
+    assert document["reported"]["episodes"] == 7
+    assert document["reported_on"] == "7 episodes used for nothing else"
+    assert document["command"].endswith("--report-episodes 7")
     assert document == json.loads((tmp_path / "compact.card.json").read_text())
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from sarl_core.agents.driver import Driver
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.errors import InputError
 from sarl_core.rendering.camera import no_display, picture_of
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.trial import make_agent
@@ -46,15 +49,15 @@ def test_who_is_ahead_is_told_by_gap_and_time(road):
     assert seen["gap ahead"] == pytest.approx(40.0)  # bumper to bumper, vehicles of 5 m
     assert seen["time to collision ahead"] == pytest.approx(8.0)
     assert seen["gap ahead on the left"] == 100.0
-    assert seen["lanes to the left"] == seen["lanes to the right"] == 1
+    assert seen["room on the left"] == seen["room on the right"] == 100.0
 
 
 def test_who_comes_from_behind_is_told_in_the_lane_beside(road):
     place(road, lane=0, ahead=-35.0, speed=30.0)
     seen = features(road)
-    assert seen["gap behind on the left"] == pytest.approx(30.0)
-    assert seen["time to collision behind on the left"] == pytest.approx(6.0)
-    assert seen["gap behind on the right"] == 100.0
+    assert seen["room on the left"] == pytest.approx(30.0)
+    assert seen["time to collision on the left"] == pytest.approx(6.0)
+    assert seen["gap ahead on the left"] == seen["room on the right"] == 100.0
 
 
 def test_who_changes_into_a_lane_is_in_it(road):
@@ -67,18 +70,18 @@ def test_who_changes_into_a_lane_is_in_it(road):
 def test_a_lane_that_is_not_there_offers_no_room(road):
     road.unwrapped.vehicle.target_lane_index = ("0", "1", 0)
     seen = features(road)
-    assert [value for name, value in seen.items() if name.endswith("on the left")] == [0.0] * 4
+    assert [value for name, value in seen.items() if name.endswith("on the left")] == [0.0] * 3
 
 
 def test_the_driver_changes_to_the_lane_with_room_and_brakes_where_there_is_none():
-    clear = [100.0, 20.0, 100.0, 20.0]
-    full = [3.0, 0.5, 100.0, 20.0]
+    clear, full, gone = [100.0, 100.0, 20.0], [3.0, 3.0, 0.5], [0.0] * 3
     scenes = [
-        [25, 0, 1, 1, 15, 4, *clear, *full],
-        [25, 0, 1, 1, 15, 4, *full, *clear],
-        [25, 0, 1, 1, 15, 4, *full, *full],
-        [25, 0, 1, 1, 100, 20, *full, *full],
-        [20, 0, 1, 1, 100, 20, *full, *full],
+        [25, 15, 4, *clear, *full],
+        [25, 15, 4, *gone, *clear],
+        [25, 15, 4, *full, *gone],
+        [25, 100, 20, *full, *full],
+        [20, 100, 20, *full, *full],
+        [20, 15, 4, 20, 7, 3, *gone],  # too slow to brake: the lane that is just wide enough
     ]
     chosen = Driver().act(np.array(scenes, dtype=np.float32), None)
     words = describe_environment("Driving-v0").label_names[0]
@@ -88,6 +91,7 @@ def test_the_driver_changes_to_the_lane_with_room_and_brakes_where_there_is_none
         "slower",
         "keep on",
         "faster",
+        "change to the left lane",
     ]
 
 
@@ -109,3 +113,9 @@ def test_an_end_on_the_motorway_is_a_crash():
     shortened = played.lengths < 30
     assert shortened.any()
     assert played.failed.tolist() == shortened.tolist()
+
+
+def test_who_lacks_the_simulator_is_told_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "highway_env", None)
+    with pytest.raises(InputError, match=r"not installed .*sarl-explorer\[driving\]"):
+        make_environment("Driving-v0")

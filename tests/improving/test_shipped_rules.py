@@ -18,6 +18,7 @@ SHIPPED = {
     "cartpole_compact.json": ("CartPole-v1", 4, 500.0),
     "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
     "bipedal_walker_compact.json": ("BipedalWalker-v3", 128, 250.0),
+    "driving_compact.json": ("Driving-v0", 24, 22.0),
 }
 
 
