@@ -41,6 +41,7 @@ from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 _FIRST_VALIDATION = 16
+_FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
 _MARKS = 8  # points on the way of a refinement from which the best is chosen
 
 
@@ -274,13 +275,13 @@ class _Run:
     def planned_units(self) -> int:
         plan = self.plan
         refined = plan.generations * generation_cost() + (
-            planned_episodes(_MARKS + 1, _FIRST_VALIDATION, plan.validation)
+            planned_episodes(_MARKS + 1, _first_validation(plan), plan.validation)
             if plan.generations
             else 0
         )
         return (
             plan.rounds * plan.episodes
-            + planned_episodes(plan.rounds, _FIRST_VALIDATION, plan.validation)
+            + planned_episodes(plan.rounds, _first_validation(plan), plan.validation)
             + refined
             + plan.report
         )
@@ -389,7 +390,7 @@ class _Run:
                 self.shielded(candidates[index], first, count, clock), self.plan.choose
             ),
             seed=seed,
-            first=_FIRST_VALIDATION,
+            first=_first_validation(self.plan),
             most=self.plan.validation,
         )
         return tried.best, float(tried.means[tried.best])
@@ -458,3 +459,10 @@ class _Run:
             demonstrations=pairs,
             seeds=self.seeds,
         )
+
+
+def _first_validation(plan: Plan) -> int:
+    """Episodes that every candidate plays before the worse half of them leaves."""
+    if plan.choose == "return":
+        return _FIRST_VALIDATION
+    return max(_FIRST_VALIDATION, plan.validation // _FIRST_SHARE)
