@@ -37,7 +37,7 @@ def sarl(*arguments: str) -> None:
     subprocess.run([sys.executable, "-m", "sarl_core", *arguments], cwd=ROOT, check=True)
 
 
-def render(env_id: str, rules: str, out: Path, *options: str) -> None:
+def render(env_id: str, rules: str, out: Path, *options: str, seed: int = 100_000) -> None:
     """A novice under shipped rules, on a seed that nothing was chosen by."""
     sarl(
         "render",
@@ -48,7 +48,7 @@ def render(env_id: str, rules: str, out: Path, *options: str) -> None:
         "--rules",
         f"data/rules/{rules}_compact.json",
         "--seed",
-        "100000",
+        str(seed),
         "--out",
         str(out),
         *options,
@@ -58,6 +58,12 @@ def render(env_id: str, rules: str, out: Path, *options: str) -> None:
 def replay() -> None:
     """The GIF: a novice in Lunar Lander, side by side."""
     render("LunarLander-v3", "lunar_lander", PICTURES / "replay.gif", "--side-by-side")
+
+
+def driving() -> None:
+    """The GIF of the motorway, side by side, on the first seed on which the novice crashes."""
+    out = PICTURES / "driving.gif"
+    render("Driving-v0", "driving", out, "--side-by-side", seed=100_001)
 
 
 def walker() -> None:
@@ -127,5 +133,6 @@ def _wait(address: str, page: Page) -> None:
 
 if __name__ == "__main__":
     replay()
+    driving()
     walker()
     screenshots()
