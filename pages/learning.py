@@ -16,7 +16,7 @@ SHIPPED, OWN = "The study", "Your own"
 st.title("Learning")
 st.caption(
     "Agents learn by trial and error while the rules shield them. Two questions: how often do they "
-    "crash meanwhile, and what are they worth when the shield is taken off?"
+    "fail meanwhile, and what are they worth when the shield is taken off?"
 )
 view = st.segmented_control(
     "View",

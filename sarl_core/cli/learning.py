@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
+from sarl_core.cli.inputs import read_agent
 from sarl_core.cli.options import (
     ChoiceName,
     Env,
     Json,
     MaxSteps,
+    Normalise,
     ProjectionName,
     Rules,
     Seed,
@@ -70,6 +72,18 @@ def learn(
     ] = 50,
     max_steps: MaxSteps = None,
     choose: ChoiceName = "return",
+    agent: Annotated[
+        str | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            show_default="nobody",
+            help="Whom to compare the learners with: it learns nothing, and plays the episodes "
+            "after learning, without the shield and with it. What evaluate --agent takes, "
+            "module:name included.",
+        ),
+    ] = None,
+    normalise: Normalise = None,
     figures: Annotated[
         bool, typer.Option("--figures", help="Also draw the study, as .png.")
     ] = False,
@@ -104,6 +118,7 @@ def learn(
             episodes,
             max_steps,
             choose,
+            None if agent is None else read_agent(agent, env, normalise),
         )
         notes = plan.notes
     with terminal.working("Learning") as advance, _stopping(watched) as stopped:
@@ -212,13 +227,16 @@ def _stopping(watched: bool) -> Iterator[Callable[[], bool]]:
 def _document(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path) -> dict[str, Any]:
     from sarl_core.explaining.words.learning import finding
     from sarl_core.learning.study_files import policy_path
+    from sarl_core.learning.summary import summarise_compared
 
+    compared = summarise_compared(study)
     return {
         "folder": str(out),
         "env_id": study.env_id,
         "steps": study.steps,
         "seeds": list(study.seeds),
         "arms": [summary.to_dict() for summary in summaries],
+        **({} if compared is None else {"compared": compared.to_dict()}),
         "policies": [str(policy_path(out, run.arm, run.seed)) for run in study.finished],
         "finding": finding(study, summaries),
     }
@@ -226,8 +244,9 @@ def _document(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path
 
 def _print_study(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path) -> None:
     from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
+    from sarl_core.learning.summary import summarise_compared
 
-    terminal.print_table(HEADINGS, table_rows(summaries))
+    terminal.print_table(HEADINGS, table_rows(summaries, summarise_compared(study)))
     terminal.print_lines(
         [*finding(study, summaries), f"Wrote {len(study.finished)} runs to {out}."]
     )

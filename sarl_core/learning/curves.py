@@ -158,6 +158,8 @@ class Trial:
         cut: Episodes that were cut off before their end; none of them is among the crashes.
         failed: Whether each ended by failure; none where that was not known, or not kept.
         costs: What each cost; none likewise.
+        freedom: What the rules left the policy to choose from, mean over the steps, 0 to 1; None
+            without a shield, or where it was not kept.
     """
 
     returns: tuple[Number, ...]
@@ -167,6 +169,7 @@ class Trial:
     cut: Count = 0
     failed: tuple[bool, ...] = ()
     costs: tuple[Number, ...] = ()
+    freedom: Share | None = None
 
     @property
     def mean(self) -> float:
@@ -188,6 +191,7 @@ class Trial:
             **({"cut": self.cut} if self.cut else {}),
             **({"failed": list(self.failed)} if self.failed else {}),
             **({"costs": list(self.costs)} if self.costs else {}),
+            **({} if self.freedom is None else {"freedom": self.freedom}),
         }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.agents.agent import PolicyAgent
+from sarl_core.agents.agent import Agent, PolicyAgent
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, WorkError
@@ -153,8 +153,12 @@ def learn(
     def still(done: int, total: int) -> bool:
         return progress is None or progress(steps, steps) is not False
 
+    learned = PolicyAgent("learner", policy, False, np.zeros(policy.n_dimensions, dtype=np.int64))
+
     def tried(shield: Shield | None) -> Trial:
-        return _try(env_id, policy, shield, episodes, max_steps, still)
+        return try_agent(
+            env_id, learned, shield, episodes=episodes, max_steps=max_steps, progress=still
+        )
 
     alone, shielded = tried(None), None if shield is None else tried(shield)
     end = so_far(curve)
@@ -223,25 +227,40 @@ def _diverged(learner: Any, error: Exception) -> Exception:
     )
 
 
-def _try(
+def try_agent(
     env_id: EnvironmentOrId,
-    policy: MlpPolicy,
+    agent: Agent,
     shield: Shield | None,
+    *,
     episodes: int,
-    max_steps: int | None,
-    still: Progress,
+    max_steps: int | None = None,
+    progress: Progress | None = None,
 ) -> Trial:
-    """Episodes with a learned policy, which acts deterministically."""
-    first = np.zeros(policy.n_dimensions, dtype=np.int64)
+    """Play the episodes by which learners are judged.
+
+    Args:
+        env_id: What ``gymnasium.make`` takes.
+        agent: Who acts.
+        shield: In force, or None.
+        episodes: How many, on seeds from `seeds.TRIAL`.
+        max_steps: After which one that has not ended is cut off; `episodes.MAX_STEPS` where None.
+        progress: Called with (episodes done, `episodes`); returning False stops.
+
+    Returns:
+        What came of them.
+
+    Raises:
+        CancelledError: If `progress` returned False.
+    """
     played = rollout(
         env_id,
-        PolicyAgent("learner", policy, False, first),
+        agent,
         shield=shield,
         episodes=episodes,
         seed=seeds.TRIAL,
         keep_steps=False,
         max_steps=max_steps,
-        progress=still,
+        progress=progress,
     )
     steps = float(played.lengths.sum())
     return Trial(
@@ -252,4 +271,5 @@ def _try(
         cut=int((played.cut & ~played.failed).sum()),
         failed=tuple(played.failed.tolist()) if played.failures_known else (),
         costs=() if np.isnan(played.costs).any() else tuple(played.costs.tolist()),
+        freedom=None if shield is None else float((played.freedom * played.lengths).sum()) / steps,
     )

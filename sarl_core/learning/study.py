@@ -9,15 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
-from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes
-from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn
+from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes, Trial
+from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn, try_agent
 from sarl_core.learning.study_files import (
     FORMAT,
     PLAN,
     VERSION,
+    Compared,
     LearningRun,
     LearningStudy,
     load_run,
@@ -27,6 +29,7 @@ from sarl_core.learning.study_files import (
     read_json,
     remove,
     run_path,
+    save_compared,
     save_run,
     save_tables,
     write_json,
@@ -36,6 +39,7 @@ from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.progress import CancelledError, Progress
 from sarl_core.rollouts.choices import Choice, check_choice
 from sarl_core.shielding.projection import Projection
+from sarl_core.shielding.shield import Shield
 
 MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
 _WRITTEN_EVERY = 1.0  # seconds, for who looks on
@@ -55,6 +59,8 @@ class LearningPlan:
         episodes: Of each trial after learning.
         max_steps: After which one of these is cut off; `episodes.MAX_STEPS` where None.
         choose: What comes first where the best way to learn is chosen.
+        agent: Whom the learners are compared with: it plays the episodes by which they are judged;
+            None for nobody.
     """
 
     env_id: EnvironmentOrId
@@ -66,6 +72,7 @@ class LearningPlan:
     episodes: int = TRIAL_EPISODES
     max_steps: int | None = None
     choose: Choice = "return"
+    agent: Agent | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be learned.
@@ -93,7 +100,6 @@ class LearningPlan:
     def notes(self) -> tuple[str, ...]:
         """What is to be said of how rules and environment were matched, as clauses."""
         from sarl_core.rollouts.player import check_environment
-        from sarl_core.shielding.shield import Shield
 
         shield = None if self.rules is None else Shield(self.rules)
         return check_environment(self.env_id, shield).notes
@@ -118,6 +124,7 @@ class LearningPlan:
             "trial_episodes": self.episodes,
             "trial_max_steps": self.max_steps,
             "choose": self.choose,
+            "agent": None if self.agent is None else self.agent.name,
             "rules": None
             if rules is None
             else {
@@ -161,6 +168,9 @@ def run_study(
     total = len(runs) * plan.steps
     diverged: list[str] = []
     try:
+        if plan.agent is not None:
+            # First: an agent that cannot play shall be known of before hours of learning.
+            save_compared(folder, _compared(plan, plan.agent, progress))
         for index, (seed, arm) in enumerate(runs):
             before = index * plan.steps
 
@@ -197,12 +207,13 @@ def run_study(
 def _claim(folder: Path, plan: LearningPlan) -> None:
     """Write the plan down, or check that it is the one that was begun here.
 
-    More arms, seeds or runs may be asked for later, and another choice; what runs share must stay.
+    More arms, seeds or runs may be asked for later, and another choice or agent to compare with;
+    what runs share must stay.
     """
     path, settings = folder / PLAN, plan.settings()
     if path.is_file():
         before = read_json(path)
-        free = ("arms", "seeds", "choose")
+        free = ("arms", "seeds", "choose", "agent")
         other = [
             name for name in settings if name not in free and before.get(name) != settings[name]
         ]
@@ -216,6 +227,26 @@ def _claim(folder: Path, plan: LearningPlan) -> None:
     write_json(path, settings)
     if plan.rules is not None:
         plan.rules.save(folder / "rules.json")
+
+
+def _compared(plan: LearningPlan, agent: Agent, progress: Progress | None) -> Compared:
+    """The agent that the learners are compared with, on their episodes."""
+    total = len(plan.arms) * len(plan.seeds) * plan.steps
+
+    def tried(shield: Shield | None) -> Trial:
+        return try_agent(
+            plan.env_id,
+            agent,
+            shield,
+            episodes=plan.episodes,
+            max_steps=plan.max_steps,
+            progress=lambda *_: progress is None or progress(0, total) is not False,
+        )
+
+    alone = tried(None)
+    if plan.rules is None:
+        return Compared(agent.name, alone, None)
+    return Compared(agent.name, alone, tried(Shield(plan.rules, projection=plan.projection)))
 
 
 def _finished(folder: Path, arm: LearningArm, seed: int) -> bool:

@@ -27,6 +27,7 @@ from sarl_core.rollouts.choices import Choice
 FORMAT = "sarl-learning"
 VERSION = 1
 PLAN, RESULTS, CURVES = "plan.json", "results.json", "curves.csv"
+COMPARED = "compared.json"
 RUNS, POLICIES = "runs", "policies"
 
 _DECIMALS = 4  # of returns in files
@@ -70,6 +71,21 @@ class LearningRun:
 
 
 @dataclass(frozen=True, eq=False)
+class Compared:
+    """An agent that has learned nothing here, on the episodes by which learners are judged.
+
+    Attributes:
+        agent: Its name.
+        alone: Without a shield.
+        shielded: With the shield on; None without rules.
+    """
+
+    agent: str
+    alone: Trial
+    shielded: Trial | None
+
+
+@dataclass(frozen=True, eq=False)
 class LearningStudy:
     """Runs of several arms and seeds under the same conditions.
 
@@ -80,6 +96,7 @@ class LearningStudy:
         arms: In the order in which they are shown.
         seeds: Of the learners.
         runs: Those that have begun; finished ones and others.
+        compared: The agent that learners are compared with; None where none was named.
     """
 
     env_id: str
@@ -88,6 +105,7 @@ class LearningStudy:
     arms: tuple[LearningArm, ...]
     seeds: tuple[int, ...]
     runs: tuple[LearningRun, ...]
+    compared: Compared | None = None
 
     @property
     def finished(self) -> tuple[LearningRun, ...]:
@@ -181,6 +199,17 @@ def policy_path(folder: Path, arm: LearningArm, seed: int) -> Path:
     return folder / POLICIES / f"{arm.name}-{seed}.npz"
 
 
+def save_compared(folder: Path, compared: Compared) -> None:
+    """Write what an agent that learners are compared with has done.
+
+    Args:
+        folder: Of the study.
+        compared: The agent and its episodes.
+    """
+    head = {"format": FORMAT, "version": VERSION}
+    write_json(folder / COMPARED, {**head, **_compared_entry(compared)})
+
+
 def load_run(path: Path) -> LearningRun:
     """Read a run.
 
@@ -222,12 +251,15 @@ def load_study(folder: Path) -> LearningStudy:
             f"{folder / PLAN} lacks a part of its plan ({error}); choose a folder that `learn` "
             "wrote"
         ) from error
+    compared = _load_compared(folder / COMPARED) if (folder / COMPARED).is_file() else None
+    if compared is not None and compared.agent != settings.get("agent"):
+        compared = None  # of an earlier order
     if (folder / RUNS).is_dir():
         paths = [run_path(folder, arm, seed) for seed in plan.seeds for arm in arms]
         runs = tuple(load_run(path) for path in paths if path.is_file())
     else:
         runs = _from_tables(folder)
-    return LearningStudy(plan.env_id, plan.steps, settings, arms, plan.seeds, runs)
+    return LearningStudy(plan.env_id, plan.steps, settings, arms, plan.seeds, runs, compared)
 
 
 def save_tables(folder: Path, study: LearningStudy, results: Mapping[str, Any]) -> None:
@@ -251,7 +283,12 @@ def save_tables(folder: Path, study: LearningStudy, results: Mapping[str, Any]) 
         unfinished.write_text(text.getvalue(), encoding="utf-8")
     write_json(
         folder / RESULTS,
-        {**study.settings, **results, "runs": [_entry(run) for run in study.finished]},
+        {
+            **study.settings,
+            **results,
+            **({} if study.compared is None else {"compared": _compared_entry(study.compared)}),
+            "runs": [_entry(run) for run in study.finished],
+        },
     )
 
 
@@ -302,6 +339,22 @@ def _entry(run: LearningRun) -> dict[str, Any]:
     }
 
 
+def _compared_entry(compared: Compared) -> dict[str, Any]:
+    return {
+        "agent": compared.agent,
+        "alone": compared.alone.to_dict(),
+        "shielded": None if compared.shielded is None else compared.shielded.to_dict(),
+    }
+
+
+def _load_compared(path: Path) -> Compared:
+    try:
+        stored = conformed(read_json(path), _StoredCompared)
+    except MisfitError as error:
+        raise InputError(f"{path} lacks a part ({error}); delete it") from error
+    return Compared(stored.agent, stored.alone, stored.shielded)
+
+
 # What a file says at least.
 class _Plan(Struct):
     env_id: str
@@ -335,6 +388,12 @@ class _StoredRun(Struct):
 
 class _StoredRunWithCurve(_StoredRun):
     curve: Columns
+
+
+class _StoredCompared(Struct):
+    agent: str
+    alone: Trial
+    shielded: Trial | None
 
 
 class _Results(Struct):

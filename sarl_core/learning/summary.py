@@ -48,6 +48,8 @@ class TrialSummary:
         cost: What an episode costs on average, with its 95 % interval; None where it is not known.
         intervention_rate: Mean share of the steps that the rules changed.
         coverage: Mean share of the steps to which a rule applied.
+        freedom: Mean of what the rules left the policy to choose from, 0 to 1; None without a
+            shield, or where it was not kept.
         episodes: How many there are, of all runs.
         cut: How many of them were cut off before their end; none of them is among the crashes.
     """
@@ -61,6 +63,7 @@ class TrialSummary:
     cost: MeanInterval | None
     intervention_rate: float
     coverage: float
+    freedom: float | None
     episodes: int
     cut: int
 
@@ -131,16 +134,39 @@ class ArmSummary:
             "late_return": _number(self.late_return),
             "intervention_rate": _number(self.intervention_rate),
             "late_intervention_rate": _number(self.late_intervention_rate),
-            "alone": self._trials(self.alone),
-            "shielded": None if self.shielded is None else self._trials(self.shielded),
+            "alone": _trial_dict(self.alone, self.failures_known),
+            "shielded": None
+            if self.shielded is None
+            else _trial_dict(self.shielded, self.failures_known),
             "safe": self.safe,
             "good": self.good,
         }
 
-    def _trials(self, trials: TrialSummary) -> dict[str, Any]:
-        fields = _trial_dict(trials)
-        unknown = dict.fromkeys(("crash_rate", "crash_low", "crash_high"))
-        return fields if self.failures_known else fields | unknown
+
+@dataclass(frozen=True)
+class ComparedSummary:
+    """An agent that has learned nothing here, on the episodes by which learners are judged.
+
+    Attributes:
+        agent: Its name.
+        alone: Without a shield.
+        shielded: With the shield on; None without rules.
+        failures_known: As of an `ArmSummary`.
+    """
+
+    agent: str
+    alone: TrialSummary
+    shielded: TrialSummary | None
+    failures_known: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        known, shielded = self.failures_known, self.shielded
+        return {
+            "agent": self.agent,
+            "alone": _trial_dict(self.alone, known),
+            "shielded": None if shielded is None else _trial_dict(shielded, known),
+        }
 
 
 def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
@@ -156,6 +182,26 @@ def summarise_study(study: LearningStudy) -> tuple[ArmSummary, ...]:
     if not study.failures_known:
         return tuple(replace(summary, failures_known=False) for summary in by_arm.values())
     return tuple(_judged(summary, by_arm.get(summary.arm.alone)) for summary in by_arm.values())
+
+
+def summarise_compared(study: LearningStudy) -> ComparedSummary | None:
+    """Sum up the agent that the learners are compared with.
+
+    Args:
+        study: Any.
+
+    Returns:
+        None where none was named.
+    """
+    compared = study.compared
+    if compared is None:
+        return None
+    return ComparedSummary(
+        compared.agent,
+        _trials([compared.alone]),
+        None if compared.shielded is None else _trials([compared.shielded]),
+        study.failures_known,
+    )
 
 
 def best(summaries: Sequence[ArmSummary], choose: Choice = "return") -> ArmSummary | None:
@@ -231,6 +277,7 @@ def _trials(trials: Sequence[Trial]) -> TrialSummary:
         cost=_cost(trials),
         intervention_rate=float(np.mean([trial.intervention_rate for trial in trials])),
         coverage=float(np.mean([trial.coverage for trial in trials])),
+        freedom=_freedom(trials),
         episodes=episodes,
         cut=sum(trial.cut for trial in trials),
     )
@@ -251,6 +298,11 @@ def _cost(trials: Sequence[Trial]) -> MeanInterval | None:
     if len(trials) == 1:
         return cost_interval(trials[0].costs)
     return cost_interval([float(np.mean(trial.costs)) for trial in trials])
+
+
+def _freedom(trials: Sequence[Trial]) -> float | None:
+    known = [trial.freedom for trial in trials if trial.freedom is not None]
+    return float(np.mean(known)) if len(known) == len(trials) else None
 
 
 @lru_cache(maxsize=256)
@@ -292,9 +344,9 @@ def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
+def _trial_dict(trials: TrialSummary, failures_known: bool) -> dict[str, Any]:
     returns = trials.returns
-    return {
+    fields = {
         "means": list(trials.means),
         "halves": list(trials.halves),
         "mean": trials.mean,
@@ -317,5 +369,8 @@ def _trial_dict(trials: TrialSummary) -> dict[str, Any]:
         ),
         "intervention_rate": trials.intervention_rate,
         "coverage": trials.coverage,
+        **({} if trials.freedom is None else {"freedom": trials.freedom}),
         **({"cut": trials.cut} if trials.cut else {}),
     }
+    unknown = dict.fromkeys(("crash_rate", "crash_low", "crash_high"))
+    return fields if failures_known else fields | unknown

@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 
@@ -26,6 +26,7 @@ from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.files import shared_temporary_folder
 from sarl_core.learning.arms import LearningArm
+from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study_files import (
     LearningStudy,
     load_run,
@@ -35,6 +36,7 @@ from sarl_core.learning.study_files import (
 )
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
+from sarl_core.rollouts.choices import Choice
 from sarl_core.shielding.shield import Projection
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs.job import Job
@@ -61,6 +63,10 @@ class LearningOrder:
         steps: Of each run.
         seeds: How many learners of each kind.
         projection: What becomes of a continuous action that breaks a rule.
+        episodes: Of each learner after learning.
+        choose: What comes first where the best way to learn is chosen.
+        agent: Whom the learners are compared with: its name on screen, and what the command line
+            calls it; None for nobody.
     """
 
     env_id: EnvironmentOrId
@@ -69,19 +75,29 @@ class LearningOrder:
     steps: int
     seeds: int
     projection: Projection
+    episodes: int = TRIAL_EPISODES
+    choose: Choice = "return"
+    agent: tuple[str, str] | None = None
 
     @property
     def conditions(self) -> str:
         """Digest of what all runs share."""
         rules = self.rules.digest if self.rules is not None else ""
-        shared = (as_environment(self.env_id).key, rules, self.steps, self.projection)
+        shared = (
+            as_environment(self.env_id).key,
+            rules,
+            self.steps,
+            self.projection,
+            self.episodes,
+        )
         return digest_of(repr(shared).encode())[:16]
 
     @property
     def folder(self) -> Path:
         """Where the study is, or will be."""
         names = tuple(arm.name for arm in self.arms)
-        return base() / f"{self.conditions}-{digest_of(repr((names, self.seeds)).encode())[:16]}"
+        wanted = (names, self.seeds, *(() if self.agent is None else (self.agent,)))
+        return base() / f"{self.conditions}-{digest_of(repr(wanted).encode())[:16]}"
 
     @property
     def steps_in_all(self) -> int:
@@ -116,7 +132,12 @@ def study_of(order: LearningOrder) -> LearningStudy | None:
         return None
     with suppress(OSError):
         os.utime(order.folder)  # somebody looks at it: it stays
-    return load_study(order.folder)
+    study = load_study(order.folder)
+    compared = study.compared
+    if compared is not None and order.agent is not None:
+        compared = replace(compared, agent=order.agent[0])
+    # Chosen is among what has been played: another choice plays nothing anew.
+    return replace(study, settings={**study.settings, "choose": order.choose}, compared=compared)
 
 
 class Training:
@@ -151,6 +172,8 @@ class Training:
                     *(*as_environment(order.env_id).words, *rules, "--steps", str(order.steps)),
                     *(part for arm in order.arms for part in ("--arm", arm.name)),
                     *("--seeds", str(order.seeds), "--projection", order.projection),
+                    *("--episodes", str(order.episodes), "--choose", order.choose),
+                    *(() if order.agent is None else ("--agent", order.agent[1])),
                     *("--out", str(self.folder)),
                 ],
                 cwd=ROOT,

@@ -49,7 +49,8 @@ def a_run(arm: str) -> LearningRun:
     columns |= {"crashed": [1] * 10, "interventions": [3] * 10, "covered": [9] * 10}
     columns |= {"ends": list(range(60, 601, 60)), "shielded": [1] * 10}
     trial = Trial((9.0, 10.0), 2, 0.0, 0.0)
-    return LearningRun(ARMS[arm], 0, 600, Columns(**columns).read(), trial, trial)
+    shielded = replace(trial, freedom=0.25)
+    return LearningRun(ARMS[arm], 0, 600, Columns(**columns).read(), trial, shielded)
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,8 @@ def test_the_shipped_study_stands_first(small_study: Path, monkeypatch: pytest.M
     assert len(app.get("plotly_chart")) == 3
     table = app.dataframe[0].value
     assert table["Way to learn"].tolist() == ["No shield", "Mask"]
+    assert table["Freedom, shield on"].tolist() == ["25 %", "25 %"]
+    assert "Freedom with the shield on: 25 % of the choice is left to the agent." in texts(app)
     shown = texts(app)
     assert "CartPole-v1, 1,508 rules (support 0, confidence 1), 600 steps" in shown
     commands = "\n".join(code.value for code in app.code)
@@ -161,7 +164,8 @@ def test_before_the_start_it_says_what_to_do() -> None:
 
 
 def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None:
-    app = own("none", "imitate", learn_steps="1000")
+    few = {"learn_steps": "1000", "learn_episodes": "3", "learn_compare": "novice"}
+    app = own("none", "imitate", **few)
     app.button(key="run_learning").click().run()
     assert not app.exception
     assert button(app, "cancel_learning") is not None
@@ -169,7 +173,13 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
     assert not errors(app), errors(app)
     assert "2 runs of 1,000 steps in CartPole-v1, all finished" in texts(app)
     assert app.button(key="run_learning").disabled
-    assert app.dataframe[0].value["Way to learn"].tolist() == ["No shield", "Mask and imitate"]
+    assert app.dataframe[0].value["Way to learn"].tolist() == [
+        "No shield",
+        "Mask and imitate",
+        "novice, for comparison",
+    ]
+    assert "3 episodes each afterwards" in texts(app)
+    assert "on the episodes afterwards “novice” without the shield returns" in texts(app)
     assert [each.label for each in app.get("download_button")] == [
         "Download policy (.npz)",
         "Download everything (.zip)",
@@ -177,8 +187,48 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
     (folder,) = own_folder.iterdir()
     assert (folder / "policies" / "imitate-0.npz").is_file()
     # Whoever asks the same again sees it at once.
-    again = own("none", "imitate", learn_steps="1000")
+    again = own("none", "imitate", **few)
     assert "all finished" in texts(again)
+
+
+def test_what_was_learned_is_chosen_from_again_by_what_comes_first() -> None:
+    """Mask returns more, and handover fails less; both are safe and good."""
+    app = own("none", "mask", "handover", learn_steps="1000")
+    rules = mine_rules(
+        load_demonstrations(ROOT / "data" / "demonstrations" / "cartpole.parquet"),
+        supp_min=0.0,
+        conf_min=1.0,
+    )
+    arms = arms_named(["none", "mask", "handover"])
+    order = learning.LearningOrder("CartPole-v1", rules, arms, 1000, 1, "centre")
+    make_folder(order.folder)
+    plan = LearningPlan("CartPole-v1", rules, arms, 1000, (0,))
+    write_json(order.folder / "plan.json", plan.settings())
+    for arm, crashed, value, failed in (
+        ("none", 1, 5.0, True),
+        ("mask", 0, 30.0, True),
+        ("handover", 0, 20.0, False),
+    ):
+        run = a_run(arm)
+        curve = replace(run.curve, crashed=run.curve.crashed & bool(crashed))
+        alone = Trial((value,) * 4, 4 * failed, 0.0, 0.0, failed=(failed,) * 4)
+        save_run(order.folder, replace(run, done=1000, curve=curve, alone=alone))
+    app.run()
+    assert "good afterwards\\: “Mask”." in app.success[0].value
+    app.selectbox(key="learn_choose").set_value("failures").run()
+    assert not errors(app)
+    (answer,) = app.success
+    assert "good afterwards\\: “Imitate, then hand over”." in answer.value
+    assert "the fewest failures, and among equals" in answer.value
+
+
+def test_who_can_be_compared_with_depends_on_the_environment() -> None:
+    assert own().selectbox(key="learn_compare").options == [
+        "nobody",
+        "novice",
+        "untrained",
+        "expert",
+    ]
 
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
@@ -231,6 +281,7 @@ REAL = subprocess.Popen
     [
         ((), {"learn_rules": "own file"}, "rule file has been uploaded"),
         (("mask",), {"data": "pendulum"}, "continuous"),
+        (("none",), {"data": "pendulum", "learn_choose": "failures first"}, "chosen by failures"),
         ((), {"data": "upload"}, "demonstrations do not say"),
     ],
 )
@@ -357,6 +408,8 @@ def test_orders_differ_in_their_folders_by_all_that_changes_the_numbers() -> Non
         replace(order, rules=OTHER_RULES),
         replace(order, arms=(ARMS["none-replay"],)),
         replace(order, projection="clip"),
+        replace(order, episodes=7),
+        replace(order, agent=("novice", "novice")),
     ]
     assert len({each.folder for each in (order, *others)}) == len(others) + 1
-    assert replace(order).folder == order.folder
+    assert replace(order, choose="failures").folder == order.folder

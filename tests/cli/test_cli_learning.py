@@ -49,6 +49,32 @@ def test_without_rules_the_learner_alone_learns(run, tmp_path):
     assert document["arms"][0]["shielded"] is None
 
 
+def test_learners_are_compared_with_an_agent_of_the_callers_own(
+    run, cart_rules, tmp_path, monkeypatch
+):
+    (tmp_path / "upright.py").write_text(
+        "def push(observations):\n    return (observations[:, 2] > 0).astype(int)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    out = tmp_path / "learned"
+    arguments = (*BASE, "--rules", cart_rules, "--arm", "none", "--out", out)
+    document = json.loads(run(*arguments, "--agent", "upright:push", "--json"))
+    compared = document["compared"]
+    assert compared["agent"] == "upright:push"
+    assert any("“upright:push” without the shield returns" in text for text in document["finding"])
+    played = json.loads(
+        run(
+            *("evaluate", "--env", "CartPole-v1", "--agent", "upright:push", "--episodes", 2),
+            *("--seed", 9_000_000, "--json"),
+        )
+    )
+    assert compared["alone"]["mean"] == played["summary"]["mean"]
+    assert json.loads((out / "results.json").read_text())["compared"]["agent"] == "upright:push"
+    again = json.loads(run(*arguments, "--agent", "novice", "--json"))  # what was learned stays
+    assert again["compared"]["agent"] == "novice"
+    assert "compared" not in json.loads(run(*arguments, "--json"))
+
+
 @pytest.mark.parametrize(
     ("more", "fragment"),
     [
@@ -59,6 +85,7 @@ def test_without_rules_the_learner_alone_learns(run, tmp_path):
         (("--env", "Nowhere-v1"), "Nowhere-v1"),
         (("--seeds", 0), "seeds"),
         (("--rules", "{other}"), "version 9"),
+        (("--arm", "none", "--agent", "nowhere:agent"), "nowhere"),
         (("--rules", "{rules}", "--env", "LunarLander-v3"), "4 features"),
         (("--arm", "none", "--out", "{file}/x"), "cannot be made"),
     ],

@@ -18,8 +18,8 @@ from sarl_core.explaining.figures.learning import (
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, verdict
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.curves import Columns, Trial
-from sarl_core.learning.study_files import LearningRun, LearningStudy
-from sarl_core.learning.summary import summarise_study
+from sarl_core.learning.study_files import Compared, LearningRun, LearningStudy
+from sarl_core.learning.summary import summarise_compared, summarise_study
 
 RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
 
@@ -85,7 +85,7 @@ def test_conditions_and_what_the_rules_are_worth_are_said(study: LearningStudy) 
     assert "3,274 rules (support 0, confidence 1)" in paragraphs[-1]
     assert "2 learners of each kind" in paragraphs[-1]
     (alone,) = [text for text in paragraphs if text.startswith("Without any shield")]
-    assert "“No shield” crashed 9 times while learning, in 90 % of its episodes" in alone
+    assert "“No shield” failed 9 times while learning, in 90 % of its episodes" in alone
     assert "Mind" not in alone
 
 
@@ -95,7 +95,7 @@ def test_a_learner_that_is_as_safe_without_a_shield_is_not_passed_over() -> None
     )
     paragraphs = finding(study, summarise_study(study))
     (alone,) = [text for text in paragraphs if text.startswith("Without any shield")]
-    assert "Mind that “No shield, replay” crashed no more often" in alone
+    assert "Mind that “No shield, replay” failed no more often" in alone
 
 
 def test_rules_that_no_threshold_cut_are_called_by_what_they_are() -> None:
@@ -130,8 +130,8 @@ def test_where_nothing_is_known_of_failures_nothing_is_said(
     summaries = summarise_study(other)
     told = finding(other, summaries)
     assert told[0].startswith(why)
-    assert not any("crash" in text for text in told)
-    places = [HEADINGS.index(name) for name in HEADINGS if "rash" in name]
+    assert not any("fail" in text for text in told[1:])
+    places = [HEADINGS.index(name) for name in HEADINGS if "ail" in name]
     assert len(places) == 2
     assert {row[place] for row in table_rows(summaries) for place in places} == {"–"}
     document = summaries[0].to_dict()
@@ -147,12 +147,58 @@ def test_the_table_has_a_row_an_arm_under_its_headings(study: LearningStudy) -> 
     rows = table_rows(summarise_study(study))
     assert all(len(row) == len(HEADINGS) for row in rows)
     table = {row[0]: dict(zip(HEADINGS, row, strict=True)) for row in rows}
-    assert table["No shield"]["Crashes while learning"] == "9 (8–10)"
+    assert table["No shield"]["Failures while learning"] == "9 (8–10)"
     assert table["No shield"]["Changed"] == "–"
-    assert table["Mask"]["Crashes while learning"] == "9"
+    assert table["Mask"]["Failures while learning"] == "9"
     assert table["Override"]["Verdict"] == "safe, not good"
     assert table["Imitate, then hand over"]["Verdict"] == "safe and good"
     assert table["Imitate, then hand over"]["Return after"] == "200 (190 to 210)"
+
+
+def test_freedom_is_said_where_it_was_kept(study: LearningStudy) -> None:
+    runs = tuple(
+        replace(run, shielded=replace(run.shielded, freedom=0.2 if run.arm.name == "mask" else 0.0))
+        for run in study.runs
+        if run.shielded is not None
+    )
+    free = replace(study, runs=runs)
+    summaries = summarise_study(free)
+    (told,) = [text for text in finding(free, summaries) if text.startswith("Freedom")]
+    assert told == (
+        "Freedom with the shield on: from 0 % to 20 % of the choice is left to the agent, by who "
+        "acts."
+    )
+    column = HEADINGS.index("Freedom, shield on")
+    table = {row[0]: row[column] for row in table_rows(summaries)}
+    assert (table["Mask"], table["Override"]) == ("20 %", "0 %")
+    assert summaries[0].to_dict()["shielded"]["freedom"] == 0.0
+    assert not any("Freedom" in text for text in finding(study, summarise_study(study)))
+
+
+def test_an_agent_for_comparison_stands_below_and_is_a_line(study: LearningStudy) -> None:
+    trial = Trial((70.0, 90.0), 1, 0.0, 0.0, failed=(True, False))
+    beside = replace(study, compared=Compared("crane:operator", trial, replace(trial, crashes=0)))
+    summaries, compared = summarise_study(beside), summarise_compared(beside)
+    assert any(
+        "“crane:operator” without the shield returns 80 and fails in 50 %, and with it returns 80 "
+        "and fails in 0 %" in text
+        for text in finding(beside, summaries)
+    )
+    *_, last = table_rows(summaries, compared)
+    row = dict(zip(HEADINGS, last, strict=True))
+    assert row["Way to learn"] == "crane:operator, for comparison"
+    assert (row["Failures while learning"], row["Return after"], row["Shield on"]) == (
+        "–",
+        "80",
+        "80",
+    )
+    assert compared is not None
+    assert compared.to_dict()["alone"]["crash_rate"] == 0.5
+    (line,) = [
+        shape for shape in outcome_figure(summaries, compared).layout.shapes if shape.y0 == 80
+    ]
+    assert line.y1 == 80
+    assert afterwards_figure(summaries, compared).layout.yaxis.ticktext[-1] == "crane:operator"
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from sarl_core import Environment
+import pytest
+
+from sarl_core import Environment, load_demonstrations, mine_rules
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.run import learn
+from sarl_core.shipped import DATA
+
+CARTPOLE = DATA / "demonstrations" / "cartpole.parquet"
 
 
 def test_a_learner_fails_by_what_its_caller_calls_a_failure() -> None:
@@ -19,3 +24,13 @@ def test_a_learner_fails_by_what_its_caller_calls_a_failure() -> None:
     assert (never.alone.crashes, often.alone.crashes) == (0, 4)
     assert often.alone.failed == (True,) * 4
     assert often.alone.costs == (0.0,) * 4
+
+
+def test_a_trial_tells_what_the_rules_left_free() -> None:
+    rules = mine_rules(load_demonstrations(CARTPOLE), supp_min=0.005, conf_min=0.9)
+    result = learn("CartPole-v1", rules, ARMS["none"], steps=600, episodes=4)
+    assert result.alone.freedom is None
+    assert result.shielded is not None
+    # A rule of one action leaves nothing, and no rule leaves everything.
+    assert result.shielded.freedom == pytest.approx(1 - result.shielded.coverage)
+    assert 0 < result.shielded.freedom < 1

@@ -21,6 +21,8 @@ from sarl_core.learning.study_files import LearningRun, LearningStudy
 from sarl_core.learning.summary import (
     SAFE_SHARE,
     ArmSummary,
+    ComparedSummary,
+    summarise_compared,
     summarise_study,
 )
 from sarl_core.mining.language import share_text
@@ -39,7 +41,7 @@ _COLOURS = {
 }
 _GOOD = "#009E73"
 _BINS = 24
-_PANELS = ("return of an episode", "crashes so far", "changed by the rules")
+_PANELS = ("return of an episode", "failures so far", "changed by the rules")
 _ROW_HEIGHT = 46
 
 
@@ -56,7 +58,7 @@ def arm_colour(arm: LearningArm) -> str:
 
 
 def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
-    """How learning went: return, crashes so far, and how often the rules changed an action.
+    """How learning went: return, failures so far, and how often the rules changed an action.
 
     Args:
         study: Finished, or at work: then each line ends where its runs are.
@@ -106,21 +108,28 @@ def curves_figure(study: LearningStudy, *, height: int = 720) -> go.Figure:
     return figure
 
 
-def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.Figure:
+def outcome_figure(
+    summaries: Sequence[ArmSummary],
+    compared: ComparedSummary | None = None,
+    *,
+    height: int = 460,
+) -> go.Figure:
     """Safe while learning against good afterwards, a point an arm.
 
     Args:
         summaries: Of `summarise_study`.
+        compared: Of `summarise_compared`: a dashed line, because it has not learned.
         height: In pixels.
 
     Returns:
-        Crashes while learning to the right, return afterwards without a shield upwards; small
+        Failures while learning to the right, return afterwards without a shield upwards; small
         points are single learners. The shaded corner is where an arm is both.
     """
     figure = go.Figure()
     plain = next((one for one in summaries if one.arm.name == "none"), None)
     crashes = [count for one in summaries for count in one.crashes] or [0]
     means = [mean for one in summaries for mean in one.alone.means] or [0.0]
+    means += [] if compared is None else [compared.alone.mean]
     width = max(crashes) * 1.12 + 1
     span = max(max(means) - min(means), 1.0)
     bottom, top = min(means) - 0.1 * span, max(means) + 0.16 * span
@@ -144,6 +153,16 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
             yanchor="top",
             font={"color": _GOOD},
         )
+    if compared is not None:
+        figure.add_hline(
+            y=compared.alone.mean,
+            line={"color": MUTED_COLOUR, "width": 1.5, "dash": "dash"},
+            annotation={
+                "text": compared.agent,
+                "font": {"color": MUTED_COLOUR},
+                "xanchor": "right",
+            },
+        )
     for one, place in zip(summaries, _places(summaries, span, width), strict=True):
         colour = arm_colour(one.arm)
         figure.add_scatter(
@@ -153,7 +172,7 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
             marker={"color": colour, "size": 6, "opacity": 0.5, "symbol": _symbol(one.arm)},
             customdata=one.seeds,
             hovertemplate=(
-                f"{one.arm.title}, seed %{{customdata}}<br>%{{x:,}} crashes while learning<br>"
+                f"{one.arm.title}, seed %{{customdata}}<br>%{{x:,}} failures while learning<br>"
                 "return afterwards %{y:,.0f}<extra></extra>"
             ),
         )
@@ -172,13 +191,13 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
                 "line": {"width": 1, "color": "#ffffff"},
             },
             hovertemplate=(
-                f"{one.arm.title}<br>%{{x:,.0f}} crashes while learning<br>return afterwards "
+                f"{one.arm.title}<br>%{{x:,.0f}} failures while learning<br>return afterwards "
                 f"%{{y:,.0f}}<br>mean of {len(one.seeds)}<extra></extra>"
             ),
         )
     figure.update_layout(**figure_layout(height, margin={"r": 16}, showlegend=False))
     figure.update_xaxes(
-        title={"text": "crashes while learning", "standoff": 2},
+        title={"text": "failures while learning", "standoff": 2},
         range=[-0.02 * width, width],
         fixedrange=True,
         nticks=7,
@@ -195,15 +214,19 @@ def outcome_figure(summaries: Sequence[ArmSummary], *, height: int = 460) -> go.
     return figure
 
 
-def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
+def afterwards_figure(
+    summaries: Sequence[ArmSummary], compared: ComparedSummary | None = None
+) -> go.Figure:
     """Returns after learning, with the shield taken off and with it on.
 
     Args:
         summaries: Of `summarise_study`.
+        compared: Of `summarise_compared`.
 
     Returns:
-        A row an arm: interquartile means with their 95 % intervals, filled without the shield,
-        hollow with it; the dotted line is PPO that never had a shield.
+        A row an arm, and one of the agent that they are compared with: interquartile means with
+        their 95 % intervals, filled without the shield, hollow with it; the dotted line is PPO
+        that never had a shield.
     """
     figure = go.Figure()
     plain = next((one for one in summaries if one.arm.name == "none"), None)
@@ -211,14 +234,17 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
         figure.add_vline(
             x=plain.alone.returns.iqm, line={"color": MUTED_COLOUR, "width": 1.5, "dash": "dot"}
         )
-    for row, one in enumerate(summaries):
+    lines = [(one.arm.title, arm_colour(one.arm), one.alone, one.shielded) for one in summaries]
+    if compared is not None:
+        lines.append((compared.agent, MUTED_COLOUR, compared.alone, compared.shielded))
+    for row, (title, colour, alone, shielded) in enumerate(lines):
         for trials, shift, symbol, words in (
-            (one.alone, -0.14, "diamond", "shield off"),
-            (one.shielded, 0.2, "circle-open", "shield on"),
+            (alone, -0.14, "diamond", "shield off"),
+            (shielded, 0.2, "circle-open", "shield on"),
         ):
             if trials is None:
                 continue
-            returns, colour = trials.returns, arm_colour(one.arm)
+            returns = trials.returns
             figure.add_scatter(
                 x=[returns.iqm],
                 y=[row + shift],
@@ -242,12 +268,12 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
                 legendgroup=words,
                 showlegend=row == 0,
                 hovertemplate=(
-                    f"{one.arm.title}, {words}: <b>{rounded_text(returns.iqm)}</b><br>95 % "
+                    f"{title}, {words}: <b>{rounded_text(returns.iqm)}</b><br>95 % "
                     f"interval {rounded_text(returns.low)} to {rounded_text(returns.high)}<br>mean "
                     f"{rounded_text(returns.mean)}<extra></extra>"
                 ),
             )
-    rows = len(summaries)
+    rows = len(lines)
     figure.update_layout(
         **figure_layout(84 + _ROW_HEIGHT * rows, margin={"r": 16}),
         showlegend=True,
@@ -261,7 +287,7 @@ def afterwards_figure(summaries: Sequence[ArmSummary]) -> go.Figure:
     )
     figure.update_yaxes(
         tickvals=list(range(rows)),
-        ticktext=[one.arm.title for one in summaries],
+        ticktext=[title for title, *_ in lines],
         range=[rows - 0.5, -0.6],
         fixedrange=True,
         showgrid=False,
@@ -283,11 +309,11 @@ def save_learning_figures(study: LearningStudy, folder: Path) -> None:
     """
     from sarl_core.explaining.figures.png import drawing_pictures
 
-    summaries = summarise_study(study)
+    summaries, compared = summarise_study(study), summarise_compared(study)
     figures = {
-        "outcome": outcome_figure(summaries, height=520),
+        "outcome": outcome_figure(summaries, compared, height=520),
         "curves": curves_figure(study, height=820),
-        "afterwards": afterwards_figure(summaries),
+        "afterwards": afterwards_figure(summaries, compared),
     }
     with drawing_pictures() as draw:
         for name, figure in figures.items():

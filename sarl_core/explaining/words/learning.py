@@ -14,14 +14,16 @@ from sarl_core.learning.study_files import LearningStudy
 from sarl_core.learning.summary import (
     SAFE_SHARE,
     ArmSummary,
+    ComparedSummary,
     TrialSummary,
     best,
     reference,
+    summarise_compared,
 )
 from sarl_core.mining.language import at_least_text, counted, share_text, threshold_text
 from sarl_core.rollouts.choices import CHOICE_TEXTS
 from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
-from sarl_core.rollouts.failures import interval_text
+from sarl_core.rollouts.failures import freedom_text, interval_text
 
 _SAME = 1.0  # returns that differ by no more are the same
 _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the rules decide
@@ -29,16 +31,17 @@ _NEARLY_ALL = 0.99  # share of the steps to which a rule applies, so that the ru
 HEADINGS = (
     "Way to learn",
     "Verdict",
-    "Crashes while learning",
+    "Failures while learning",
     "Episodes",
     "Changed",
     "Return meanwhile",
     "Return after",
     "Typical return, 95 % interval",
-    "Crashed after",
+    "Failed after",
     "Worst tenth after",
     "Cost after",
     "Shield on",
+    "Freedom, shield on",
 )
 
 
@@ -61,18 +64,21 @@ def verdict(summary: ArmSummary) -> str:
     }[summary.safe, summary.good]
 
 
-def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
+def table_rows(
+    summaries: Sequence[ArmSummary], compared: ComparedSummary | None = None
+) -> list[tuple[str, ...]]:
     """The study as a table.
 
     Args:
         summaries: Of `summarise_study`.
+        compared: Of `summarise_compared`.
 
     Returns:
-        A row an arm, under `HEADINGS`.
+        A row an arm, under `HEADINGS`; and one of the agent that they are compared with.
     """
     rows: list[tuple[str, ...]] = []
     for summary in summaries:
-        alone, shielded, known = summary.alone, summary.shielded, summary.failures_known
+        known = summary.failures_known
         spread = (
             f" ({rounded_text(min(summary.crashes))}–{rounded_text(max(summary.crashes))})"
             if len(summary.crashes) > 1
@@ -86,16 +92,31 @@ def table_rows(summaries: Sequence[ArmSummary]) -> list[tuple[str, ...]]:
                 rounded_text(float(np.mean(summary.episodes))),
                 share_text(summary.intervention_rate) if summary.arm.shielded else "–",
                 rounded_text(summary.learning_return),
-                _with_worst(alone.mean, alone.means),
-                f"{rounded_text(alone.returns.iqm)} ({rounded_text(alone.returns.low)} to "
-                f"{rounded_text(alone.returns.high)})",
-                f"{_crash_share(alone)} ({interval_text(alone.failures)})" if known else "–",
-                rounded_text(alone.worst_tenth),
-                _cost(alone),
-                "–" if shielded is None else rounded_text(shielded.mean),
+                *_afterwards(summary.alone, summary.shielded, known),
             )
         )
+    if compared is not None:
+        title = f"{compared.agent}, for comparison"
+        after = _afterwards(compared.alone, compared.shielded, compared.failures_known)
+        rows.append((title, *["–"] * (len(HEADINGS) - 1 - len(after)), *after))
     return rows
+
+
+def _afterwards(
+    alone: TrialSummary, shielded: TrialSummary | None, failures_known: bool
+) -> tuple[str, ...]:
+    """The columns of the episodes after learning."""
+    freedom = None if shielded is None else shielded.freedom
+    return (
+        _with_worst(alone.mean, alone.means),
+        f"{rounded_text(alone.returns.iqm)} ({rounded_text(alone.returns.low)} to "
+        f"{rounded_text(alone.returns.high)})",
+        f"{_failed_share(alone)} ({interval_text(alone.failures)})" if failures_known else "–",
+        rounded_text(alone.worst_tenth),
+        _cost(alone),
+        "–" if shielded is None else rounded_text(shielded.mean),
+        "–" if freedom is None else share_text(freedom),
+    )
 
 
 def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
@@ -114,7 +135,13 @@ def finding(study: LearningStudy, summaries: Sequence[ArmSummary]) -> list[str]:
     safest = best(judged, study.choose)
     paragraphs = [_answer(study, judged, summaries), *_others(judged, safest)]
     paragraphs.append(_alone(summaries, safest))
-    paragraphs += [_rules(study, summaries), _cut(study, summaries), _conditions(study)]
+    paragraphs += [
+        _compared_text(summarise_compared(study)),
+        _rules(study, summaries),
+        _freedom(summaries),
+        _cut(study, summaries),
+        _conditions(study),
+    ]
     return [paragraph for paragraph in paragraphs if paragraph]
 
 
@@ -126,9 +153,10 @@ def save_finding(study: LearningStudy, summaries: Sequence[ArmSummary], folder: 
         summaries: Of it.
         folder: Where it goes.
     """
-    rows = [HEADINGS, ["---"] * len(HEADINGS), *table_rows(summaries)]
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
-    text = "\n\n".join([f"# Learning in {study.env_id}", *finding(study, summaries), table])
+    table = table_rows(summaries, summarise_compared(study))
+    rows = [HEADINGS, ["---"] * len(HEADINGS), *table]
+    lines = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    text = "\n\n".join([f"# Learning in {study.env_id}", *finding(study, summaries), lines])
     with whole_file(folder / "finding.md") as unfinished:
         unfinished.write_text(f"{text}\n", encoding="utf-8")
 
@@ -151,21 +179,21 @@ def _answer(
     alone = reference(summaries, safest.arm)
     assert alone is not None  # else it were not judged
     after = rounded_text(safest.alone.halves[1])
-    crashes = [_crash_share(one.alone) for one in (safest, alone)]
+    failures = [_failed_share(one.alone) for one in (safest, alone)]
     chosen = "these returns are of the second"
     if study.choose == "failures":
         # What was chosen by a share cannot be reported by it.
-        crashes = [
+        failures = [
             at_least_text(one.alone.crash_halves[1], one.alone.cut) for one in (safest, alone)
         ]
         chosen = f"{CHOICE_TEXTS['failures']}; these shares and returns are of the second"
     return (
-        f"Safe while learning and good afterwards: “{safest.arm.title}”. While learning it crashed "
+        f"Safe while learning and good afterwards: “{safest.arm.title}”. While learning it failed "
         f"{_times(safest.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
-        f"crashes in {crashes[0]} of the episodes; the same learner "
-        f"that never had a shield returns {rounded_text(alone.alone.halves[1])} and crashes in "
-        f"{crashes[1]}. (It was chosen by the first half of the episodes "
+        f"fails in {failures[0]} of the episodes; the same learner "
+        f"that never had a shield returns {rounded_text(alone.alone.halves[1])} and fails in "
+        f"{failures[1]}. (It was chosen by the first half of the episodes "
         f"afterwards{': ' if study.choose == 'failures' else '; '}{chosen}.)"
     )
 
@@ -204,7 +232,7 @@ def _alone(summaries: Sequence[ArmSummary], safest: ArmSummary | None) -> str:
         return ""
     text = "Without any shield: " + _listed(
         [
-            f"“{summary.arm.title}” {_crashed(summary)}returns "
+            f"“{summary.arm.title}” {_failed(summary)}returns "
             f"{_with_worst(summary.alone.mean, summary.alone.means)} afterwards"
             for summary in alone
         ]
@@ -220,21 +248,37 @@ def _alone(summaries: Sequence[ArmSummary], safest: ArmSummary | None) -> str:
     fewer = all(sum(summary.episodes) < sum(safest.episodes) for summary in rivals)
     share = share_text(sum(safest.crashes) / max(sum(safest.episodes), 1))
     return (
-        f"{text}. Mind that {names} crashed no more often than the best shielded way to learn"
+        f"{text}. Mind that {names} failed no more often than the best shielded way to learn"
         f"{', in fewer and longer episodes' if fewer else ''}; of those of “{safest.arm.title}” "
-        f"{share} crashed."
+        f"{share} failed."
     )
 
 
-def _crashed(summary: ArmSummary) -> str:
+def _failed(summary: ArmSummary) -> str:
     """How often it did while learning; nothing where that is not known."""
     if not sum(summary.episodes):
         return "finished no episode while learning, and "
     if not summary.failures_known:
         return ""
     share = share_text(sum(summary.crashes) / sum(summary.episodes))
+    return f"failed {_times(summary.mean_crashes)} while learning, in {share} of its episodes, and "
+
+
+def _compared_text(compared: ComparedSummary | None) -> str:
+    """What the agent that they are compared with does on the same episodes."""
+    if compared is None:
+        return ""
+
+    def played(trials: TrialSummary) -> str:
+        fails = f" and fails in {_failed_share(trials)}" if compared.failures_known else ""
+        return f"returns {rounded_text(trials.mean)}{fails}"
+
+    text = f"For comparison, on the episodes afterwards “{compared.agent}” "
+    if compared.shielded is None:
+        return f"{text}{played(compared.alone)}."
     return (
-        f"crashed {_times(summary.mean_crashes)} while learning, in {share} of its episodes, and "
+        f"{text}without the shield {played(compared.alone)}, and with it "
+        f"{played(compared.shielded)}."
     )
 
 
@@ -248,13 +292,28 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     # Where an interval leaves the learner room, it matters what was learned.
     if not covered or np.ptp([trials.mean for trials in covered]) > _SAME:
         return ""
-    crashes = f", crashes in {_crash_share(covered[0])} of the episodes"
+    failures = f", fails in {_failed_share(covered[0])} of the episodes"
     if not summaries[0].failures_known:
-        crashes = ""
+        failures = ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "
-        f"whatever was learned: return {rounded_text(covered[0].mean)}{crashes}."
+        f"whatever was learned: return {rounded_text(covered[0].mean)}{failures}."
     )
+
+
+def _freedom(summaries: Sequence[ArmSummary]) -> str:
+    """What the rules leave those who have learned to choose from."""
+    known = [
+        summary.shielded.freedom
+        for summary in summaries
+        if summary.shielded is not None and summary.shielded.freedom is not None
+    ]
+    if not known:
+        return ""
+    least, most = (freedom_text(end(known)) for end in (min, max))
+    if least == most:
+        return f"Freedom with the shield on: {least}."
+    return f"Freedom with the shield on: from {share_text(min(known))} to {most}, by who acts."
 
 
 def _cost(trials: TrialSummary) -> str:
@@ -265,7 +324,7 @@ def _cost(trials: TrialSummary) -> str:
     return rounded_text(cost.mean, 1) + ("" if np.isnan(cost.low) else between)
 
 
-def _crash_share(trials: TrialSummary) -> str:
+def _failed_share(trials: TrialSummary) -> str:
     return at_least_text(trials.crash_rate, trials.cut)
 
 
@@ -300,7 +359,7 @@ def _conditions(study: LearningStudy) -> str:
     meant = ""
     if study.failures_known:
         meant = (
-            f"Safe means at most {share_text(SAFE_SHARE)} of the crashes of the same learner "
+            f"Safe means at most {share_text(SAFE_SHARE)} of the failures of the same learner "
             "without a shield; good means at least its mean return, both averaged over the "
             "learners. "
         )
@@ -314,7 +373,8 @@ def _conditions(study: LearningStudy) -> str:
 
 
 def _times(count: float) -> str:
-    return "once" if count == 1 else f"{rounded_text(count)} times"
+    text = rounded_text(count)
+    return "once" if text == "1" else f"{text} times"
 
 
 def _with_worst(mean: float, means: Sequence[float]) -> str:

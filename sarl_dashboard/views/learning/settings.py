@@ -7,16 +7,19 @@ import streamlit as st
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.learning.arms import ARMS
+from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
+from sarl_core.rollouts.choices import CHOICE_TEXTS
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.learning import LearningOrder
-from sarl_dashboard.state.agents import PROJECTIONS
+from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, compact_file
 from sarl_dashboard.text import refuse
 
-MOST_STEPS, MOST_SEEDS = 500_000, 5
+MOST_STEPS, MOST_SEEDS, MOST_EPISODES = 500_000, 5, 500
+NOBODY = "nobody"
 
 
 def settings() -> LearningOrder | None:
@@ -60,6 +63,16 @@ def settings() -> LearningOrder | None:
                 persist_state="session",
                 help="One may have been lucky; three say more.",
             )
+            episodes = st.number_input(
+                "Episodes afterwards",
+                1,
+                MOST_EPISODES,
+                TRIAL_EPISODES,
+                key="learn_episodes",
+                bind="query-params",
+                persist_state="session",
+                help="After learning, of each learner, without the shield and with it.",
+            )
             projection = PROJECTIONS[0]
             if not discrete:
                 projection = st.selectbox(
@@ -71,6 +84,26 @@ def settings() -> LearningOrder | None:
                     "of the rule's interval. Clip: the nearest value in it. Expert: what the "
                     "expert typically did there.",
                 )
+            choose = st.selectbox(
+                "Choose by",
+                tuple(CHOICE_TEXTS),
+                key="learn_choose",
+                bind="query-params",
+                persist_state="session",
+                format_func=lambda name: f"{name} first",
+                help="Which way to learn is the best of those that are safe and good. Return: the "
+                "highest mean return afterwards. Failures: the fewest failures, and among equals "
+                "the highest mean return. It is reported on other episodes.",
+            )
+            agent = st.selectbox(
+                "Compare with",
+                (NOBODY, *comparable_agents()),
+                key="learn_compare",
+                bind="query-params",
+                persist_state="session",
+                help="An agent that plays the episodes after learning too, without the shield and "
+                "with it, and learns nothing.",
+            )
         names = st.pills(
             "Ways to learn",
             list(ARMS),
@@ -100,13 +133,40 @@ def settings() -> LearningOrder | None:
         if not chosen:
             raise InputError("no way to learn is chosen; choose at least one above")
         plan = LearningPlan(
-            env_id, rule_set, chosen, int(steps), tuple(range(int(seeds))), projection
+            env_id,
+            rule_set,
+            chosen,
+            int(steps),
+            tuple(range(int(seeds))),
+            projection,
+            int(episodes),
+            choose=choose,
         )
         notes_notice(plan.notes)
     except SarlError as error:
         refuse(error)
         return None
-    return LearningOrder(env_id, rule_set, chosen, int(steps), int(seeds), projection)
+    compared = None if agent == NOBODY else (agent, own_agents().get(agent, agent))
+    return LearningOrder(
+        env_id,
+        rule_set,
+        chosen,
+        int(steps),
+        int(seeds),
+        projection,
+        int(episodes),
+        choose,
+        compared,
+    )
+
+
+def comparable_agents() -> tuple[str, ...]:
+    """Agents that need no file: the usual ones, and those of whoever runs the server."""
+    try:
+        expert = has_expert(environment_of(None))
+    except SarlError:
+        expert = False
+    return (*(name for name in AGENTS if name != "expert" or expert), *own_agents())
 
 
 def is_discrete() -> bool:

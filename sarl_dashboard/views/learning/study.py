@@ -16,8 +16,14 @@ from sarl_core.explaining.figures.learning import (
 )
 from sarl_core.explaining.html.headings import term
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
-from sarl_core.learning.study_files import LearningStudy, policy_path
-from sarl_core.learning.summary import best, summarise_study
+from sarl_core.learning.study_files import (
+    COMPARED,
+    CURVES,
+    RESULTS,
+    LearningStudy,
+    policy_path,
+)
+from sarl_core.learning.summary import best, summarise_compared, summarise_study
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.text import escaped
 
@@ -29,7 +35,7 @@ def show_study(study: LearningStudy, name: str) -> None:
         study: With finished runs.
         name: Of the place on screen, for the charts' keys.
     """
-    summaries = summarise_study(study)
+    summaries, compared = summarise_study(study), summarise_compared(study)
     answer, *more = finding(study, summaries)
     way = best(summaries, study.choose)
     (st.success if way is not None else st.info)(
@@ -37,11 +43,11 @@ def show_study(study: LearningStudy, name: str) -> None:
     )
     picture, words = st.columns([3, 2], gap="large")
     with picture:
-        st.markdown("**Crashes while learning, and what the learner is worth without its shield**")
+        st.markdown("**Failures while learning, and what the learner is worth without its shield**")
         chart(
-            outcome_figure(summaries),
+            outcome_figure(summaries, compared),
             f"outcome_{name}",
-            "Crashes while learning against the return afterwards without a shield",
+            "Failures while learning against the return afterwards without a shield",
         )
         st.caption("Large points are means, small ones single learners. Squares learn by replay.")
     with words:
@@ -55,7 +61,7 @@ def show_study(study: LearningStudy, name: str) -> None:
         show_curves(study, name)
     with after:
         chart(
-            afterwards_figure(summaries),
+            afterwards_figure(summaries, compared),
             f"after_{name}",
             "Return after learning with the shield on and off",
         )
@@ -67,14 +73,15 @@ def show_study(study: LearningStudy, name: str) -> None:
         )
     with table:
         st.dataframe(
-            [dict(zip(HEADINGS, row, strict=True)) for row in table_rows(summaries)],
+            [dict(zip(HEADINGS, row, strict=True)) for row in table_rows(summaries, compared)],
             hide_index=True,
             height="content",
         )
         st.caption(
-            "Means of the learners, in brackets the least and the largest. Crashed: the episode "
-            "ended by failure. Changed: share of the steps at which the rules changed what the "
-            "learner wanted. After: the shield is off, but in the last column."
+            "Means of the learners, in brackets the least and the largest. Failed: what the "
+            "task must never let happen has happened. Changed: share of the steps at which the "
+            "rules changed what the learner wanted. After: the shield is off, but in the last two "
+            "columns. Freedom: what the rules leave to choose from."
         )
     with arms:
         for summary in summaries:
@@ -92,7 +99,7 @@ def show_curves(study: LearningStudy, name: str) -> None:
     chart(
         curves_figure(study),
         f"curves_{name}",
-        "Return, crashes so far and share of changed actions while learning",
+        "Return, failures so far and share of changed actions while learning",
     )
     many = " A band reaches from the lowest learner to the highest." if len(study.seeds) > 1 else ""
     st.caption(
@@ -113,7 +120,7 @@ def archive(study: LearningStudy, folder: Path) -> bytes:
     """
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
-        paths = [folder / name for name in ("results.json", "curves.csv", "rules.json")]
+        paths = [folder / name for name in (RESULTS, CURVES, COMPARED, "rules.json")]
         paths += [policy_path(folder, run.arm, run.seed) for run in study.finished]
         for path in paths:
             if path.is_file():
