@@ -149,6 +149,19 @@ def rounded_text(value: float, decimals: int = 0) -> str:
     return f"−{text}" if value < 0 and any(digit in text for digit in "123456789") else text
 
 
+def telling_text(value: float) -> str:
+    """A return or a cost for sentences and tables: as many decimals as tell something.
+
+    Args:
+        value: Any; NaN or infinite where there is none.
+
+    Returns:
+        As "1,213", "21.3" or "−1.20"; "0" for zero; "–" where there is none.
+    """
+    size = abs(value)
+    return rounded_text(value, 0 if size >= 100 or value == 0 else 1 if size >= 10 else 2)
+
+
 def float32_around(value: float) -> tuple[float, float]:
     """The 32-bit numbers on either side of a number: no other pair is parted by it.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from sarl_core.decimals import rounded_text
+from sarl_core.decimals import telling_text
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import cannot_fail, no_failures_text
 from sarl_core.mining.language import at_least_text, share_text
@@ -120,10 +120,10 @@ def cost_text(summary: Mapping[str, float | None]) -> str:
     if cost is None or cost == summary.get("failure_rate"):
         return ""
     low, high = summary.get("cost_low"), summary.get("cost_high")
-    text = f"{_number(cost)} an episode"
+    text = f"{telling_text(cost)} an episode"
     if low is None or high is None:
         return f"{text}, each the same"
-    return f"{text} (95 % interval {_number(low)} to {_number(high)})"
+    return f"{text} (95 % interval {telling_text(low)} to {telling_text(high)})"
 
 
 def worst_tenth_text(summary: Mapping[str, float | None]) -> str:
@@ -138,11 +138,11 @@ def worst_tenth_text(summary: Mapping[str, float | None]) -> str:
     worst = summary.get("worst_tenth")
     if worst is None:
         return ""
-    text = f"a mean return of {_number(worst)}"
+    text = f"a mean return of {telling_text(worst)}"
     cost = summary.get("cost_worst_tenth")
     if cost is None or not cost_text(summary):
         return text
-    return f"{text}, a mean cost of {_number(cost)}"
+    return f"{text}, a mean cost of {telling_text(cost)}"
 
 
 def freedom_text(freedom: float) -> str:
@@ -205,19 +205,13 @@ def safety_cells(summary: Mapping[str, float], episodes: int) -> dict[str, str]:
     cost = summary.get("cost") if cost_text(summary) else None
     between = ""
     if "cost_low" in summary:
-        between = f" ({_number(summary['cost_low'])} to {_number(summary['cost_high'])})"
+        between = f" ({telling_text(summary['cost_low'])} to {telling_text(summary['cost_high'])})"
     worst = summary.get("worst_tenth")
     return {
         "Failures": "–" if rate is None else at_least_text(rate.rate, rate.unknown),
         "Failures, 95 %": "–"
         if rate is None
         else f"{share_text(rate.low)} to {share_text(rate.high)}",
-        "Cost": "–" if cost is None else f"{_number(cost)}{between}",
-        "Worst tenth": "–" if worst is None else _number(worst),
+        "Cost": "–" if cost is None else f"{telling_text(cost)}{between}",
+        "Worst tenth": "–" if worst is None else telling_text(worst),
     }
-
-
-def _number(value: float) -> str:
-    """With as many digits as tell something."""
-    size = abs(value)
-    return rounded_text(value, 0 if size >= 100 else 1 if size >= 10 else 2)

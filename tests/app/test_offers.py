@@ -11,7 +11,7 @@ from sarl_core import Environment
 from sarl_core.agents.offers import VARIABLE, Offers
 from sarl_core.cli.app import main
 from sarl_dashboard.state.environments import offers
-from tests.app.screens import errors, finished, html, metrics, open_page, run_through
+from tests.app.screens import errors, finished, html, metrics, open_page, run_through, texts
 
 TASK = """
 import gymnasium
@@ -57,6 +57,37 @@ def test_an_offered_agent_is_compared_with_the_others(offered: None) -> None:
     assert not errors(app)
     (table,) = [frame.value for frame in app.dataframe if "Agent" in frame.value]
     assert list(table["Agent"]) == ["operator"]
+
+
+def test_who_knows_the_task_stands_in_the_place_of_the_shipped_expert(offered: None) -> None:
+    query = {"data": "cartpole", "env": CRANE.id}
+    assert open_page("improve", **query).selectbox(key="expert").value == "operator"
+    (agents,) = [one for one in open_page("shield", **query).pills if one.key == "agents"]
+    assert agents.value == ["novice", "operator"]
+    compared = open_page("learning", learn_view="Your own", **query)
+    assert compared.selectbox(key="learn_compare").options[-1] == "operator"
+
+
+def test_a_failure_that_the_owner_names_is_said_on_every_page_that_plays(
+    offered: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    always = "cart position < 9"
+    failing = Environment("CartPole-v1", CRANE.arguments, failure=always, cost=always)
+    given = Offers((failing,), (("operator", "offered_task:operator"),))
+    monkeypatch.setenv(VARIABLE, given.to_text())
+    offers.cache_clear()
+    query = {"data": "cartpole", "agent": "operator", "rules": "filtered"}
+    replayed = run_through(open_page("replay", seed="3", **query), "replay")
+    assert "With the rules, and without them, it fails. Cost: 12" in texts(replayed)
+    assert metrics(replayed)["Freedom"].endswith("%")
+    app = open_page("ablation", ablation_episodes="6", most_rules="2", **query)
+    app.button(key="run_ablation").click().run()
+    finished(app, "ablation")
+    shown = metrics(app)
+    assert shown["Failures, all rules"] == "6 of 6"
+    assert (shown["Cost"], shown["Worst tenth"]) == ("12.0", "12.0")
+    (failures,) = [one for one in app.metric if one.label == "Failures, all rules"]
+    assert failures.delta == "54 % to 100 %"
 
 
 def test_nothing_is_imported_that_is_not_offered(tmp_path: Path) -> None:

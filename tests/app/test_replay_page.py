@@ -55,7 +55,9 @@ def test_an_agent_is_replayed_with_the_rules_and_without(data: str, agent: str, 
         "Length without",
         "Changed",
         "Covered",
+        "Freedom",
     }
+    assert "With the rules" in texts(app)  # how it ended
     assert "settings have changed" not in texts(app)
     assert len(app.get("plotly_chart")) == 2
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sarl_core import RuleSet, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core import Environment, RuleSet, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.explaining.figures.ablation import (
     VERDICT_COLOURS,
     ablation_columns,
@@ -15,7 +15,7 @@ from sarl_core.explaining.figures.ablation import (
     difference_text,
     left_out_text,
 )
-from sarl_core.explaining.words.fork import ending_text, fork_text
+from sarl_core.explaining.words.fork import ending_text, ending_texts, fork_text
 from sarl_core.rendering.fork import fork
 from sarl_core.studies.ablation import Ablation
 from sarl_core.studies.ablation_run import ablate
@@ -107,3 +107,14 @@ def test_endings_have_the_words_of_their_environment() -> None:
     assert ending_text("end", "BipedalWalker-v3") == "it arrives"
     assert ending_text("limit", "CartPole-v1") == "it runs to the limit"
     assert ending_text("end", "somewhere/Else-v0") == "the environment ends it"
+    assert ending_text("failure", "Driving-v0") == "it crashes"
+
+
+def test_a_failure_that_somebody_named_is_no_crash() -> None:
+    environment = Environment("LunarLander-v3", failure="vertical position > -100")
+    played = rollout(environment, "novice", episodes=2, seed=0)
+    assert played.failed.all()
+    assert ending_texts(played) == ["it fails", "it fails"]
+    assert set(ending_texts(rollout("LunarLander-v3", "novice", episodes=2, seed=0))) == {
+        "it crashes"
+    }

@@ -180,8 +180,8 @@ def test_an_agent_for_comparison_stands_below_and_is_a_line(study: LearningStudy
     beside = replace(study, compared=Compared("crane:operator", trial, replace(trial, crashes=0)))
     summaries, compared = summarise_study(beside), summarise_compared(beside)
     assert any(
-        "“crane:operator” without the shield returns 80 and fails in 50 %, and with it returns 80 "
-        "and fails in 0 %" in text
+        "“crane:operator” without the shield returns 80.0 and fails in 50 %, and with it returns "
+        "80.0 and fails in 0 %" in text
         for text in finding(beside, summaries)
     )
     *_, last = table_rows(summaries, compared)
@@ -189,8 +189,8 @@ def test_an_agent_for_comparison_stands_below_and_is_a_line(study: LearningStudy
     assert row["Way to learn"] == "crane:operator, for comparison"
     assert (row["Failures while learning"], row["Return after"], row["Shield on"]) == (
         "–",
-        "80",
-        "80",
+        "80.0",
+        "80.0",
     )
     assert compared is not None
     assert compared.to_dict()["alone"]["crash_rate"] == 0.5

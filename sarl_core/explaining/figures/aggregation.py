@@ -37,6 +37,7 @@ class RoundPoint:
         disagreement: Share of the covered decisions in which the expert would do otherwise.
         rules: Number of rules.
         pairs: State-action pairs that they were grown from.
+        failures: How many of its episodes failed; None where that is not known.
     """
 
     number: Count
@@ -46,6 +47,7 @@ class RoundPoint:
     disagreement: Share
     rules: Count
     pairs: Count
+    failures: Count | None = None
 
 
 class BudgetPoint(Struct, frozen=True, rename={"low": "iqm_low", "high": "iqm_high"}):
@@ -86,6 +88,7 @@ def points_of(rounds: Sequence[AggregationRound]) -> tuple[RoundPoint, ...]:
             disagreement=one.disagreement,
             rules=one.rules,
             pairs=one.pairs,
+            failures=None if one.failures is None else one.failures.count,
         )
         for one in rounds
     )

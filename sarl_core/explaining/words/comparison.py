@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sarl_core.decimals import rounded_text
+from sarl_core.decimals import telling_text
 from sarl_core.mining.language import at_least_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import Rate
@@ -32,7 +32,7 @@ def verdict(agent: str, shield: str, alone: Episodes, shielded: Episodes) -> str
         of 0 % of its episodes fail: these rules harm it."
     """
     effect = shield_effect(alone, shielded)
-    before, after = (rounded_text(episodes.statistics.iqm) for episodes in (alone, shielded))
+    before, after = (telling_text(episodes.statistics.iqm) for episodes in (alone, shielded))
     mean = effect.returns.mean
     if not _is_clear(effect):
         change = (
@@ -79,11 +79,11 @@ def _difference(effect: ShieldEffect, alone: Episodes, shielded: Episodes) -> st
     """The means with their paired difference, its interval, and whether it may be chance."""
     if effect.returns.low == effect.returns.high == 0.0:
         return "every episode has the same return with them and without"
-    before, after = (rounded_text(episodes.statistics.mean) for episodes in (alone, shielded))
-    ends = [rounded_text(end) for end in (effect.returns.low, effect.returns.high)]
+    before, after = (telling_text(episodes.statistics.mean) for episodes in (alone, shielded))
+    ends = [telling_text(end) for end in (effect.returns.low, effect.returns.high)]
     few = f"; {effect.episodes} episodes are too few to rule out chance" if effect.too_few else ""
     return (
-        f"its mean from {before} to {after}, a difference of {rounded_text(effect.returns.mean)}, "
+        f"its mean from {before} to {after}, a difference of {telling_text(effect.returns.mean)}, "
         f"95 % interval {ends[0]} to {ends[1]}{few}"
     )
 
@@ -91,7 +91,7 @@ def _difference(effect: ShieldEffect, alone: Episodes, shielded: Episodes) -> st
 def _clause(shield: str, alone: Episodes, shielded: Episodes) -> str:
     """The same of one more shield, in a few words."""
     effect = shield_effect(alone, shielded)
-    after = rounded_text(shielded.statistics.iqm)
+    after = telling_text(shielded.statistics.iqm)
     notes = [_difference(effect, alone, shielded)]
     if alone.failures is not None and shielded.failures is not None:
         some = alone.failures.count or shielded.failures.count

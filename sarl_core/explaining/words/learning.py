@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sarl_core.decimals import rounded_text
+from sarl_core.decimals import rounded_text, telling_text
 from sarl_core.environments.failures import no_failures_text
 from sarl_core.files import whole_file
 from sarl_core.learning.study_files import LearningStudy
@@ -91,7 +91,7 @@ def table_rows(
                 rounded_text(summary.mean_crashes) + spread if known else "–",
                 rounded_text(float(np.mean(summary.episodes))),
                 share_text(summary.intervention_rate) if summary.arm.shielded else "–",
-                rounded_text(summary.learning_return),
+                telling_text(summary.learning_return),
                 *_afterwards(summary.alone, summary.shielded, known),
             )
         )
@@ -109,12 +109,12 @@ def _afterwards(
     freedom = None if shielded is None else shielded.freedom
     return (
         _with_worst(alone.mean, alone.means),
-        f"{rounded_text(alone.returns.iqm)} ({rounded_text(alone.returns.low)} to "
-        f"{rounded_text(alone.returns.high)})",
+        f"{telling_text(alone.returns.iqm)} ({telling_text(alone.returns.low)} to "
+        f"{telling_text(alone.returns.high)})",
         f"{_failed_share(alone)} ({interval_text(alone.failures)})" if failures_known else "–",
-        rounded_text(alone.worst_tenth),
+        telling_text(alone.worst_tenth),
         _cost(alone),
-        "–" if shielded is None else rounded_text(shielded.mean),
+        "–" if shielded is None else telling_text(shielded.mean),
         "–" if freedom is None else share_text(freedom),
     )
 
@@ -178,7 +178,7 @@ def _answer(
         )
     alone = reference(summaries, safest.arm)
     assert alone is not None  # else it were not judged
-    after = rounded_text(safest.alone.halves[1])
+    after = telling_text(safest.alone.halves[1])
     failures = [_failed_share(one.alone) for one in (safest, alone)]
     chosen = "these returns are of the second"
     if study.choose == "failures":
@@ -192,7 +192,7 @@ def _answer(
         f"{_times(safest.mean_crashes)}, against {_times(alone.mean_crashes)} without a shield. "
         f"Afterwards, without the shield, it returns {after} and "
         f"fails in {failures[0]} of the episodes; the same learner "
-        f"that never had a shield returns {rounded_text(alone.alone.halves[1])} and fails in "
+        f"that never had a shield returns {telling_text(alone.alone.halves[1])} and fails in "
         f"{failures[1]}. (It was chosen by the first half of the episodes "
         f"afterwards{': ' if study.choose == 'failures' else '; '}{chosen}.)"
     )
@@ -205,7 +205,7 @@ def _others(judged: Sequence[ArmSummary], safest: ArmSummary | None) -> list[str
         return _listed(
             [
                 f"“{summary.arm.title}” ({_times(summary.mean_crashes)}; afterwards "
-                f"{rounded_text(summary.alone.mean)})"
+                f"{telling_text(summary.alone.mean)})"
                 for summary in judged
                 if (summary.safe, summary.good) == (safe, good) and summary is not safest
             ]
@@ -271,7 +271,7 @@ def _compared_text(compared: ComparedSummary | None) -> str:
 
     def played(trials: TrialSummary) -> str:
         fails = f" and fails in {_failed_share(trials)}" if compared.failures_known else ""
-        return f"returns {rounded_text(trials.mean)}{fails}"
+        return f"returns {telling_text(trials.mean)}{fails}"
 
     text = f"For comparison, on the episodes afterwards “{compared.agent}” "
     if compared.shielded is None:
@@ -297,7 +297,7 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
         failures = ""
     return (
         "These rules speak in nearly every state, so with the shield on it is they who act, "
-        f"whatever was learned: return {rounded_text(covered[0].mean)}{failures}."
+        f"whatever was learned: return {telling_text(covered[0].mean)}{failures}."
     )
 
 
@@ -320,8 +320,8 @@ def _cost(trials: TrialSummary) -> str:
     cost = trials.cost
     if cost is None:
         return "–"
-    between = f" ({rounded_text(cost.low, 1)} to {rounded_text(cost.high, 1)})"
-    return rounded_text(cost.mean, 1) + ("" if np.isnan(cost.low) else between)
+    between = f" ({telling_text(cost.low)} to {telling_text(cost.high)})"
+    return telling_text(cost.mean) + ("" if np.isnan(cost.low) else between)
 
 
 def _failed_share(trials: TrialSummary) -> str:
@@ -379,8 +379,8 @@ def _times(count: float) -> str:
 
 def _with_worst(mean: float, means: Sequence[float]) -> str:
     if len(means) < 2:
-        return rounded_text(mean)
-    return f"{rounded_text(mean)} ({rounded_text(min(means))} to {rounded_text(max(means))})"
+        return telling_text(mean)
+    return f"{telling_text(mean)} ({telling_text(min(means))} to {telling_text(max(means))})"
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import streamlit as st
@@ -19,11 +20,10 @@ from sarl_core.explaining.figures.ablation import (
 )
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.mining.language import sentence
-from sarl_core.rollouts.failures import rate_text
 from sarl_core.studies.ablation import Ablation
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.components.safety import safety_metrics
+from sarl_dashboard.components.safety import safety_tiles
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
 from sarl_dashboard.text import escaped
@@ -41,24 +41,28 @@ def show(ablation: Ablation, choice: AblationChoice, *, at_work: bool) -> None:
         choice: What was asked for.
         at_work: Whether more is on its way.
     """
-    why = no_failures_text(ablation.base.env_id)
     notes_notice(note for note in ablation.remarks if note not in ablation.base.notes)
     with st.grid(6, min_column_width=150):
-        st.metric("Return, all rules", f"{ablation.base.returns.mean():,.1f}", border=True)
-        failures = ablation.base.failures
         st.metric(
-            "Failures, all rules",
-            "–" if failures is None else f"{failures.count:,} of {failures.of:,}",
+            "Return, all rules",
+            f"{ablation.base.returns.mean():,.1f}",
             border=True,
-            help=f"{why[0].upper()}{why[1:]}." if failures is None else rate_text(failures),
+            height="stretch",
         )
-        for label, value, hint in safety_metrics(ablation.base)[1:]:
-            st.metric(f"{label}, all rules", value, border=True, help=hint)
-        st.metric("Rules taken out", f"{len(ablation.rules):,}", border=True)
+        failures, (first, *others) = (
+            ablation.base.failures,
+            safety_tiles(ablation.base, shielded=True),
+        )
+        count = "–" if failures is None else f"{failures.count:,} of {failures.of:,}"
+        replace(first, value=count).show("Failures, all rules")
+        for tile in others:
+            tile.show()
+        st.metric("Rules taken out", f"{len(ablation.rules):,}", border=True, height="stretch")
         st.metric(
             "Episodes run for it",
             f"{ablation.played:,}",
             border=True,
+            height="stretch",
             help=f"Of {len(ablation.rules) * len(ablation.base):,}: in the others the rule that is "
             "taken out changed nothing, so they are the same without it.",
         )

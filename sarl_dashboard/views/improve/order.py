@@ -51,8 +51,8 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
     else:
         if not has_expert(env_id):
             raise InputError(
-                f"no expert is shipped for {env_id}; give a policy of your own, or choose nobody "
-                "to see which states need a demonstration"
+                f"no expert is shipped for {env_id}; choose another one, or a policy of your "
+                "own, or nobody, to see which states need a demonstration"
             )
         expert = agent_for("expert", None, env_id, choices.seed)
     thresholds = None

@@ -20,7 +20,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import as_file, download
-from sarl_dashboard.components.safety import safety_metrics
+from sarl_dashboard.components.safety import Tile, safety_tiles
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.state.data import (
@@ -105,26 +105,27 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
     if improved.reported.summary().get("freedom") == 0.0:
         changed = share_text(improved.reported.summary()["intervention_rate"])
         st.markdown(f"{POLICY_TEXT}: they changed {changed} of the novice's steps.")
-    with st.grid(7, min_column_width=130):
-        for label, value, hint in (
-            ("Mean return", f"{spread.mean:,.1f}", "Over the fresh episodes"),
-            ("Deviation", f"{spread.std:,.1f}", "Standard deviation over the fresh episodes"),
-            ("Least return", f"{float(returns.min()):,.1f}", "Of the fresh episodes"),
-            (
+    with st.grid(5, min_column_width=140):
+        for tile in (
+            Tile("Mean return", f"{spread.mean:,.1f}", "Over the fresh episodes"),
+            Tile("Deviation", f"{spread.std:,.1f}", "Standard deviation over the fresh episodes"),
+            Tile("Least return", f"{float(returns.min()):,.1f}", "Of the fresh episodes"),
+            Tile(
                 "Typical return",
                 f"{spread.iqm:,.1f}",
                 "Mean of the middle half of the episodes (IQM), 95 % interval "
                 f"{spread.low:,.1f} to {spread.high:,.1f}",
+                f"{spread.low:,.1f} to {spread.high:,.1f}",
             ),
-            *safety_metrics(improved.reported),
-            ("Rules", f"{len(rules):,}", "Over all actions"),
-            (
+            *safety_tiles(improved.reported, shielded=True),
+            Tile("Rules", f"{len(rules):,}", "Over all actions"),
+            Tile(
                 "Demonstrations",
                 f"{len(improved.demonstrations):,}",
                 "State-action pairs that they were made of, all answered by the expert",
             ),
         ):
-            st.metric(label, value, border=True, height="stretch", help=hint)
+            tile.show()
 
 
 def how_chosen(improved: Aggregation) -> str:
@@ -192,6 +193,7 @@ def show_rounds(
                 "Round": point.number,
                 "Mean return": point.mean,
                 "Deviation": point.std,
+                **({} if point.failures is None else {"Failures": point.failures}),
                 "Coverage": 100 * point.coverage,
                 "Expert disagrees": 100 * point.disagreement,
                 "Rules": point.rules,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import SarlError
 from sarl_core.improving.refinement import generation_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_dashboard.components.settings import environment_choice
-from sarl_dashboard.state.agents import PolicyFile, own_agents, policy_upload
+from sarl_dashboard.state.agents import PolicyFile, has_expert, own_agents, policy_upload
+from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER
 
@@ -45,6 +48,14 @@ def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> 
     return int(usual if value is None else value)
 
 
+def _usual_expert(env: str | None) -> str:
+    """Who is asked where nothing else is said: who is offered, where no expert is shipped."""
+    with suppress(SarlError):
+        if not has_expert(environment_of(env)):
+            return next(iter(own_agents()), SHIPPED_EXPERT)
+    return SHIPPED_EXPERT
+
+
 def settings(demonstrations: Demonstrations) -> ImproveChoices:
     """The widgets."""
     expert = st.session_state.get("expert") or st.query_params.get("expert")
@@ -55,9 +66,11 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
     with st.container(border=True):
         with st.grid(5, min_column_width=150, gap="small"):
             env = environment_choice()
+            experts = (SHIPPED_EXPERT, *own_agents(), OWN_FILE, NOBODY)
             expert = st.selectbox(
                 "Expert",
-                (SHIPPED_EXPERT, *own_agents(), OWN_FILE, NOBODY),
+                experts,
+                index=experts.index(_usual_expert(env)),
                 key="expert",
                 bind="query-params",
                 help="Who is asked. Shipped: the expert that comes with this environment. Own "

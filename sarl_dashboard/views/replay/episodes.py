@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import streamlit as st
 
 from sarl_core.explaining.figures.replay import (
@@ -10,15 +11,14 @@ from sarl_core.explaining.figures.replay import (
     ReturnRow,
     comparison_figure,
 )
-from sarl_core.explaining.words.fork import ending_text
+from sarl_core.explaining.words.fork import ending_texts
 from sarl_core.mining.language import share_text
-from sarl_core.rendering.fork import endings
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import summarise
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
-from sarl_dashboard.components.safety import safety_column_config, safety_columns
+from sarl_dashboard.components.safety import freedom_cell, safety_column_config, safety_columns
 from sarl_dashboard.jobs.replays import (
     EPISODE_RUNS,
     EPISODES,
@@ -105,6 +105,7 @@ def comparison(order: ReplayOrder) -> None:
                 "Changed": share_text(float(run.interventions.sum()) / float(run.lengths.sum()))
                 if name == WITH
                 else "–",
+                "Freedom": freedom_cell(run) if name == WITH else "–",
                 flips_title(run.env_id): f"{flips_rate(run):.2f}" if name == WITH else "–",
             }
         )
@@ -127,8 +128,10 @@ def every_episode(episodes: Episodes, *, shielded: bool) -> None:
         "Seed": episodes.seeds,
         "Return": episodes.returns,
         "Steps": episodes.lengths,
-        "Ended": [ending_text(end, episodes.env_id) for end in endings(episodes)],
+        "Ended": ending_texts(episodes),
     }
+    if not np.isnan(episodes.costs).any():
+        columns["Cost"] = episodes.costs
     if shielded and episodes.flips is not None:
         columns["Changed"] = episodes.interventions
         columns[flips_title(episodes.env_id)] = [

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import streamlit as st
 
+from sarl_core.decimals import rounded_text
+from sarl_core.explaining.words.fork import ending_texts
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rules import UNFILTERED
+from sarl_core.rollouts.episodes import Episodes
+from sarl_dashboard.components.safety import FREEDOM_HELP, freedom_cell
 from sarl_dashboard.jobs.replays import ReplayPair
 from sarl_dashboard.state.rule_files import CHOSEN
 
@@ -20,10 +25,12 @@ def numbers(replay: ReplayPair) -> None:
         with st.grid(6, min_column_width=130):
             st.metric("Return", f"{alone:,.1f}", border=True)
             st.metric("Length", f"{int(plain.lengths[0]):,} steps", border=True)
+        (ended,) = ending_texts(plain)
+        st.caption(f"{ended[0].upper()}{ended[1:]}.{_cost(plain)}")
         return
     with_rules, length = float(shielded.returns[0]), int(shielded.lengths[0])
     changed, covered = int(shielded.interventions[0]), int(shielded.covered[0])
-    with st.grid(6, min_column_width=140):
+    with st.grid(7, min_column_width=120):
         st.metric("Return with rules", f"{with_rules:,.1f}", border=True, height="stretch")
         st.metric("Return without", f"{alone:,.1f}", border=True, height="stretch")
         st.metric("Length with rules", f"{length:,}", border=True, height="stretch")
@@ -42,6 +49,18 @@ def numbers(replay: ReplayPair) -> None:
             height="stretch",
             help=f"Some rule applied at {covered:,} of {length:,} steps.",
         )
+        st.metric(
+            "Freedom",
+            freedom_cell(shielded),
+            border=True,
+            height="stretch",
+            help=f"{FREEDOM_HELP}.",
+        )
+    (with_them,), (without,) = ending_texts(shielded), ending_texts(plain)
+    told = f"With the rules {with_them}. Without them {without}."
+    if with_them == without:
+        told = f"With the rules, and without them, {without}."
+    st.caption(told + _cost(shielded, plain))
     beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
     if beyond:
         st.caption(
@@ -71,6 +90,14 @@ def numbers(replay: ReplayPair) -> None:
             ":material/info: :gray[The rules changed nothing in this episode: wherever one "
             "applied, the agent did what it says.]"
         )
+
+
+def _cost(*runs: Episodes) -> str:
+    """What an episode with the rules cost, and what it cost without them, where it is known."""
+    costs = [float(run.costs[0]) for run in runs]
+    if any(np.isnan(cost) for cost in costs):
+        return ""
+    return f" Cost: {', without them '.join(rounded_text(cost, 2) for cost in costs)}."
 
 
 def _unfiltered_differ(replay: ReplayPair) -> bool:

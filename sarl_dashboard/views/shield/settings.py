@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_core.errors import SarlError
 from sarl_core.shielding.shield import Outside, Projection
 from sarl_dashboard.components.settings import (
     environment_choice,
@@ -17,10 +19,12 @@ from sarl_dashboard.components.settings import (
 from sarl_dashboard.state.agents import (
     FRESH_SEED,
     PolicyFile,
+    has_expert,
     offered_agents,
+    own_agents,
     policy_uploads,
 )
-from sarl_dashboard.state.environments import continuous
+from sarl_dashboard.state.environments import continuous, environment_of
 from sarl_dashboard.state.rule_choice import EDITED
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
 
@@ -46,6 +50,14 @@ class ShieldChoices:
     def from_demonstrations(self) -> bool:
         """Whether some of the rules come from the chosen demonstrations."""
         return any(name not in (NO_SHIELD, OWN_FILE) for name in self.shields)
+
+
+def _usual_agents(env: str | None) -> list[str]:
+    """Who acts where nothing else is said: also one who knows the task, if there is one."""
+    with suppress(SarlError):
+        if has_expert(environment_of(env)):
+            return ["novice", "expert"]
+    return ["novice", *list(own_agents())[:1]]
 
 
 def settings() -> ShieldChoices:
@@ -79,7 +91,7 @@ def settings() -> ShieldChoices:
             "Agents",
             offered_agents(),
             selection_mode="multi",
-            default=["novice", "expert"],
+            default=_usual_agents(env),
             key="agents",
             bind="query-params",
             help="Novice: random actions. Expert: the one that is shipped for this environment. "

@@ -16,7 +16,7 @@ from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
 from sarl_dashboard.components.run_bar import episodes_bar, watched
-from sarl_dashboard.components.safety import safety_column_config, safety_columns
+from sarl_dashboard.components.safety import freedom_cell, safety_column_config, safety_columns
 from sarl_dashboard.jobs.episodes import COMPARISON, known
 from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
@@ -192,11 +192,6 @@ def column_config(env_id: str) -> dict[str, Any]:
         "Covered": column.TextColumn(
             alignment="right", help="Share of the steps at which some rule applied"
         ),
-        "Freedom": column.TextColumn(
-            alignment="right",
-            help="What the rules leave the agent to choose from: 100 % where no rule applies, 0 % "
-            "where they decide everything and the agent nothing",
-        ),
         flips_title(env_id): column.TextColumn(
             alignment="right", help="How often the shield switches on or off"
         ),
@@ -222,7 +217,7 @@ def table_row(line: ShieldLine, episodes: Episodes, safety: Mapping[str, str]) -
         if rules is not None and any(rule.box is not None for rule in rules.rules)
         else "–",
         "Covered": share_text(summary["coverage"]) if rules is not None else "–",
-        "Freedom": share_text(summary.get("freedom", float("nan"))) if rules is not None else "–",
+        "Freedom": freedom_cell(episodes) if rules is not None else "–",
         flips_title(episodes.env_id): f"{flips_rate(episodes):.2f}"
         if rules is not None and episodes.flips is not None
         else "–",
