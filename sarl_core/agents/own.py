@@ -233,7 +233,7 @@ def _columns(
             f"the agent {name} gives what is no array of numbers ({reason(error)}); {advice}"
         ) from error
     if actions.dtype.kind not in "biuf":
-        kind = type(chosen).__name__ if actions.dtype.kind == "O" else str(actions.dtype)
+        kind = "texts" if actions.dtype.kind in "US" else type(chosen).__name__
         raise AgentFaultError(f"the agent {name} gives {kind} and no numbers; {advice}")
     if actions.shape not in (wanted, (count, m)) and not (m == 1 and actions.shape == (count,)):
         raise AgentFaultError(f"the agent {name} gives actions of shape {actions.shape}; {advice}")

@@ -377,8 +377,8 @@ def print_episodes(
 
     summary = document["summary"]
     terminal.print_lines([title])
-    names = ("seed", "return", "length", "interventions", "covered")
-    terminal.print_table(names, [_episode(row) for row in document["episodes"]])
+    rows = document["episodes"]
+    terminal.print_table(_columns(rows), [_episode(row, _columns(rows)) for row in rows])
     interval = f"95 % interval {summary['iqm_low']:.2f} to {summary['iqm_high']:.2f}"
     terminal.print_facts(
         [
@@ -433,9 +433,20 @@ def _invalid(count: int) -> str:
     )
 
 
-def _episode(row: dict[str, Any]) -> tuple[str, ...]:
-    counts = (f"{row[name]:,}" for name in ("length", "interventions", "covered"))
-    return (str(row["seed"]), f"{row['return']:.2f}", *counts)
+def _columns(rows: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    """What is told of each episode: also whether it failed, and what it cost, where it is known."""
+    known = tuple(name for name in ("failed",) if any(name in row for row in rows))
+    if any(row.get("cost", row.get("failed")) != row.get("failed") for row in rows):
+        known += ("cost",)
+    return ("seed", "return", "length", *known, "interventions", "covered")
+
+
+def _episode(row: dict[str, Any], columns: Sequence[str]) -> tuple[str, ...]:
+    cells = {name: f"{row[name]:,}" for name in ("length", "interventions", "covered")}
+    cells |= {"seed": str(row["seed"]), "return": f"{row['return']:.2f}"}
+    cells["failed"] = {True: "yes", False: "no", None: "–"}[row.get("failed")]
+    cells["cost"] = f"{row['cost']:,.2f}" if "cost" in row else "–"
+    return tuple(cells[name] for name in columns)
 
 
 def describe_replay(replay: Replay, path: Path, shielded: Sequence[bool]) -> dict[str, Any]:
@@ -468,10 +479,14 @@ def print_replay(document: dict[str, Any]) -> None:
         document: What it gave.
     """
     terminal.print_lines([f"Wrote {document['file']}: {document['seconds']:.1f} s"])
+    columns = _columns(document["episodes"])
     terminal.print_table(
-        ("agent", "seed", "return", "length", "interventions", "covered"),
+        ("agent", *columns),
         [
-            (f"{entry['agent']}{', shielded' if entry['shielded'] else ''}", *_episode(entry))
+            (
+                f"{entry['agent']}{', shielded' if entry['shielded'] else ''}",
+                *_episode(entry, columns),
+            )
             for entry in document["episodes"]
         ],
     )

@@ -162,7 +162,8 @@ def _falling(start: float) -> Callable[[float], float]:
 def _environment(env_id: EnvironmentOrId) -> Any:
     from gymnasium.wrappers import FlattenObservation
 
+    from sarl_core.learning.faults import WatchedEnvironment
     from sarl_core.shielding.wrappers import is_flat
 
     env = make_environment(env_id)
-    return env if is_flat(env.observation_space) else FlattenObservation(env)
+    return WatchedEnvironment(env if is_flat(env.observation_space) else FlattenObservation(env))

@@ -107,7 +107,8 @@ def learn(
         InputError: If a number is out of range, or arm, rules and environment do not fit, or the
             checkpoint is of another run.
         CancelledError: If `progress` returned False; the checkpoint has what was learned.
-        WorkError: If the learner diverged, or the checkpoint cannot be written.
+        WorkError: If the learner diverged, the environment failed in the middle (the checkpoint
+            has what was learned), or the checkpoint cannot be written.
     """
     check_learning(env_id, rules, arm, steps=steps, seed=seed)
     if episodes < 1:
@@ -182,7 +183,9 @@ def _learn(
 
     Raises:
         CancelledError: If `tell` said so.
+        WorkError: If the environment failed.
     """
+    from sarl_core.learning.faults import EnvironmentFaultError
     from sarl_core.learning.recorder import Recorder
 
     begun = learner.num_timesteps
@@ -193,6 +196,10 @@ def _learn(
     if go_on and begun < steps:
         try:
             learner.learn(steps - begun, callback=recorder, reset_num_timesteps=False)
+        except EnvironmentFaultError as error:
+            keep(recorder.curve())
+            tell(recorder.curve(), learner.num_timesteps)
+            raise WorkError(error.sentence(str(env_id), len(recorder.curve()))) from error
         except ValueError as error:  # torch's word for probabilities that are no numbers
             raise _diverged(learner, error) from error
     keep(recorder.curve())

@@ -112,7 +112,7 @@ class LearningPlan:
             "version": VERSION,
             "env_id": str(self.env_id),
             "made_with": {
-                name.strip("-"): value
+                name.strip("-"): list(value) if isinstance(value, tuple) else value
                 for name, value in as_environment(self.env_id).options.items()
                 if value is not None and name != "--env"
             }
@@ -281,7 +281,9 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
             progress=progress,
             watch=watch,
         )
-    except CancelledError:
+    except DivergedError:
+        raise
+    except (CancelledError, WorkError):
         save_run(folder, latest)
         raise
     result.policy.save(policy_path(folder, arm, seed))

@@ -21,7 +21,6 @@ from sarl_dashboard.state.agents import (
     PolicyFile,
     has_expert,
     offered_agents,
-    own_agents,
     policy_uploads,
 )
 from sarl_dashboard.state.environments import continuous, environment_of
@@ -57,7 +56,7 @@ def _usual_agents(env: str | None) -> list[str]:
     with suppress(SarlError):
         if has_expert(environment_of(env)):
             return ["novice", "expert"]
-    return ["novice", *list(own_agents())[:1]]
+    return ["novice"]
 
 
 def settings() -> ShieldChoices:
