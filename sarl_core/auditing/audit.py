@@ -10,18 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.auditing import near
-from sarl_core.auditing.drift import (
-    Drift,
-    Moved,
-    Shares,
-    against_expected,
-    by_episode,
-    differences,
-    moved,
-    quarters,
-    rule_counts,
-)
-from sarl_core.auditing.matching import MatchedLog, matched_log
+from sarl_core.auditing.clock import Clock, clock_of
+from sarl_core.auditing.drift import Drift, by_episode, rule_counts
+from sarl_core.auditing.log_drift import drift_from_demonstrations, drift_from_rules
+from sarl_core.auditing.matching import matched_log
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.documents import plain
 from sarl_core.errors import require
@@ -34,7 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _WORST = 10  # stretches that are told
-_BEYOND = 0.02  # of a rule's own states lie outside their 1 % and 99 % quantiles
 _PER = 1_000  # steps that breaks are counted in, where no time is known
 
 
@@ -46,6 +37,7 @@ class Stretch(NamedTuple):
         step: Of the first of them.
         row: Its row in the log, from 0.
         length: How many steps.
+        seconds: How long they last; None where no time is known.
         rules: Places in the rule set of the rules that were broken, ascending.
     """
 
@@ -53,7 +45,24 @@ class Stretch(NamedTuple):
     step: int
     row: int
     length: int
+    seconds: float | None
     rules: tuple[int, ...]
+
+
+class Minute(NamedTuple):
+    """The minute with the most breaks, in one episode.
+
+    Attributes:
+        episode: What the episode is called.
+        step: Of the first of them.
+        row: Its row in the log, from 0.
+        breaks: How many.
+    """
+
+    episode: int
+    step: int
+    row: int
+    breaks: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -195,6 +204,8 @@ class Audit:
         begins = np.zeros(self.steps, dtype=np.bool_)
         begins[self.log.episode_starts] = True
         begins[1:] |= self._jumps != 0  # what was done in between, nobody knows
+        if self.clock is not None:
+            begins[self.clock.gaps + 1] = True
         first = broken & (begins | ~np.append(False, broken[:-1]))
         rows = np.flatnonzero(broken)
         starts = np.flatnonzero(first[rows])
@@ -215,6 +226,7 @@ class Audit:
                     int(self.log.steps[row]),
                     row,
                     length,
+                    None if self.clock is None else float(self.clock.seconds[part].sum()),
                     tuple(np.unique(self.rules[part][self.breaks[part]]).tolist()),
                 )
             )
@@ -229,6 +241,39 @@ class Audit:
     def breaks_per_thousand(self) -> float:
         """Broken steps in a thousand steps."""
         return _PER * self.broken / self.steps
+
+    @cached_property
+    def clock(self) -> Clock | None:
+        """When the steps were; None where the log does not say."""
+        return clock_of(self.log)
+
+    @property
+    def breaks_per_minute(self) -> float:
+        """Broken steps in a minute, gaps left out; NaN where no time is known."""
+        return float("nan") if self.clock is None else self.broken / self.clock.minutes
+
+    @cached_property
+    def worst_minute(self) -> Minute | None:
+        """The first minute with the most breaks; None without any, or where no time is known."""
+        if self.clock is None or not self.broken:
+            return None
+        assert self.log.steps is not None
+        rows = np.flatnonzero(self.is_broken)
+        breaks = self.clock.most_in_a_minute(rows)
+        row = int(rows[np.argmax(breaks)])
+        return Minute(int(self.log.episodes[row]), int(self.log.steps[row]), row, int(breaks.max()))
+
+    @property
+    def most_in_a_minute(self) -> float:
+        """Breaks of the worst minute; NaN where no time is known."""
+        if self.clock is None:
+            return float("nan")
+        return 0.0 if self.worst_minute is None else float(self.worst_minute.breaks)
+
+    @property
+    def time_gaps(self) -> float:
+        """Where the time between two steps of an episode jumps; NaN where no time is known."""
+        return float("nan") if self.clock is None else float(len(self.clock.gaps))
 
     @cached_property
     def _jumps(self) -> NDArray[np.int64]:
@@ -254,7 +299,9 @@ class Audit:
 
         Returns:
             `episode`, `steps`, `covered`, `broken`, `longest_run`, `outside`, `near`, `agreement`
-            (NaN where nothing is covered), `breaks_per_thousand`, `first_row` in the log.
+            (NaN where nothing is covered), `breaks_per_thousand`, `minutes`, `breaks_per_minute`
+            and `worst_minute` (its breaks; all three NaN where no time is known), `first_row` in
+            the log.
         """
         import pandas as pd
 
@@ -268,6 +315,13 @@ class Audit:
         np.maximum.at(longest, np.searchsorted(starts, rows, side="right") - 1, run)
         with np.errstate(invalid="ignore", divide="ignore"):
             agreement = 1.0 - broken / covered
+        minutes, worst = np.full((2, len(starts)), np.nan)
+        if self.clock is not None:
+            minutes = np.add.reduceat(self.clock.seconds, starts) / 60.0
+            worst = np.zeros(len(starts))
+            broken_rows = np.flatnonzero(self.is_broken)
+            places = np.searchsorted(starts, broken_rows, side="right") - 1
+            np.maximum.at(worst, places, self.clock.most_in_a_minute(broken_rows))
         return pd.DataFrame(
             {
                 "episode": self.log.episodes[starts],
@@ -279,6 +333,9 @@ class Audit:
                 "near": near_ones,
                 "agreement": agreement,
                 "breaks_per_thousand": _PER * broken / lengths,
+                "minutes": minutes,
+                "breaks_per_minute": broken / minutes,
+                "worst_minute": worst,
                 "first_row": starts,
             }
         )
@@ -365,6 +422,7 @@ class Audit:
             "breaks_per_thousand": self.breaks_per_thousand,
             "missing_steps": self.missing_steps,
             "gaps": self.gaps,
+            "time": self._time_document,
             "worst": [
                 {
                     **stretch._asdict(),
@@ -387,6 +445,21 @@ class Audit:
             "notes": list(self.notes),
         }
         return dict(plain(document))
+
+    @property
+    def _time_document(self) -> dict[str, Any] | None:
+        """What is known of the log's times, None if nothing is."""
+        clock, minute = self.clock, self.worst_minute
+        if clock is None:
+            return None
+        return {
+            "step_seconds": clock.step,
+            "minutes": clock.minutes,
+            "breaks_per_minute": self.breaks_per_minute,
+            "worst_minute": None if minute is None else minute._asdict(),
+            "gaps": len(clock.gaps),
+            "longest_gap_seconds": clock.longest_gap,
+        }
 
 
 def audit(
@@ -433,10 +506,10 @@ def audit(
     )
     nearly[breaks.any(axis=1)] = -1
     if demonstrations is None or demonstrated is None:
-        drift = _drift_from_rules(rule_set, log, matched, decision.rules)
+        drift = drift_from_rules(rule_set, log, matched, decision.rules)
     else:
         in_force = shield.rules_in_force(demonstrated)
-        drift = _drift_from_demonstrations(
+        drift = drift_from_demonstrations(
             rule_set,
             (log, matched.observations, decision.rules),
             (demonstrations, demonstrated, in_force),
@@ -464,123 +537,3 @@ def _words(names: NDArray[np.str_], places: NDArray[np.int64]) -> Any:
 
     known, first = np.unique(names, return_inverse=True)
     return pd.Categorical.from_codes(first[places], known.tolist())
-
-
-def _rule_names(rule_set: RuleSet) -> list[tuple[str, str]]:
-    several = len(rule_set.actions) > 1
-    names = [(rule_set.name_of(rule), "steps in which it applies") for rule in rule_set]
-    return names + [
-        ("no rule", f"steps without a rule{f' for {action.name}' if several else ''}")
-        for action in rule_set.actions
-    ]
-
-
-def _drift_from_rules(
-    rule_set: RuleSet,
-    log: Demonstrations,
-    matched: MatchedLog,
-    in_force: NDArray[np.int64],
-) -> Drift:
-    """Compare with what a rule file keeps of the demonstrations: supports, and data boxes."""
-    starts = log.episode_starts
-    lengths = log.episode_lengths.astype(np.float64)
-    size, episodes = len(rule_set), rule_set.source.episodes
-    counts = rule_counts(rule_set, in_force, starts)
-    # A rule of a person's own says nothing of how often it applied, nor one that is switched off.
-    known = [place for place, rule in enumerate(rule_set) if rule.enabled and not rule.placed]
-    expected = [rule_set[place].support for place in known]
-    if len(known) == size:
-        known += range(size, size + len(rule_set.actions))
-        expected += [
-            1.0 - sum(rule.support for rule in rule_set.of_dimension(dimension))
-            for dimension in range(len(rule_set.actions))
-        ]
-    names = [_rule_names(rule_set)[place] for place in known]
-    rules = against_expected(Shares(counts[:, known], lengths), np.array(expected), episodes)
-    beyond, ruled, usual = _beyond(rule_set, matched.observations, in_force, starts)
-    features: tuple[Moved, ...] = ()
-    if ruled.sum():
-        before, now, low, high = against_expected(Shares(beyond, ruled), usual, episodes)
-        said = "states outside the middle 98 % of the data of the rule that applies"
-        features = moved(
-            [(one.name, said) for one in rule_set.source.features],
-            # Fewer than usual is no drift: a narrower log looks like the demonstrations.
-            (before, now, low, np.maximum(high, 0.0)),
-        )
-    return Drift(
-        "what the rules say of their demonstrations",
-        features,
-        moved(names, rules),
-        (len(starts), episodes),
-    )
-
-
-def _beyond(
-    rule_set: RuleSet,
-    observations: NDArray[np.float32],
-    in_force: NDArray[np.int64],
-    starts: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Steps whose feature lies outside the middle of the data of the rule in force.
-
-    Returns:
-        Such steps (E, d), all steps of rules that keep a box (E,), and the share that is usual
-        (d,): of n states, about 2 / n of others like them lie outside all of them.
-    """
-    d = observations.shape[1]
-    counts, ruled = np.zeros((len(starts), d)), np.zeros(len(starts))
-    usual = 0.0
-    boxes = [rule.box for rule in rule_set]
-    has_box = np.array([box is not None for box in boxes] + [False])
-    low, high = np.zeros((2, len(boxes), d))
-    for place, box in enumerate(boxes):
-        if box is not None:
-            low[place], high[place] = box.low, box.high
-    chance = np.array([min(_BEYOND + 2.0 / (rule.samples + 1), 1.0) for rule in rule_set])
-    for column in in_force.T:
-        known = has_box[column]
-        ruled += by_episode(known, starts)
-        rules = np.where(known, column, 0)
-        usual += float(chance[rules][known].sum()) if len(boxes) else 0.0
-        for feature in range(d if len(boxes) else 0):
-            values = observations[:, feature]
-            out = (values < low[rules, feature]) | (values > high[rules, feature])
-            counts[:, feature] += by_episode(out & known, starts)
-    return counts, ruled, np.full(d, usual / max(ruled.sum(), 1.0))
-
-
-def _drift_from_demonstrations(
-    rule_set: RuleSet,
-    now: tuple[Demonstrations, NDArray[np.float32], NDArray[np.int64]],
-    before: tuple[Demonstrations, NDArray[np.float32], NDArray[np.int64]],
-) -> Drift:
-    """Compare distributions: where the quarters of each feature lie, and each rule's share."""
-    edges = quarters(before[1])
-    sides = []
-    for log, observations, in_force in (now, before):
-        starts = log.episode_starts
-        sides.append(
-            Shares(
-                np.hstack(
-                    [
-                        *(by_episode(observations <= edge, starts) for edge in edges),
-                        rule_counts(rule_set, in_force, starts),
-                    ]
-                ),
-                log.episode_lengths.astype(np.float64),
-            )
-        )
-    from sarl_core.mining.language import number_text
-
-    names = [
-        (feature.name, f"states at or below {number_text(float(edge))} {feature.unit}".rstrip())
-        for row in edges
-        for feature, edge in zip(rule_set.source.features, row, strict=True)
-    ]
-    all_moved = moved([*names, *_rule_names(rule_set)], differences(sides[0], sides[1]))
-    return Drift(
-        "the demonstrations",
-        all_moved[: len(names)],
-        all_moved[len(names) :],
-        (now[0].n_episodes, before[0].n_episodes),
-    )

@@ -23,9 +23,12 @@ MEASURES: dict[str, Callable[[Audit], float]] = {
     "freedom": lambda audit: audit.freedom,
     "longest_run": lambda audit: float(audit.longest_run),
     "breaks_per_thousand": lambda audit: audit.breaks_per_thousand,
+    "breaks_per_minute": lambda audit: audit.breaks_per_minute,
+    "worst_minute": lambda audit: audit.most_in_a_minute,
     "drift": lambda audit: float(len(audit.drift.drifted)),
     "missing_steps": lambda audit: audit.missing_steps / (audit.steps + audit.missing_steps),
     "gaps": lambda audit: float(audit.gaps),
+    "time_gaps": lambda audit: audit.time_gaps,
     "steps": lambda audit: float(audit.steps),
 }
 """What a condition may ask about; shares are of the steps, `agreement` of the covered ones."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -65,8 +66,9 @@ def audit(
             metavar="CONDITION",
             show_default=False,
             help="Exit with 3 if this holds, as breaks>0.02 or coverage<50%; may be given several "
-            "times. Measures: agreement, breaks, breaks_per_thousand, coverage, drift, freedom, "
-            "gaps, longest_run, missing_steps, near, outside, steps.",
+            "times. Measures: agreement, breaks, breaks_per_minute, breaks_per_thousand, coverage, "
+            "drift, freedom, gaps, longest_run, missing_steps, near, outside, steps, time_gaps, "
+            "worst_minute.",
         ),
     ] = None,
     compare: Annotated[
@@ -206,7 +208,10 @@ def _guard(held: Audit, guards: list[GuardCondition]) -> None:
     """End with a code of its own where a condition holds."""
     failed = [one for one in guards if one.holds(held)]
     terminal.print_notes(
-        f"{one.text} holds: {one.measure} is {one.value(held):.6g}" for one in failed
+        f"{one.text} counts as if it held: {one.measure} is not known"
+        if math.isnan(one.value(held))
+        else f"{one.text} holds: {one.measure} is {one.value(held):.6g}"
+        for one in failed
     )
     if failed:
         raise typer.Exit(_FAILED)

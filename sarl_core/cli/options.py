@@ -191,9 +191,9 @@ _ColumnRoles = Annotated[
         show_default=False,
         help="What one column of the file is; the others are guessed. ROLE is feature, "
         "action, episode, step, reward, terminated, truncated, first, last, time or ignore; with a "
-        "unit: speed=feature:m/s; an amount in whole numbers: throttle=action:continuous:0:100 "
-        "(bounds may be left out); numbers that are choices: gear=action:labels. May be given "
-        "several times.",
+        "unit: speed=feature:m/s, t=time:ms; an amount in whole numbers: "
+        "throttle=action:continuous:0:100 (bounds may be left out); numbers that are "
+        "choices: gear=action:labels. May be given several times.",
     ),
 ]
 MissingName = Annotated[

@@ -75,6 +75,7 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
         "truncated": None
         if raw.truncated is None
         else flags(raw.truncated, n, "column 'truncated'"),
+        "times": None if raw.times is None else _times(raw.times, n),
         "feature_names": feature_names,
         "feature_units": units,
         "indicators": _indicators(raw.indicators, observations, feature_names),
@@ -114,6 +115,15 @@ def _observations(given: Any) -> NDArray[np.float32]:
             "reads could use; choose fewer columns"
         )
     return frozen(observations, np.float32)
+
+
+def _times(given: Any, n: int) -> NDArray[np.float64] | None:
+    """Seconds, NaN where not known; None where that is so everywhere."""
+    times = as_numbers(given, "times").astype(np.float64)
+    if times.shape != (n,):
+        raise InputError(f"times must be one number a step, not of shape {times.shape}")
+    times[~np.isfinite(times)] = np.nan
+    return None if np.isnan(times).all() else times
 
 
 def _indicators(

@@ -141,6 +141,8 @@ class Demonstrations(DemonstrationFields):
         terminated: Whether the environment ended the episode at this step, (N,) bool, or None.
         truncated: Whether a limit ended it, (N,) bool, or None.
         steps: Index of each step within its episode, (N,) int64; counted where not given.
+        times: When each step was, in seconds from any beginning, (N,) float64; NaN where that is
+            not known. None where it is known of no step.
         feature_names: d names; "feature 0"... where not given.
         feature_units: d units, "" where there is none.
         indicators: For each feature what it says of a column of words, or None; None where none
@@ -327,6 +329,7 @@ class Demonstrations(DemonstrationFields):
             "rewards",
             "terminated",
             "truncated",
+            "times",
         ):
             value = getattr(self, name)
             if value is not None:
@@ -366,6 +369,7 @@ class Demonstrations(DemonstrationFields):
             terminated=chosen(self.terminated),
             truncated=chosen(self.truncated),
             steps=chosen(self.steps),
+            times=chosen(self.times),
         )
 
     def summary(self) -> Summary:

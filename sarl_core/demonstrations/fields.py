@@ -87,6 +87,7 @@ class DemonstrationFields:
     terminated: NDArray[np.bool_] | None = None
     truncated: NDArray[np.bool_] | None = None
     steps: NDArray[np.int64] | None = None
+    times: NDArray[np.float64] | None = None
     feature_names: tuple[str, ...] | None = None
     feature_units: tuple[str, ...] | None = None
     indicators: tuple[Indicator | None, ...] | None = None

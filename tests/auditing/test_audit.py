@@ -290,3 +290,50 @@ def test_gaps_in_the_numbers_of_steps_are_counted(
     wrong = audit(rules, replace(held.log, actions=(held.labels[:, 0] + 1) % 4))
     rows, lengths = wrong.runs
     assert not ((rows < 50) & (rows + lengths > 50)).any()
+
+
+def test_breaks_are_counted_by_the_minute_where_times_are_known(
+    rules: RuleSet, demonstrations: Demonstrations
+) -> None:
+    says = np.array([rule.action for rule in rules])
+    in_force = Shield(rules).rules_in_force(demonstrations.observations)[:, 0]
+    rows = np.flatnonzero(in_force >= 0)[:40]
+    broken = np.zeros(40, dtype=bool)
+    broken[[1, 2, 3, 12, 19, 20, 30]] = True
+    # A step every ten seconds; half an hour passes in the first episode, after a break.
+    times = np.tile(np.arange(20) * 10.0, 2)
+    times[3:20] += 1800.0
+    obeyed = says[in_force[rows]]
+    log = replace(
+        demonstrations,
+        observations=demonstrations.observations[rows],
+        actions=np.where(broken, (obeyed + 1) % 4, obeyed),
+        episodes=np.repeat([7, 9], 20),
+        steps=None,
+        rewards=None,
+        terminated=None,
+        truncated=None,
+        times=times,
+    )
+    held = audit(rules, log)
+    assert held.clock is not None
+    assert (held.clock.step, held.clock.minutes) == (10.0, 40 / 6)
+    assert held.breaks_per_minute == pytest.approx(7 / (40 / 6))
+    # 3 and 12 lie 90 s apart, 19 and 20 in two episodes.
+    assert held.worst_minute is not None
+    assert held.worst_minute._asdict() == {"episode": 7, "step": 1, "row": 1, "breaks": 2}
+    assert held.episodes["worst_minute"].tolist() == [2.0, 1.0]
+    assert held.episodes["breaks_per_minute"].tolist() == pytest.approx([1.5, 0.6])
+    assert (held.time_gaps, held.clock.longest_gap) == (1.0, 1810.0)
+    # What was done in the half hour, nobody knows.
+    assert [(one.row, one.length, one.seconds) for one in held.worst][:1] == [(1, 2, 20.0)]
+    document = held.to_dict()["time"]
+    assert document["gaps"] == 1
+    assert document["worst_minute"]["breaks"] == 2
+    assert guard("worst_minute>1").holds(held)
+    assert not guard("time_gaps>1").holds(held)
+    untimed = audit(rules, replace(log, times=None))
+    assert untimed.to_dict()["time"] is None
+    assert guard("breaks_per_minute>1000").holds(untimed)  # it cannot be known
+    still = audit(rules, replace(log, times=np.zeros(40)))
+    assert still.clock is None

@@ -31,6 +31,13 @@ def test_it_fails_a_job_with_a_code_of_its_own(capsys: pytest.CaptureFixture[str
     assert "coverage>50% holds: coverage is 1" in error
 
 
+def test_a_log_without_times_says_how_to_give_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["audit", RULES, LOG, "--fail-on", "worst_minute>5"]) == 3
+    out, error = capsys.readouterr()
+    assert "--column t=time" in out
+    assert "worst_minute>5 counts as if it held: worst_minute is not known" in error
+
+
 def test_it_writes_a_page_and_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "audited"
     assert main(["audit", RULES, LOG, "--out", str(out), "--compare", LOG]) == 0

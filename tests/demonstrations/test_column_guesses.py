@@ -186,7 +186,8 @@ def test_r_is_the_reward_only_where_the_other_names_speak_so() -> None:
 def test_a_counter_is_no_feature(name: str, values: np.ndarray) -> None:
     demonstrations = read(**{name: values}, x=noise(0), v=noise(1), action=LABELS, episode=EPISODES)
     assert demonstrations.feature_names == ("x", "v")
-    assert any(f"'{name}' was not used" in note for note in demonstrations.notes)
+    noted = any(f"'{name}' was not used" in note for note in demonstrations.notes)
+    assert noted == (demonstrations.times is None)
 
 
 def test_a_counter_is_known_by_any_mark_of_episodes_of_any_lengths() -> None:

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.columns import (
+    IS_TIME,
     Guess,
     UnclearColumnsError,
     listed,
     unclear_columns,
 )
 from sarl_core.demonstrations.formats.mapping.roles import settled_by
+from sarl_core.demonstrations.formats.times import as_clock
 from sarl_core.demonstrations.formats.vocabulary import plain
 from sarl_core.demonstrations.requirements import (
     FEW_VALUES,
@@ -186,8 +188,10 @@ def _doubtful_roles(guess: Guess, values: Values) -> Guess:
             guess = replace(
                 guess,
                 columns=replace(columns, step=None),
-                unused={**guess.unused, name: "it is a time"},
+                unused={**guess.unused, name: IS_TIME},
             )
+            if columns.time is None:
+                guess = as_clock(guess, name)
     return guess
 
 

@@ -26,7 +26,9 @@ from sarl_core.demonstrations.formats.vocabulary import (
 )
 from sarl_core.errors import InputError, quoted, require
 
-SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last")
+SINGLES = ("episode", "step", "reward", "terminated", "truncated", "first", "last", "time")
+IS_TIME = "it is a time"
+"""Why a column is no feature."""
 _BY_NAME = "its name says so"
 _BY_PERSON = "as it was mapped"
 _NO_OBSERVATION = "the features' names begin with a word for observations, and its own does not"
@@ -47,6 +49,7 @@ class ColumnMap:
         truncated: Column that says whether a limit ended it.
         first: Column that says whether an episode begins with this step.
         last: Column that says whether one ends with it, for whatever reason.
+        time: Column that says when the step was.
         feature_names: d names to use in place of the columns' own.
         action_names: m names, likewise.
     """
@@ -60,6 +63,7 @@ class ColumnMap:
     truncated: str | None = None
     first: str | None = None
     last: str | None = None
+    time: str | None = None
     feature_names: tuple[str, ...] | None = None
     action_names: tuple[str, ...] | None = None
 
@@ -87,6 +91,7 @@ class ColumnMap:
             truncated=singles.get("truncated"),
             first=singles.get("first"),
             last=singles.get("last"),
+            time=singles.get("time"),
         )
 
     def only(self, names: Collection[str]) -> ColumnMap:
@@ -303,7 +308,7 @@ def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
         singles,
     )
     reasons |= dict.fromkeys(roles, _BY_PERSON)
-    unused |= dict.fromkeys((*said["ignore"], *said["time"]), _BY_PERSON)
+    unused |= dict.fromkeys((*said["ignore"], *said["time"][1:]), _BY_PERSON)
     return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed), roles)
 
 
@@ -502,7 +507,7 @@ def _why_unused(name: str, names: Sequence[str]) -> str | None:
     if vocabulary.ROW_NUMBERS.fullmatch(word):
         return "it numbers the rows"
     if vocabulary.TIMES.fullmatch(word):
-        return "it is a time"
+        return IS_TIME
     if vocabulary.BOOKKEEPING.fullmatch(word):
         return "it is no part of a state"
     roles = (role for role, all_of in vocabulary.ROLES.items() for one in all_of if _is(one, word))

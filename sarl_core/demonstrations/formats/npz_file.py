@@ -40,6 +40,7 @@ ARRAY_KEYS = {
     "rewards": ("rewards", "rews", "reward", "rew"),
     "terminated": ("terminated", "terminals", "terminal", "terminations", "dones", "done"),
     "truncated": ("truncated", "timeouts", "timeout", "truncations"),
+    "times": ("times",),
     "indices": ("indices",),
     "starts": ("episode_starts",),
 }
@@ -51,6 +52,7 @@ _USES = {
     "rewards": "reward",
     "terminated": ROLE_WORDS["terminated"],
     "truncated": ROLE_WORDS["truncated"],
+    "times": ROLE_WORDS["time"],
     "indices": "rows at which episodes begin",
     "starts": ROLE_WORDS["first"],
 }
@@ -124,6 +126,7 @@ def recording_of_arrays(
         )
     actions, words = _labels(actions)
     episodes, terminated = _episodes(arrays, len(actions))
+    times = _one_a_step(arrays.get("times"))
     return Recording(
         observations=observations,
         actions=actions,
@@ -137,6 +140,7 @@ def recording_of_arrays(
         rewards=_one_a_step(arrays.get("rewards")),
         terminated=terminated,
         truncated=_one_a_step(arrays.get("truncated")),
+        times=times if times is not None and times.shape == (len(actions),) else None,
         names={
             role: f"the array {keys[key]!r}"
             for role, key in (
@@ -174,6 +178,7 @@ def write_npz(demonstrations: Demonstrations, out: BinaryIO) -> None:
             "rewards",
             "terminated",
             "truncated",
+            "times",
         )
         if (values := getattr(demonstrations, name)) is not None
     }

@@ -49,6 +49,7 @@ from sarl_core.demonstrations.formats.tables import (
     without_times,
 )
 from sarl_core.demonstrations.formats.texts.csv_file import CsvTable, open_csv
+from sarl_core.demonstrations.formats.times import with_seconds
 from sarl_core.demonstrations.formats.vocabulary import is_perhaps_action, plain
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
@@ -262,6 +263,7 @@ def _observations_of(table: CsvTable) -> _Half:
     guess, read, numbered = without_times(guess, table.read(guess.columns))
     words = {name for name, column in read.items() if column.words}
     guess = settle(guess, {name: column.values for name, column in read.items()}, words)
+    guess, read = with_seconds(guess, read, table.metadata.column_units)
     read = {name: read[name] for name in guess.columns.used}
     _require_marks(read, guess.columns)
     return _Half(guess, read, (*guess_notes(guess), *numbered))
@@ -282,6 +284,7 @@ def _actions_of(table: CsvTable) -> _Half:
     if not guess.columns.actions:
         require_clear(guess, table.names)
     guess, read, numbered = without_times(guess, table.read(guess.columns))
+    guess, read = with_seconds(guess, read, table.metadata.column_units)
     _require_marks(read, guess.columns)
     return _Half(guess, read, numbered)
 
@@ -319,6 +322,8 @@ def _together(
             observed = observed[followed]
             single[0] = {role: values[followed] for role, values in single[0].items()}
             notes = (*notes, "the last observation of each episode has no action and was dropped")
+    if "time" in single[0]:  # the time of an action may be a little later
+        single[1].pop("time", None)
     for role in single[0].keys() & single[1].keys():
         first, second = single[0][role], single[1][role]
         if len(first) == len(second) and not np.array_equal(first, second):

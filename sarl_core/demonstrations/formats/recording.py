@@ -60,6 +60,7 @@ class Recording:
         rewards: Shape (N,), likewise.
         terminated: Shape (N,), likewise.
         truncated: Shape (N,), likewise.
+        times: Seconds, shape (N,), likewise; NaN where not known.
         rows: Shape (N,), the rows the steps had in the file, from 0; None if they are those.
         guess_labels: Whether one column of floats that are whole numbers may be labels.
         names: What "episode", "step", "reward", "terminated" and "truncated" are called in
@@ -84,6 +85,7 @@ class Recording:
     rewards: NDArray[Any] | None = None
     terminated: NDArray[Any] | None = None
     truncated: NDArray[Any] | None = None
+    times: NDArray[Any] | None = None
     rows: NDArray[np.int64] | None = None
     guess_labels: bool = True
     names: Mapping[str, str] = field(default_factory=dict)
@@ -144,6 +146,7 @@ def to_demonstrations(
         terminated=recording.terminated,
         truncated=recording.truncated,
         steps=recording.steps,
+        times=recording.times,
         **fields,
         **space,
     )
@@ -290,6 +293,7 @@ def _complete(recording: Recording, missing: Missing) -> Recording:
             rewards=of_left(recording.rewards),
             terminated=of_left(recording.terminated),
             truncated=of_left(recording.truncated),
+            times=of_left(recording.times),
             rows=left if recording.rows is None else recording.rows[left],
             notes=(
                 *recording.notes,

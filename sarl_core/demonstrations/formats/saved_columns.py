@@ -31,6 +31,7 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
         "reward": demonstrations.rewards,
         "terminated": demonstrations.terminated,
         "truncated": demonstrations.truncated,
+        "time": demonstrations.times,
     }
     return columns | {name: values for name, values in singles.items() if values is not None}
 

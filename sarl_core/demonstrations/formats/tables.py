@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.fields import TRUTH, Indicator
 from sarl_core.demonstrations.formats.column_values import resolved, settle
 from sarl_core.demonstrations.formats.columns import (
+    IS_TIME,
     ColumnMap,
     Guess,
     action_names,
@@ -32,13 +33,14 @@ from sarl_core.demonstrations.formats.mapping.roles import Roles
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.demonstrations.formats.times import as_clock, of_words, with_seconds
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
 from sarl_core.demonstrations.words import Coded, indicated, indicators_of
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
-_OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated")
+_OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated", "time")
 
 
 def recording_from_table(
@@ -83,6 +85,8 @@ def recording_from_table(
     if guessed:
         words = {name for name, column in read.items() if column.words}
         guess = settle(guess, {name: column.values for name, column in read.items()}, words)
+    guess, read = with_seconds(guess, read, table.metadata.column_units, rows, certain=not guessed)
+    if guessed:
         notes = guess_notes(guess)
         if not any(name in guess.roles for name in guess.columns.actions):
             acted = guess.columns.actions
@@ -154,7 +158,7 @@ def without_times(
                 f"column {quoted(name)} holds {quoted(words[codes[row]])} in row {row + 1}, which "
                 "is a time and no number; write numbers, or leave it out"
             )
-    times = dict.fromkeys(timed, "it is a time")
+    times = dict.fromkeys(timed, IS_TIME)
     guess = guess.without(times)
     if columns.observations and not guess.columns.observations:
         raise InputError(
@@ -167,6 +171,10 @@ def without_times(
             columns=replace(guess.columns, step=None),
             unused={**guess.unused, columns.step: times[columns.step]},
         )
+    if times and columns.time is None:
+        clock = next(iter(times))
+        guess = as_clock(guess, clock)
+        read = {**read, clock: of_words(read[clock])}
     left = {name: read[name] for name in guess.columns.used}
     episode = columns.episode
     if episode is None or not left[episode].words:
@@ -202,6 +210,7 @@ def episode_fields(
             ("rewards", "reward"),
             ("terminated", "terminated"),
             ("truncated", "truncated"),
+            ("times", "time"),
         )
         if role in single
     }

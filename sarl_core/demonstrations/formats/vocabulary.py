@@ -11,6 +11,13 @@ ACTIONS = "actions?|acts?"
 SINGLE_ACTION = ("action", "actions", "act", "acts", "a")
 
 _COUNTED = "(_?(id|ids|index|idx|no|nr|num|number|count))?"
+# A date alone says of no step when it was, so that it is one of the times that nobody reads.
+_WHICH = "((unix|wall|sim|real|elapsed|clock|utc|local)_?)?"
+_HOW = "(_(s|sec|secs|seconds|ms|us|ns|utc|unix))?"
+_TIMES = (
+    rf"{_WHICH}(time|time_?stamp|date_?time|ts){_HOW}"
+    r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc|unix|ms|secs?|seconds|t_(s|ms)"
+)
 # Of a name as `plain` gives it; the first pattern that a column matches takes the role.
 ROLES: Mapping[str, tuple[str, ...]] = {
     "episode": (
@@ -23,6 +30,7 @@ ROLES: Mapping[str, tuple[str, ...]] = {
     "truncated": ("(is_?)?(truncated|truncation|timeout)s?",),
     "first": ("is_?first|is_?start|first_step|episode_starts?",),
     "last": ("is_?last|is_?end|last_step|episode_ends?",),
+    "time": (_TIMES,),
 }
 # Words for a role that may as well name a feature; what the column holds decides.
 DOUBTFUL_ROLES = re.compile(rf"(run|demo|demonstration|trial|frame|tick){_COUNTED}|t")
@@ -30,11 +38,7 @@ DOUBTFUL_ROLES = re.compile(rf"(run|demo|demonstration|trial|frame|tick){_COUNTE
 ROW_NUMBERS = re.compile(
     r"|#|index|idx|unnamed:_\d+|__index_level_\d+__|(row|line)_?(id|index|idx|no|nr|num|number)"
 )
-TIMES = re.compile(
-    r"((unix|wall|sim|real|elapsed|clock|utc|local)_?)?"
-    r"(time|time_?stamp|date|date_?time|ts)(_(s|sec|secs|seconds|ms|us|ns|utc|unix))?"
-    r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc|unix|ms|secs?|seconds|t_(s|ms)"
-)
+TIMES = re.compile(f"{_TIMES}|{_WHICH}date{_HOW}")
 # What learners write along, and no agent sees.
 BOOKKEEPING = re.compile(
     r"discounts?|(action_)?log_?p(robs?)?|advantages?|returns?_to_go|rtg|infos?(_.*)?"

@@ -134,13 +134,18 @@ def broken_rules_html(audit: Audit) -> Markup:
 
 def _episodes(audit: Audit) -> Markup:
     table = audit.episodes.sort_values("broken", ascending=False, kind="stable").head(_MOST_ROWS)
-    columns = tuple(
-        Column(title, "n")
-        for title in ("Episode", "Steps", "With a rule", "Broken", "Longest run", "Near misses")
-    )
+    titles = ["Episode", "Steps", "With a rule", "Broken", "Longest run", "Near misses"]
     names = ["episode", "steps", "covered", "broken", "longest_run", "near"]
+    if audit.clock is not None:
+        titles += ["Breaks a minute", "In the worst minute"]
+        names += ["breaks_per_minute", "worst_minute"]
+    columns = tuple(Column(title, "n") for title in titles)
     rows = [
-        (str(row[0]), *(f"{value:,}" for value in row[1:]))
+        (
+            str(row[0]),
+            *(f"{value:,}" for value in row[1:6]),
+            *(f"{value:.3g}" for value in row[6:]),
+        )
         for row in table[names].itertuples(index=False)
     ]
     return table_html(columns, rows, "Episodes")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sarl_core.auditing.audit import Audit, Stretch
+from sarl_core.auditing.clock import GAP
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.auditing.drift import Drift, Moved
 from sarl_core.auditing.near import NEAR
@@ -10,6 +11,7 @@ from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.language import counted, share_text
 
 _LISTED = 5
+_UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
 def audit_facts(audit: Audit) -> list[tuple[str, str]]:
@@ -44,7 +46,8 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
             f"{counted(audit.broken, 'step')}, {audit.breaks_per_thousand:.1f} in a thousand; a "
             "shield would have changed these actions",
         ),
-        ("longest run", counted(audit.longest_run, "step")),
+        ("breaks a minute", _pace_text(audit)),
+        ("longest run", counted(audit.longest_run, "step") + _lasting(audit)),
         ("outside", f"{counted(int(audit.outside.sum()), 'break')} where the rule has no data"),
         (
             "near misses",
@@ -61,7 +64,54 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
                 f"{counted(audit.missing_steps, 'step')}",
             )
         )
+    clock = audit.clock
+    if clock is not None and len(clock.gaps):
+        facts.append(
+            (
+                "gaps in time",
+                f"{counted(len(clock.gaps), 'jump')} of more than {GAP} steps, or back, within "
+                f"episodes; the longest of {duration_text(clock.longest_gap)}",
+            )
+        )
     return facts
+
+
+def duration_text(seconds: float) -> str:
+    """A time in the unit that it is read in.
+
+    Args:
+        seconds: At least 0.
+
+    Returns:
+        As "0.02 s", "3.5 min" or "12 h".
+    """
+    size, unit = next((one for one in _UNITS if seconds >= one[0]), _UNITS[-1])
+    return f"{seconds / size:.3g} {unit}"
+
+
+def _pace_text(audit: Audit) -> str:
+    clock, minute = audit.clock, audit.worst_minute
+    if clock is None:
+        return (
+            "not known, as the log has no times: say which column holds them (--column t=time), or "
+            "call it time"
+        )
+    worst = (
+        ""
+        if minute is None
+        else f"; {minute.breaks:,} in the worst one, from step {minute.step} of episode "
+        f"{minute.episode}"
+    )
+    return (
+        f"{audit.breaks_per_minute:.3g} in {duration_text(60 * clock.minutes)} with a step every "
+        f"{duration_text(clock.step)}{worst}"
+    )
+
+
+def _lasting(audit: Audit) -> str:
+    """How long the longest run lasts, where that is known."""
+    seconds = audit.worst[0].seconds if audit.worst else None
+    return "" if seconds is None else f" ({duration_text(seconds)})"
 
 
 def stretch_text(audit: Audit, stretch: Stretch) -> str:
@@ -72,12 +122,14 @@ def stretch_text(audit: Audit, stretch: Stretch) -> str:
         stretch: One of its worst.
 
     Returns:
-        As "episode 3, from step 17: 12 steps that break R4".
+        As "episode 3, from step 17: 12 steps (24 s) that break R4".
     """
     rules = " and ".join(audit.rule_set.name_of(audit.rule_set[at]) for at in stretch.rules)
+    lasting = "" if stretch.seconds is None else f" ({duration_text(stretch.seconds)})"
+    breaks = "breaks" if stretch.length == 1 else "break"
     return (
         f"episode {stretch.episode}, from step {stretch.step}: "
-        f"{counted(stretch.length, 'step')} that break{'s' if stretch.length == 1 else ''} {rules}"
+        f"{counted(stretch.length, 'step')}{lasting} that {breaks} {rules}"
     )
 
 

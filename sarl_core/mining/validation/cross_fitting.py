@@ -247,7 +247,12 @@ def _in_stretches(demonstrations: Demonstrations, count: int) -> Demonstrations:
     """One episode, cut into so many stretches of about the same length."""
     episodes = np.arange(len(demonstrations)) * count // len(demonstrations)
     return replace(
-        demonstrations, episodes=episodes, steps=None, rewards=None, terminated=None, truncated=None
+        demonstrations,
+        episodes=episodes,
+        steps=None,
+        rewards=None,
+        terminated=None,
+        truncated=None,
     )
 
 

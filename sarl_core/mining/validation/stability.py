@@ -264,6 +264,7 @@ def _drawn(demonstrations: Demonstrations, drawn: NDArray[np.int64]) -> Demonstr
         terminated=None,
         truncated=None,
         steps=None,
+        times=None,
     )
 
 

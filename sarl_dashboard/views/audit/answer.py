@@ -35,6 +35,11 @@ def show_answer(logs: Logs) -> None:
         ("Coverage", share_text(held.coverage), "coverage"),
         ("Agreement", share_text(held.agreement) if held.covered else "–", "agreement"),
         ("Broken", f"{held.broken:,}", "breaks"),
+        (
+            "Breaks a minute",
+            "–" if held.clock is None else f"{held.breaks_per_minute:.3g}",
+            "breaks a minute",
+        ),
         ("Longest run", f"{held.longest_run:,}", "longest run"),
         ("Near misses", f"{held.near_count:,}", "near misses"),
         ("Freedom", share_text(held.freedom), "freedom"),

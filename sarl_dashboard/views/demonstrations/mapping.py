@@ -20,6 +20,7 @@ SINGLE_COLUMNS: dict[RoleName, str] = {
     "truncated": "Ended by a limit",
     "first": "First of its run",
     "last": "Last of its run",
+    "time": "Time",
 }
 _KINDS = {"labels": "one of several choices", "continuous": "an amount"}
 _MOST_UNITS = 40  # features whose units are asked for one by one

@@ -35,6 +35,7 @@ from sarl_core.demonstrations.formats.metadata import (
 )
 from sarl_core.demonstrations.formats.opened_table import MAX_NAME, TableColumn, check_names
 from sarl_core.demonstrations.formats.saved_columns import columns_of
+from sarl_core.demonstrations.formats.times import of_words
 from sarl_core.demonstrations.words import Coded, in_order
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import read_limit, require_memory, table_memory
@@ -100,7 +101,7 @@ class ParquetTable(TableOfLeaves):
             read: dict[str, TableColumn] = {}
             for column in used:
                 wanted = {name: leaf for name, leaf in leaves.items() if leaf.column == column}
-                read |= _columns(file, column, wanted, columns.observations, schema)
+                read |= _columns(file, column, wanted, columns, schema)
             return {name: read[name] for name in columns.used}
 
 
@@ -181,7 +182,7 @@ def _columns(
     file: Any,
     column: str,
     leaves: Mapping[str, Leaf],
-    observations: Collection[str],
+    used: ColumnMap,
     schema: Any,
 ) -> dict[str, TableColumn]:
     """The leaves of one column, brought into their final form batch by batch."""
@@ -204,7 +205,7 @@ def _columns(
             part = column_from_arrow(name, held, at)
             if name not in values:
                 # True and false are more than 1 and 0.
-                as_it_is = name not in observations or part.values.dtype.kind == "b"
+                as_it_is = name not in used.observations or part.values.dtype.kind == "b"
                 values[name] = np.empty(rows, dtype=part.values.dtype if as_it_is else np.float32)
             # What overflows float32 is found as infinite.
             with np.errstate(over="ignore", invalid="ignore"):
@@ -218,7 +219,9 @@ def _columns(
     kind = schema.field(column).type  # a file that is read by dictionaries forgets their order
     ordered = pa.types.is_dictionary(kind) and kind.ordered
     words = {
-        name: TableColumn.of_words(_words(name, pa.chunked_array(one), ordered=ordered))
+        name: times_from_arrow(name, pa.chunked_array(one))
+        if name == used.time
+        else TableColumn.of_words(_words(name, pa.chunked_array(one), ordered=ordered))
         for name, one in texts.items()
     }
     return numbers | words
@@ -333,6 +336,25 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
     return TableColumn(_numbers(pc.fill_null(column, filler)), missing)
 
 
+def times_from_arrow(name: str, column: Any) -> TableColumn:
+    """Times of an Arrow column; arguments and errors as of `column_from_arrow`.
+
+    Returns:
+        Times of NumPy, numbers as they stand there, or a word that is no time.
+    """
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    if not _is_time(kind):
+        held = column_from_arrow(name, column)
+        return of_words(held) if held.words else held
+    if pa.types.is_time(kind):
+        column = pc.cast(pc.cast(column, pa.time64("us")), pa.int64())
+    zone = kind.tz if pa.types.is_timestamp(kind) else None
+    return TableColumn(_numbers(pc.cast(column, pa.timestamp("us", zone), safe=False)))
+
+
 def _words(name: str, column: Any, *, ordered: bool) -> Coded:
     """The words of an Arrow column, each looked at once however often it occurs."""
     import pyarrow as pa
@@ -342,8 +364,10 @@ def _words(name: str, column: Any, *, ordered: bool) -> Coded:
     if _is_time(chunked.type):
         chunked = pc.cast(chunked, pa.large_string())
     if not pa.types.is_dictionary(chunked.type):
-        chunked = pc.dictionary_encode(chunked)
-    whole = chunked.unify_dictionaries().combine_chunks()
+        chunked = pc.dictionary_encode(chunked.combine_chunks())  # once, and not chunk by chunk
+    whole = chunked
+    if isinstance(chunked, pa.ChunkedArray):
+        whole = chunked.unify_dictionaries().combine_chunks()
     whole = whole.chunk(0) if isinstance(whole, pa.ChunkedArray) else whole
     codes = np.asarray(pc.fill_null(pc.cast(whole.indices, pa.int64()), -1))
     sizes = np.asarray(pc.fill_null(pc.binary_length(whole.dictionary), 0))

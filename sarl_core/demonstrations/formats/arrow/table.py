@@ -14,7 +14,11 @@ from sarl_core.demonstrations.formats.arrow.nested import (
     refuse_nested,
     values_in,
 )
-from sarl_core.demonstrations.formats.arrow.parquet_file import column_from_arrow, refusing_damage
+from sarl_core.demonstrations.formats.arrow.parquet_file import (
+    column_from_arrow,
+    refusing_damage,
+    times_from_arrow,
+)
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import KEY, Metadata, decode_metadata
 from sarl_core.demonstrations.formats.opened_table import TableColumn, as_float32, check_names
@@ -56,7 +60,8 @@ class ArrowTable(TableOfLeaves):
         read: dict[str, TableColumn] = {}
         with refusing_damage():
             for name in columns.used:
-                column = column_from_arrow(name, self._values(name))
+                reader = times_from_arrow if name == columns.time else column_from_arrow
+                column = reader(name, self._values(name))
                 read[name] = as_float32(column) if name in columns.observations else column
         return read
 

@@ -29,6 +29,7 @@ _ROLES = {
     "step": "frame_index",
     "reward": "next.reward",
     "last": "next.done",
+    "time": "timestamp",
 }
 
 

@@ -154,11 +154,12 @@ def _role(guess: Guess, name: str, table: Table) -> ColumnRole | None:
         "truncated": "truncated",
         "first": "first",
         "last": "last",
+        "time": "time",
     }
     for role, column in columns.singles.items():
         if column == name:
             return ColumnRole(single[role])
-    return ColumnRole("time" if guess.unused.get(name) == "it is a time" else "ignore")
+    return ColumnRole("ignore")
 
 
 def _action_kind(guess: Guess, column: TableColumn) -> ActionKind | None:

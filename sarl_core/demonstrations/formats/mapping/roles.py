@@ -42,10 +42,14 @@ ROLE_WORDS: Mapping[str, str] = MappingProxyType(
         "truncated": "end of an episode (by a limit)",
         "first": "beginning of an episode",
         "last": "end of an episode",
-        "time": "not used",
+        "time": "time",
         "ignore": "not used",
     }
 )
+SECONDS: Mapping[str, float] = MappingProxyType(
+    {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+)
+"""How long the units of times are."""
 ActionKind = Literal["labels", "continuous"]
 UNCLEAR = "unclear"
 """What stands in a suggestion where two readings are possible."""
@@ -53,8 +57,9 @@ TOGETHER = "+"
 """Between columns that are one action together."""
 _GRAMMAR = (
     "write NAME=ROLE with one of the roles "
-    f"{', '.join(get_args(RoleName))}; a feature may have a unit (speed=feature:m/s), and an "
-    "action may be labels or continuous with or without bounds (throttle=action:continuous:0:100)"
+    f"{', '.join(get_args(RoleName))}; a feature may have a unit (speed=feature:m/s), and a time "
+    "(t=time:ms), and an action may be labels or continuous with or without bounds "
+    "(throttle=action:continuous:0:100)"
 )
 _MOST_OFFERED = 3  # columns of which a sentence says what to do
 _FORMAT, _VERSION = "sarl-columns", 1
@@ -65,8 +70,8 @@ class ColumnRole:
     """What one column is.
 
     Attributes:
-        role: What it holds; a time and what is to be ignored are not read.
-        unit: Of a feature, "" where there is none.
+        role: What it holds; what is to be ignored is not read.
+        unit: Of a feature, or what a time is counted in; "" where there is none.
         kind: Whether an action is labels or an amount; None to go by its values.
         low: Lower bound of a continuous action; None to go by its values.
         high: Upper bound, likewise.
@@ -82,8 +87,12 @@ class ColumnRole:
     high: float | None = None
 
     def __post_init__(self) -> None:
-        if self.unit and self.role != "feature":
+        if self.unit and self.role not in ("feature", "time"):
             raise InputError(f"a column that is {self.role!r} has no unit here; leave the unit out")
+        if self.unit and self.role == "time" and self.unit not in SECONDS:
+            raise InputError(
+                f"{quoted(self.unit)} is no unit of a time here; write one of {', '.join(SECONDS)}"
+            )
         if (self.kind is not None or self.low is not None) and self.role != "action":
             raise InputError(
                 f"a column that is {self.role!r} is neither labels nor continuous; only an action "
@@ -126,8 +135,8 @@ def role_from_text(text: str) -> ColumnRole:
     role = role.strip().lower()
     if role not in ROLE_WORDS:
         raise InputError(f"{quoted(role)} is no role of a column; {_GRAMMAR}")
-    if role == "feature":
-        return ColumnRole("feature", unit=":".join(more).strip())
+    if role in ("feature", "time"):
+        return ColumnRole(cast("RoleName", role), unit=":".join(more).strip())
     fits = not more or (role == "action" and len(more) in (1, 3))
     kind = more[0].strip().lower() if more else None
     if not fits or kind not in (None, *get_args(ActionKind)):

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import TRUTH
-from sarl_core.demonstrations.formats.arrow.parquet_file import column_from_arrow, is_text
+from sarl_core.demonstrations.formats.arrow.parquet_file import (
+    column_from_arrow,
+    is_text,
+    times_from_arrow,
+)
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.opened_table import TableColumn, as_float32, check_names
@@ -32,8 +36,9 @@ _BOMS = {
 _MOST_DIFFERENT = 1_000  # texts of a column that are kept once each
 _BLOCK = 2**22  # bytes that are looked through at once
 _FEED, _RETURN = b"\n\r"
-# What Arrow's parser of numbers takes beside numbers, wherever it stands.
-_NO_NUMBERS = re.compile(rb"0x|nan\(", re.I)
+# What Arrow's parser of numbers takes beside numbers, 0x and nan(, wherever it stands; looked for
+# by their ends, as digits are everywhere.
+_NO_NUMBERS = re.compile(rb"[xX(](?:(?<=0[xX])|(?<=[nN][aA][nN]\())")
 _NOTHING = ("", "NA", "N/A", "n/a", "#N/A", "<NA>", "NaN", "nan", "NAN", "null", "NULL", "Null")
 # A number, and a field that holds one, nothing, or a truth value; as Arrow's own matcher has it.
 _NUMBER_TEXT = r"([+-]?(\d+(POINT\d*)?|POINT\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity))"
@@ -106,13 +111,18 @@ class CsvTable:
         # What Arrow takes for a number and a person does not: 0x10, nan(1).
         if _NO_NUMBERS.search(self.body):
             self._require_numbers([name for name in columns.used if name not in texts])
-        for name in texts:
+        for name in texts - {columns.time}:
             self._require_words(name, table.column(name))
         spelled = self._spelled([one for one in columns.actions if pa.types.is_boolean(kinds[one])])
         # Each column is given back as soon as its numbers stand in one piece.
         left = dict(zip(columns.used, table.columns, strict=True))
         del table
-        read = {name: column_from_arrow(name, left.pop(name)) for name in columns.used} | spelled
+        read = {
+            name: (times_from_arrow if name == columns.time else column_from_arrow)(
+                name, left.pop(name)
+            )
+            for name in columns.used
+        } | spelled
         return {
             name: as_float32(column) if name in columns.observations else column
             for name, column in read.items()
