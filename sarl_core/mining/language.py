@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
 _LONGEST = 120
 _IS = " is "
+_IS_NOT = " is not "
 _FLAG_WORDS = ("contact",)
 # Labels that say nothing without the action that they are of.
 _NO_ACTIONS = {"true", "false", "yes", "no", "on", "off", "none", "t", "f", "y", "n"}
@@ -152,6 +153,93 @@ def flag_text(feature: Feature, bounds: Bounds) -> str:
     if _states(feature):
         return feature.name if holds else feature.name.replace(_IS, f"{_IS}not ", 1)
     return f"{'' if holds else 'no '}{feature.name}"
+
+
+def asked(rule: Rule, features: Sequence[Feature]) -> tuple[tuple[Bounds, ...], ...]:
+    """The least that says what a rule asks: of a column of words exactly one is the case.
+
+    Args:
+        rule: Any.
+        features: All features.
+
+    Returns:
+        One entry a feature or a column of words, in the order of the rule. It is one interval; or
+        several, where several of a column's words are not to be the case and two or more are left.
+    """
+    by_thing: dict[int | str, list[Bounds]] = {}
+    for one in rule.bounds:
+        feature = features[one.feature]
+        of_words = feature.indicator is not None and not feature.indicator.otherwise
+        if of_words and is_flag(feature, one):
+            assert feature.indicator is not None
+            by_thing.setdefault(feature.indicator.column, []).append(one)
+        else:
+            by_thing[one.feature] = [one]
+    return tuple(
+        entry
+        for thing, bounds in by_thing.items()
+        for entry in (_least(thing, bounds, features) if isinstance(thing, str) else [(bounds[0],)])
+    )
+
+
+def _least(
+    column: str, bounds: Sequence[Bounds], features: Sequence[Feature]
+) -> list[tuple[Bounds, ...]]:
+    """The same of one column of words."""
+    holding = [one for one in bounds if math.isinf(one.high)]
+    if holding:  # the others say no more; two of them hold nowhere, which is said
+        return [(one,) for one in holding]
+    excluded = {one.feature for one in bounds}
+    left = [
+        at
+        for at, feature in enumerate(features)
+        if feature.indicator is not None
+        and feature.indicator.column == column
+        and at not in excluded
+    ]
+    if len(left) == 1 and len(bounds) > 1:
+        return [(Bounds(left[0], bounds[-1].high, math.inf),)]
+    return [tuple(bounds)]
+
+
+def asked_bounds(rule: Rule, features: Sequence[Feature]) -> tuple[Bounds, ...]:
+    """The same, interval by interval."""
+    return tuple(one for entry in asked(rule, features) for one in entry)
+
+
+def merged_length(rule: Rule, features: Sequence[Feature]) -> int:
+    """Number of features and columns of words that a rule asks about."""
+    return len(asked(rule, features))
+
+
+def neither_text(entry: Sequence[Bounds], features: Sequence[Feature]) -> str | None:
+    """What an entry of `asked` is that leaves out several words of a column.
+
+    Args:
+        entry: One or several intervals.
+        features: All features.
+
+    Returns:
+        As "mode is neither light nor mixed"; None for one interval, and where features were
+        renamed to what names no word of a column.
+    """
+    if len(entry) == 1:
+        return None
+    excluded = [features[one.feature].statement(False).partition(_IS_NOT) for one in entry]
+    columns, _, words = zip(*excluded, strict=True)
+    if len({*columns}) > 1 or not all(words):
+        return None
+    return f"{columns[0]} is neither {', '.join(words[:-1])} nor {words[-1]}"
+
+
+def _asked_texts(
+    rule: Rule, features: Sequence[Feature], text: Callable[[Bounds], str], *, the: str = ""
+) -> list[str]:
+    texts: list[str] = []
+    for entry in asked(rule, features):
+        neither = neither_text(entry, features)
+        texts += map(text, entry) if neither is None else [f"{the}{neither}"]
+    return texts
 
 
 def _states(feature: Feature) -> bool:
@@ -310,7 +398,7 @@ def conditions_text(rule: Rule, rule_set: RuleContents) -> str:
         As "pole angle > 0.02 rad and cart velocity ≤ 0.3 m/s"; "always" without conditions.
     """
     features = rule_set.source.features
-    parts = [short_condition(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    parts = _asked_texts(rule, features, lambda one: short_condition(one, features[one.feature]))
     return " and ".join(parts) if parts else "always"
 
 
@@ -336,14 +424,12 @@ def sentence(
     """
     features = rule_set.source.features
     action = action_text(rule.action, rule_set.actions[rule.dimension])
-    parts = [
-        condition_text(
-            bounds,
-            features[bounds.feature],
-            beside=() if state is None else (float(state[bounds.feature]),),
-        )
-        for bounds in rule.bounds
-    ]
+
+    def text_of(bounds: Bounds) -> str:
+        beside = () if state is None else (float(state[bounds.feature]),)
+        return condition_text(bounds, features[bounds.feature], beside=beside)
+
+    parts = _asked_texts(rule, features, text_of, the="the ")
     if not parts:
         text = f"Always {action}"
     elif len(parts) == 1:

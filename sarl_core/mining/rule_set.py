@@ -23,6 +23,7 @@ from sarl_core.mining.language import (
     exact_condition,
     label_text,
     limits_text,
+    merged_length,
     sentence,
     share_text,
 )
@@ -195,7 +196,15 @@ class RuleSet(RuleContents, Sequence[Rule]):
                     for rule in self
                 ],
                 **{
-                    column: np.array([getattr(rule, column) for rule in self], dtype=dtype)
+                    column: np.array(
+                        [
+                            merged_length(rule, features)
+                            if column == "merged_length"
+                            else getattr(rule, column)
+                            for rule in self
+                        ],
+                        dtype=dtype,
+                    )
                     for column, dtype in _NUMBERS.items()
                 },
                 "origin": [rule.origin for rule in self],

@@ -115,11 +115,6 @@ class Rule:
             )
         return tuple(by_feature.values())
 
-    @property
-    def merged_length(self) -> int:
-        """Number of features it asks about."""
-        return len(self.bounds)
-
     def applies(self, observations: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Whether its conditions hold.
 

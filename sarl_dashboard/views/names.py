@@ -134,7 +134,7 @@ def show_sentence(demonstrations: Demonstrations) -> None:
     rules = largest_rules(grown, chosen_thresholds(), 5).part
     if not rules.rules:
         return
-    longest = max(rules.rules, key=lambda rule: rule.merged_length)
+    longest = max(rules.rules, key=lambda rule: rule.length)
     with st.container(border=True):
         st.caption("So a rule reads now")
         st.markdown(escaped(sentence(longest, rules)))

@@ -169,7 +169,7 @@ def test_a_compact_rule_is_explained_on_the_chosen_demonstrations(compact: RuleS
     assert f"Over the {compact.source.steps:,} pairs that the compact set was built from" in words
     assert f"support {share_text(shipped.support)}" in words
     assert html(app).count("<tr") == (1 + 1 + rule.length) + (1 + min(10, rule.samples))
-    assert html(app).count("<figure>") == rule.merged_length
+    assert html(app).count("<figure>") == len(rule.bounds)
     assert "The tree around the rule: " in html(app)
     app.button_group(key="tree").set_value("Whole tree").run()
     assert not app.exception
@@ -184,7 +184,7 @@ def test_a_rule_that_no_demonstrated_state_reaches_says_so(compact: RuleSet) -> 
     assert escape(sentence(rule, here, evidence=False)) in html(app)
     assert "so did the expert" not in html(app)
     assert len(app.get("plotly_chart")) == 1
-    assert html(app).count("<figure>") == rule.merged_length
+    assert html(app).count("<figure>") == len(rule.bounds)
     assert len(app.dataframe) == 1
     assert html(app).count("<tr") == 1 + 1 + rule.length
 

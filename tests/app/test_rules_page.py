@@ -42,7 +42,7 @@ def test_the_rule_of_a_link_is_explained(data: str) -> None:
     examples = min(10, rule.samples)
     assert html(app).count("<tr") == (1 + 1 + rule.length) + (1 + examples)
     assert "this is the rule" in html(app)
-    assert html(app).count("<figure>") == rule.merged_length
+    assert html(app).count("<figure>") == len(rule.bounds)
     assert html(app).count('<i class="dot end"') == 1
     assert not app.get("plotly_chart")
     whole = open_page("rules", data=data, rule=rule.id, tree="Whole tree")

@@ -59,7 +59,7 @@ def test_a_state_a_rule_and_what_would_change_the_decision() -> None:
         rule = rules.rules[decision.rules[0]]
         assert f"{rules.name_of(rule)}. {sentence(rule, rules)}" in said(app)
         assert ("Changed by the rules" in said(app)) == decision.intervened
-        assert len(table(app, "The state has")) == rule.merged_length
+        assert len(table(app, "The state has")) == len(rule.bounds)
 
     # The first row says the least change: beyond it another action is executed, before it not.
     app.button(key="another").click().run()

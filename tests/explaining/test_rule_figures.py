@@ -47,7 +47,7 @@ def test_a_path_goes_from_all_states_to_those_of_the_rule(
 def test_evidence_of_a_feature_is_that_of_its_states(
     lander_like: Demonstrations, lander_trees: tuple[PolicyTree, ...], rules: RuleSet
 ) -> None:
-    rule = max(rules.rules, key=lambda one: one.merged_length)
+    rule = max(rules.rules, key=lambda one: len(one.bounds))
     found = feature_evidence(lander_like, lander_trees[0], rule)
     assert [one.bounds for one in found] == list(rule.bounds)
     for one in found:

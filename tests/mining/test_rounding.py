@@ -186,7 +186,7 @@ def test_merged_rules_apply_where_they_did(lander_like: Demonstrations) -> None:
     )
     assert np.array_equal(before.rules, after.rules)
     assert max(rule.length for rule in merged.rules) < max(rule.length for rule in rules.rules)
-    assert all(rule.length <= 2 * rule.merged_length for rule in merged.rules)
+    assert all(rule.length <= 2 * len(rule.bounds) for rule in merged.rules)
 
 
 def test_other_features_are_refused(lander_like: Demonstrations) -> None:

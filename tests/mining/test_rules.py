@@ -16,7 +16,7 @@ def rule(*conditions):
 def test_several_bounds_on_one_feature_make_one_interval():
     merged = rule((2, "<=", 5.0), (0, ">", 1.0), (2, ">", -1.0), (2, "<=", 3.0), (0, ">", 0.5))
     assert merged.bounds == (Bounds(2, -1.0, 3.0), Bounds(0, 1.0, np.inf))
-    assert (merged.length, merged.merged_length) == (5, 2)
+    assert (merged.length, len(merged.bounds)) == (5, 2)
 
 
 def test_a_state_on_the_threshold_goes_left():

@@ -24,6 +24,7 @@ from sarl_core.mining.language import (
     counted,
     exact_condition,
     label_text,
+    merged_length,
     sentence,
 )
 from sarl_core.mining.rule_order import rules_for
@@ -299,7 +300,7 @@ def rules_to_csv(rule_set: RuleSet) -> str:
                 repr(rule.joint_support),
                 rule.samples,
                 rule.length,
-                rule.merged_length,
+                merged_length(rule, features),
                 "yes" if rule.enabled else "no",
                 rule.origin,
                 "yes" if rule.pinned else "no",

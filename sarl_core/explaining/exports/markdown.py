@@ -11,9 +11,11 @@ from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
 from sarl_core.mining.language import (
     action_text,
+    asked,
     counted,
     flag_text,
     is_flag,
+    neither_text,
     one_line,
     share_text,
 )
@@ -73,7 +75,11 @@ def _text(text: str) -> str:
 
 def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     features = rule_set.source.features
-    intervals = [_interval(bounds, features[bounds.feature]) for bounds in rule.bounds]
+    intervals: list[str] = []
+    for entry in asked(rule, features):
+        neither = neither_text(entry, features)
+        each = (_interval(one, features[one.feature]) for one in entry)
+        intervals += each if neither is None else [_text(neither)]
     action = _text(action_text(rule.action, rule_set.actions[rule.dimension]))
     name = rule_set.name_of(rule)
     if rule.origin == "manual":

@@ -7,7 +7,7 @@ from markupsafe import Markup
 from sarl_core.explaining.html.evidence_bar import evidence_bar
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, episodes_text, mined_text
-from sarl_core.mining.language import counted, sentence, share_text
+from sarl_core.mining.language import counted, merged_length, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import verdict
@@ -56,7 +56,8 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> Mark
     words = [rule_set.name_of(rule)]
     if reached:
         words.append(measures_text(rule))
-    words.append(f"{counted(rule.length, 'condition')} on {counted(rule.merged_length, 'feature')}")
+    asked_about = merged_length(rule, rule_set.source.features)
+    words.append(f"{counted(rule.length, 'condition')} on {counted(asked_about, 'feature')}")
     sureness, colour, bar = "", "", Markup()
     if reached and threshold is not None:
         sureness, colour = _sureness(rule, threshold)

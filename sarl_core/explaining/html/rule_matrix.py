@@ -18,6 +18,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.templates import render, style_sheet
 from sarl_core.mining.language import (
     action_text,
+    asked_bounds,
     counted,
     label_text,
     number_text,
@@ -110,7 +111,8 @@ class RuleMatrix:
         Returns:
             One a feature that it asks about.
         """
-        by_feature = {bounds.feature: bounds for bounds in rule.bounds}
+        asked = asked_bounds(rule, self.rule_set.source.features)
+        by_feature = {bounds.feature: bounds for bounds in asked}
         return {
             column.feature: _bar(by_feature[column.feature], column)
             for column in self.columns
@@ -129,8 +131,10 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     Returns:
         Columns in the order of the features.
     """
-    queried = sorted({bounds.feature for rule in rule_set.rules for bounds in rule.bounds})
     features = rule_set.source.features
+    queried = sorted(
+        {one.feature for rule in rule_set.rules for one in asked_bounds(rule, features)}
+    )
     if demonstrations is not None and demonstrations.observations.shape[1] != len(features):
         demonstrations = None
     placed = [rule for rule in rule_set.rules if rule.placed]

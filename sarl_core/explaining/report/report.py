@@ -30,7 +30,7 @@ from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
-from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.language import counted, merged_length, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree, grow_policy_trees
 from sarl_core.mining.validation.cross_fitting import cross_fit
@@ -327,7 +327,8 @@ def _capital(text: str) -> str:
 def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...]:
     followed = counts.followed
     rules = [rule for rule in rule_set.rules if rule.enabled]
-    merged = sum(rule.merged_length for rule in rules) / max(len(rules), 1)
+    features = rule_set.source.features
+    merged = sum(merged_length(rule, features) for rule in rules) / max(len(rules), 1)
     return (
         (f"{len(rules):,}", "rule" if len(rules) == 1 else "rules"),
         (f"{merged:.1f}", "conditions a rule, on average"),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
@@ -20,9 +21,11 @@ from sarl_core.mining.digits import value_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     action_text,
+    asked,
     counted,
     done_text,
     is_flag,
+    neither_text,
     number_text,
     sentence,
     share_text,
@@ -150,20 +153,7 @@ def rule_card(
         tags=tags(rule),
         support=_support(rule, applying, decided, tally),
         evidence=_evidence(rule, rule_set, index, tally, applying),
-        conditions=tuple(
-            _condition(
-                bounds,
-                rule_set.source.features[bounds.feature],
-                ranges[bounds.feature],
-                (
-                    demonstrations.observations[rows, bounds.feature].min().item(),
-                    demonstrations.observations[rows, bounds.feature].max().item(),
-                )
-                if len(rows)
-                else (),
-            )
-            for bounds in rule.bounds
-        ),
+        conditions=_conditions(rule, rule_set, ranges, demonstrations.observations[rows]),
         pictures=tuple(_picture(frame, rule, rule_set, ranges) for frame in frames),
     )
 
@@ -263,6 +253,26 @@ def _tried(source: str, held_out: HeldOut, threshold: float | None) -> Evidence:
         bar=evidence_bar(share, interval, below=below, threshold=threshold),
         below=below,
     )
+
+
+def _conditions(
+    rule: Rule,
+    rule_set: RuleSet,
+    ranges: Sequence[FeatureRow],
+    states: NDArray[np.float32],
+) -> tuple[ConditionRow, ...]:
+    features = rule_set.source.features
+    rows: list[ConditionRow] = []
+    for entry in asked(rule, features):
+        neither = neither_text(entry, features)
+        if neither is not None:
+            rows.append(ConditionRow(neither, "", Markup()))
+            continue
+        for one in entry:
+            values = states[:, one.feature]
+            ends = (values.min().item(), values.max().item()) if len(values) else ()
+            rows.append(_condition(one, features[one.feature], ranges[one.feature], ends))
+    return tuple(rows)
 
 
 def _condition(

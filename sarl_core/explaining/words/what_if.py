@@ -11,14 +11,24 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import done_text, is_flag, number_text, short_condition
+from sarl_core.mining.language import (
+    asked,
+    done_text,
+    is_flag,
+    neither_text,
+    number_text,
+    short_condition,
+)
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.neighbourhood import FeatureChange
+
+_HALF = 0.5  # of a feature that is 1 or 0
 
 
 @dataclass(frozen=True)
@@ -49,20 +59,47 @@ def condition_views(
     Returns:
         One entry a feature that it asks about.
     """
+    features = rule_set.source.features
     views = []
-    for bounds in rule.bounds:
-        feature, value = rule_set.source.features[bounds.feature], state[bounds.feature]
-        room = min(value - bounds.low, bounds.high - value)
-        views.append(
-            ConditionView(
-                short_condition(bounds, feature, beside=(value,)),
-                feature.statement(value > max(bounds.low, 0.0))
-                if is_flag(feature, bounds) and feature.indicator is not None
-                else with_unit(value_text(value, feature, [bounds]), feature),
-                "–" if is_flag(feature, bounds) else with_unit(number_text(room), feature),
+    for entry in asked(rule, features):
+        neither = neither_text(entry, features)
+        if neither is not None:
+            views.append(ConditionView(neither, word_text(entry[0].feature, state, features), "–"))
+            continue
+        for bounds in entry:
+            feature, value = features[bounds.feature], state[bounds.feature]
+            flag = is_flag(feature, bounds)
+            room = min(value - bounds.low, bounds.high - value)
+            views.append(
+                ConditionView(
+                    short_condition(bounds, feature, beside=(value,)),
+                    word_text(bounds.feature, state, features)
+                    if flag and feature.indicator is not None
+                    else with_unit(value_text(value, feature, [bounds]), feature),
+                    "–" if flag else with_unit(number_text(room), feature),
+                )
             )
-        )
     return tuple(views)
+
+
+def word_text(at: int, state: Sequence[float], features: Sequence[Feature]) -> str:
+    """What a state says of a column of words.
+
+    Args:
+        at: One of the column's features.
+        state: d values.
+        features: The d features.
+
+    Returns:
+        As "mode is heavy"; where the state says no word, or several, whether that feature holds.
+    """
+    own = features[at].indicator
+    assert own is not None
+    column = columns_of_words([one.indicator for one in features])[own.column]
+    holding = [one for one in column if state[one] > _HALF]
+    if len(holding) == 1 and len(column) > 1:
+        return features[holding[0]].statement(True)
+    return features[at].statement(state[at] > _HALF)
 
 
 def outside_texts(
