@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.errors import InputError
 from sarl_core.shielding.shield import BatchDecision, Shield
 
@@ -120,6 +121,8 @@ class Neighbourhood:
         self._first, self._last = after(low), at_most(high)
         # Where its data begins, and what comes after the last of it.
         self._begin, self._beyond = at_least(least), after(most)
+        columns = columns_of_words([one.indicator for one in shield.rule_set.source.features])
+        self._words = [np.array(places) for places in columns.values() if len(places) > 1]
 
     def near_misses(
         self, state: ArrayLike, spreads: Floats, *, features: int = 1, most: int = 8
@@ -140,11 +143,14 @@ class Neighbourhood:
         """
         here = self._state(state)
         wanted = np.clip(here, self._first, self._last)
-        differs = wanted != here
         # A bound that no finite number reaches makes a rule that never applies.
         possible = (self._first <= self._last).all(axis=1) & np.isfinite(wanted).all(axis=1)
+        differs = wanted != here
+        for places in self._words:
+            possible &= self._other_word(here, places, wanted, differs)
         rows = np.flatnonzero(possible & (differs.sum(axis=1) == features))
         moved = np.abs(wanted[rows].astype(np.float64) - here.astype(np.float64)) / spreads
+        moved[~differs[rows]] = 0.0  # of words one feature tells of all
         distances = moved.sum(axis=1)
         nearest = np.argsort(distances, kind="stable")[:most]
         rows, distances = rows[nearest], distances[nearest]
@@ -163,8 +169,40 @@ class Neighbourhood:
             for row, distance, at in zip(rows.tolist(), distances.tolist(), in_force, strict=True)
         )
 
+    def _other_word(
+        self,
+        here: States,
+        places: NDArray[np.int64],
+        wanted: States,
+        differs: NDArray[np.bool_],
+    ) -> NDArray[np.bool_]:
+        """Let a column hold another word where rules ask for it: all its features move at once.
+
+        Args:
+            here: The state, (d,).
+            places: The k features that say which word the column holds.
+            wanted: What the rules ask for, (R, d); changed in place.
+            differs: Which features that is told by, (R, d); of the column one. Likewise.
+
+        Returns:
+            Whether a word is as each rule asks, (R,).
+        """
+        words = np.eye(len(places), dtype=np.float32)
+        first, last = self._first[:, None, places], self._last[:, None, places]
+        fits: NDArray[np.bool_] = np.all((first <= words) & (words <= last), axis=2)
+        lacks: NDArray[np.bool_] = np.any(differs[:, places], axis=1)
+        word = fits.argmax(axis=1)
+        wanted[:, places] = np.where(lacks[:, None], words[word], here[places])
+        # Where any other word will do, it is the present one that is too much.
+        told = np.where(fits.sum(axis=1) == len(places) - 1, np.argmin(fits, axis=1), word)
+        differs[:, places] = lacks[:, None] & (np.arange(len(places)) == told[:, None])
+        return np.asarray(fits.any(axis=1))
+
     def lines(self, state: ArrayLike, action: Any) -> tuple[FeatureLine, ...]:
         """What the shield would do along each feature.
+
+        A feature that says that a column holds one of three or more words has two stretches: the
+        state as it is, and from 1 on the state in which the column holds that word.
 
         Args:
             state: Shape (d,); finite, taken as float32.
@@ -180,7 +218,15 @@ class Neighbourhood:
         broken = ~((self._first <= here) & (here <= self._last))
         count = broken.sum(axis=1)
         starts, states = [], []
+        of_words = {at: places for places in self._words for at in places.tolist()}
         for feature in range(len(here)):
+            if feature in of_words:
+                at = np.repeat(here[None], 2, axis=0)
+                at[1, of_words[feature]] = 0.0
+                at[1, feature] = 1.0
+                starts.append(np.array([_DOWN, 1.0], dtype=np.float32))
+                states.append(at)
+                continue
             # Rules whose other conditions hold; no other can apply anywhere along the line.
             rows = np.flatnonzero(count == broken[:, feature])
             edges = _starts(

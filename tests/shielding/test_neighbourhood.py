@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sarl_core import InputError, Shield, mine_rules
+from sarl_core import InputError, RuleSet, Shield, mine_rules
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.fields import Indicator
+from sarl_core.explaining.words.what_if import near_miss_text
+from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.rules import FILTERED, Condition, Rule
+from sarl_core.mining.tree import Source
 from sarl_core.shielding.neighbourhood import (
     Neighbourhood,
     after,
@@ -182,3 +189,78 @@ def test_a_state_that_is_none_is_refused():
             near.near_misses(state, np.ones(D))
         with pytest.raises(InputError, match="3 finite numbers"):
             near.lines(state, 4)
+
+
+MODES = ("heavy", "light", "mixed", "odd")
+
+
+def rules_about_modes() -> RuleSet:
+    """Lower where the mode is heavy, hold where it is neither light nor heavy, above 9 m/s."""
+    features = (
+        *(Feature(f"mode is {word}", "", Indicator("mode", word)) for word in MODES),
+        Feature("wind", "m/s"),
+    )
+    asked = (
+        ((0, ">", 0.5),),
+        ((0, "<=", 0.5), (1, "<=", 0.5), (4, ">", 9.0)),
+        ((0, "<=", 0.5), (1, "<=", 0.5), (2, "<=", 0.5), (4, "<=", 9.0)),
+    )
+    rules = tuple(
+        Rule(f"0.{place}", 0, tuple(Condition(*one) for one in each), place, 0.2, 0.97, 1.9, 90)
+        for place, each in enumerate(asked)
+    )
+    actions = (LabelledDimension("lift", ("lower", "hold", "raise")),)
+    return RuleSet(rules, actions, Source("", features, "d" * 32, 400, 10), FILTERED)
+
+
+def of_mode(word: str, wind: float) -> np.ndarray:
+    return np.array([*(word == one for one in MODES), wind], dtype=np.float32)
+
+
+def test_another_word_is_one_change_of_the_whole_column() -> None:
+    rules = rules_about_modes()
+    near, state, spreads = Neighbourhood(Shield(rules)), of_mode("light", 12.0), np.ones(5)
+    misses = near.near_misses(state, spreads)
+    assert [
+        (miss.rule, near_miss_text(miss.changes, rules.source.features), miss.distance)
+        for miss in misses
+    ] == [(0, "mode were heavy", 1.0), (1, "mode were mixed", 1.0)]
+    two = near.near_misses(state, spreads, features=2)
+    assert [near_miss_text(one.changes, rules.source.features) for one in two] == [
+        "mode were odd and wind were 3 m/s less"
+    ]
+    # A word that is too much, where each of the others will do.
+    heavy = near.near_misses(of_mode("heavy", 3.0), spreads)
+    assert [near_miss_text(one.changes, rules.source.features) for one in heavy] == [
+        "mode were odd"
+    ]
+
+
+def test_along_a_column_of_words_the_shield_is_asked_for_each_of_them() -> None:
+    rules = rules_about_modes()
+    shield = Shield(rules)
+    state = of_mode("light", 12.0)
+    lines = Neighbourhood(shield).lines(state, 2)
+    for place, word in enumerate(MODES):
+        expected = shield.decide(of_mode(word, 12.0), 2)
+        assert lines[place].decisions.executed[-1].tolist() == [expected.executed]
+        assert lines[place].decisions.executed[0].tolist() == [2]  # as it is
+    changes = [
+        change
+        for line in lines[:4]
+        for change in decision_changes(line, float(state[line.feature]), 1.0)
+        if change is not None
+    ]
+    assert [(one.change.feature, one.executed.tolist()) for one in changes] == [
+        (0, [0]),
+        (2, [1]),
+        (3, [1]),
+    ]
+
+
+def test_a_rule_that_leaves_out_the_present_word_alone_says_so() -> None:
+    rules = rules_about_modes()
+    one = replace(rules[1], conditions=rules[1].conditions[:1])
+    near = Neighbourhood(Shield(replace(rules, rules=(one,))))
+    (miss,) = near.near_misses(of_mode("heavy", 3.0), np.ones(5))
+    assert near_miss_text(miss.changes, rules.source.features) == "mode were not heavy"

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.path import label_key
 from sarl_core.explaining.markup import percent
@@ -33,6 +34,7 @@ class _Row(NamedTuple):
     place: str
     parts: list[tuple[str, str]]
     ends: list[str]
+    of_words: bool = False
 
 
 def lines_html(
@@ -57,14 +59,29 @@ def lines_html(
         rule_set: The shield's.
 
     Returns:
-        HTML. Every bar is as wide as there is room; the
-        present value is marked on it.
+        HTML. A column of words has one bar, with a part for each word. Every bar is as wide as
+        there is room; the present value is marked on it.
     """
     labels = rule_set.actions[dimension]
-    rows = [
-        _row(stretches(line, ends, dimension, rule_set), ends, value, feature, labels)
-        for line, ends, value, feature in zip(lines, ranges, values, features, strict=True)
-    ]
+    columns = columns_of_words([feature.indicator for feature in features])
+    several = {at: places for places in columns.values() if len(places) > 1 for at in places}
+    rows = []
+    for place, (line, ends, value, feature) in enumerate(
+        zip(lines, ranges, values, features, strict=True)
+    ):
+        words = sorted(several.get(place, ()), key=lambda at: lines[at].feature)
+        if not words:
+            parts = stretches(line, ends, dimension, rule_set)
+            rows.append(_row(parts, ends, value, feature, labels))
+        elif place == min(words):
+            done = [
+                _looks(lines[at], len(lines[at].starts) - 1, dimension, rule_set) for at in words
+            ]
+            rows.append(
+                _row_of_words(
+                    [features[at] for at in words], [values[at] for at in words], done, labels
+                )
+            )
     return render("states/lines", labels=label_key(labels), rows=rows)
 
 
@@ -84,15 +101,6 @@ def stretches(
         without gaps.
     """
     low, high = ends
-    executed = line.decisions.executed[:, dimension]
-    executed_labels = rule_set.actions[dimension].labels_of(executed).tolist()
-    # A rule that abstains is in force, and something else is executed.
-    ruled = [
-        rule >= 0 and rule_set.rules[rule].action == label
-        for rule, label in zip(
-            line.decisions.rules[:, dimension].tolist(), executed_labels, strict=True
-        )
-    ]
     starts = [-np.inf, *line.starts[1:].astype(np.float64).tolist()]
     joined: list[tuple[float, float, int, bool]] = []
     for place, start in enumerate(starts):
@@ -100,12 +108,55 @@ def stretches(
         left, right = max(start, low), min(end, high)
         if left >= right:
             continue
-        looks = (executed_labels[place], ruled[place])
+        looks = _looks(line, place, dimension, rule_set)
         if joined and joined[-1][2:] == looks:
             joined[-1] = (joined[-1][0], right, *looks)
         else:
             joined.append((left, right, *looks))
     return joined
+
+
+def _looks(line: FeatureLine, stretch: int, dimension: int, rule_set: RuleSet) -> tuple[int, bool]:
+    """The label of what is executed in a stretch, and whether a rule decides it."""
+    executed = line.decisions.executed[stretch : stretch + 1, dimension]
+    label = int(rule_set.actions[dimension].labels_of(executed)[0])
+    rule = int(line.decisions.rules[stretch, dimension])
+    # A rule that abstains is in force, and something else is executed.
+    return label, rule >= 0 and rule_set.rules[rule].action == label
+
+
+def _row_of_words(
+    features: Sequence[Feature],
+    values: Sequence[float],
+    done: Sequence[tuple[int, bool]],
+    labels: LabelledDimension,
+) -> _Row:
+    """A column of words: as many parts as it has words, all as wide."""
+    said = [feature.statement(True) for feature in features]
+    indicators = [feature.indicator for feature in features if feature.indicator is not None]
+    does = [_done((0.0, 0.0, *looks), labels) for looks in done]
+    width = 100 / len(features)
+    here = max(range(len(values)), key=values.__getitem__)
+    return _Row(
+        indicators[0].column,
+        f"{said[here]}: {does[here]}; "
+        + "; ".join(f"{one}: {does[at]}" for at, one in enumerate(said) if at != here),
+        said[here],
+        f"{width * (here + 0.5):.2f}%",
+        [
+            (
+                f"{said[at]}: {does[at]}",
+                f"left:{width * at:.2f}%;width:{width:.2f}%;background:{_colour(*looks)}",
+            )
+            for at, looks in enumerate(done)
+        ],
+        [one.value for one in indicators],
+        of_words=True,
+    )
+
+
+def _colour(label: int, ruled: bool) -> str:
+    return label_colour(label) if ruled else faded(label_colour(label), _PALE)
 
 
 def _row(
@@ -150,10 +201,12 @@ def _part(
     side = (
         f"left:{percent((start - low) / (high - low))}" if end < high or start == low else "right:0"
     )
-    colour = label_colour(label) if ruled else faded(label_colour(label), _PALE)
     between = f"{feature.name} {_between(start, end, feature)}"
     width = percent((end - start) / (high - low))
-    return f"{between}: {_done(part, labels)}", f"{side};width:{width};background:{colour}"
+    return (
+        f"{between}: {_done(part, labels)}",
+        f"{side};width:{width};background:{_colour(label, ruled)}",
+    )
 
 
 def _described(
