@@ -35,6 +35,7 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[
     Returns:
         A document for JSON.
     """
+    from sarl_core.explaining.words.states import word_shares
     from sarl_core.mining.validation.contradictions import identical_contradictions
 
     finished = demonstrations.episode_finished
@@ -50,11 +51,17 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[
         "lengths": _spread(demonstrations.episode_lengths),
         "returns": None if returns is None else _spread(returns, finished),
         "features": [
-            {"name": feature.name, "unit": feature.unit, **_spread(column)}
+            {
+                "name": feature.name,
+                "unit": feature.unit,
+                "word": feature.indicator is not None,
+                **_spread(column),
+            }
             for feature, column in zip(
                 demonstrations.features, demonstrations.observations.T, strict=True
             )
         ],
+        "words": word_shares(demonstrations),
         "actions": [
             _describe_action(dimension, column)
             for dimension, column in zip(
@@ -142,6 +149,8 @@ def print_demonstrations(document: dict[str, Any]) -> None:
     Args:
         document: What it gave.
     """
+    from sarl_core.mining.language import share_text
+
     origin = document["env_id"] or "an environment that the file does not name"
     by = f", by {document['agent']}" if document["agent"] else ""
     terminal.print_lines(
@@ -159,8 +168,13 @@ def print_demonstrations(document: dict[str, Any]) -> None:
                 *_numbers(entry),
             )
             for entry in document["features"]
+            if not entry["word"]
         ],
     )
+    for column, shares in document["words"].items():
+        terminal.print_table(
+            (column, "share"), [(word, share_text(share)) for word, share in shares.items()]
+        )
     _print_actions(document["actions"])
     if document["columns"]:
         terminal.print_table(

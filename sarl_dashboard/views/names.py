@@ -27,8 +27,15 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
             "Name": list(names.features),
             "Unit": list(names.units),
             "Came as": list(own.features),
-            "Least": list(map(decimal_on_scale, low.tolist(), low.tolist(), high.tolist())),
-            "Largest": list(map(decimal_on_scale, high.tolist(), low.tolist(), high.tolist())),
+            **{
+                title: [
+                    decimal_on_scale(value, *ends) if feature.indicator is None else None
+                    for feature, value, *ends in zip(
+                        raw.features, values.tolist(), low.tolist(), high.tolist(), strict=True
+                    )
+                ]
+                for title, values in (("Least", low), ("Largest", high))
+            },
         }
     if table == ACTIONS:
         return {"Name": list(names.actions), "Came as": list(own.actions)}

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.formats.metadata import KEY
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.steps import StepTable
 
@@ -47,9 +48,17 @@ class RecordedSteps:
 
         Returns:
             The columns of `StepTable.to_frame`, the episode's `seed` after its number, and after
-            each `rule` column the rule's id in a `rule_id` column, empty where none applies.
+            each `rule` column the rule's id in a `rule_id` column, empty where none applies. What
+            the features say of a column of words stands in one column, in words.
         """
         frame = self.steps.to_frame([feature.name for feature in self.features])
+        for column in state_columns(self.features):
+            if column.of_words:
+                names = [f"obs_{feature.name}" for feature in column.features]
+                place = list(frame.columns).index(names[0])
+                frame = frame.drop(columns=names)
+                words = column.words(self.steps.observation)
+                frame.insert(place, f"obs_{column.title}", words, allow_duplicates=True)
         seeds = [int(seed) for seed in self.seeds]
         frame.insert(1, "seed", [seeds[episode] for episode in self.steps.episode.tolist()])
         if self.rule_set is None:

@@ -13,6 +13,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
 from sarl_core.explaining.report.tally import Tally
+from sarl_core.explaining.words.states import state_columns, word_shares
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, label_text, number_text, share_text
 from sarl_core.mining.rule_set import RuleSet
@@ -119,7 +120,10 @@ def demonstrations_part(
                 f"{row.name} ({row.unit})" if row.unit else row.name,
                 *(within(value, row) for value in (row.low, row.median, row.high)),
             )
-            for row in feature_rows(demonstrations)
+            for row, feature in zip(
+                feature_rows(demonstrations), demonstrations.features, strict=True
+            )
+            if feature.indicator is None
         ),
         notes=demonstrations.notes,
     )
@@ -177,13 +181,22 @@ def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionSha
 def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     who = f"The agent “{demonstrations.agent}”" if demonstrations.agent else "An expert"
     where = f" in {demonstrations.env_id}" if demonstrations.env_id else ""
-    numbers = counted(demonstrations.observations.shape[1], "number")
+    width, shares = len(state_columns(demonstrations.features)), word_shares(demonstrations)
+    seen = [
+        counted(count, noun)
+        for count, noun in ((width - len(shares), "number"), (len(shares), "word"))
+        if count
+    ]
     sentences = [
         f"{who} acted{where} for {counted(len(demonstrations), 'step')} in "
         f"{counted(demonstrations.n_episodes, 'episode')}. At every step it saw the state of the "
-        f"task, {numbers} listed below, and chose an action. An episode is one attempt from start "
-        "to end.",
+        f"task, {' and '.join(seen)} listed below, and chose an action. An episode is one attempt "
+        "from start to end.",
     ]
+    for title, words in shares.items():
+        parts = [f"{word} in {share_text(share)}" for word, share in words.items()]
+        parts[0] += " of the steps"
+        sentences.append(f"The {title} was {', '.join(parts)}.")
     summary, finished = demonstrations.summary(), demonstrations.episode_finished
     if summary.return_mean is not None:
         ended = "a finished episode" if finished is not None and finished.any() else "an episode"

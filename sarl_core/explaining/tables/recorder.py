@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, done_text
 from sarl_core.mining.rule_set import RuleSet
@@ -41,7 +42,8 @@ def recorder_columns(
         Column name to one value a row: the seed, the step, for each dimension what the agent
         wanted, what was done and the rule's name, then "Changed", "Outside", "Not checked" (why no
         rule was asked), "Distance", "Reward", "Failure" and "Cost" where the steps say so, and the
-        features, with their units. Where no threshold was looked at, the distance is NaN.
+        features: with their units, and words in words. Where no threshold was looked at, the
+        distance is NaN.
     """
     part = steps.take(rows)
     columns: dict[str, list[object]] = {}
@@ -83,11 +85,16 @@ def recorder_columns(
         columns["Failure"] = part.failed.tolist()
     if not np.isnan(steps.cost).all():
         columns["Cost"] = part.cost.tolist()
-    for index, feature in enumerate(features):
-        title = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
+    for column in state_columns(features):
+        index = column.places[0]
+        title = f"{column.title} ({column.unit})" if column.unit else column.title
         if title in columns:
             title = f"{title} [{index}]"  # a column of a table has a name of its own
-        columns[title] = part.observation[:, index].astype(np.float64).tolist()
+        columns[title] = (
+            list(column.words(part.observation))
+            if column.of_words
+            else part.observation[:, index].astype(np.float64).tolist()
+        )
     return columns
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.splits import written_value
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.language import asked_bounds, label_text, number_text, query_text
 from sarl_core.mining.rules import Bounds, Condition, Rule, node_of
@@ -186,7 +187,7 @@ def example_columns(
 
     Returns:
         What the expert did, whether that is what the rule says, every feature, rounded for
-        display, those of the rule first, and at last episode and step.
+        display or in words, those of the rule first, and at last episode and step.
     """
     rows = example_rows(tree, node_of(rule), count)
     dimension = tree.dimension
@@ -203,13 +204,19 @@ def example_columns(
         "As the rule says": (labels == rule.action).tolist(),
     }
     queried = [bounds.feature for bounds in rule.bounds]
-    others = [index for index in range(len(demonstrations.features)) if index not in queried]
-    for index in (*queried, *others):
-        feature = demonstrations.features[index]
-        name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
-        values = demonstrations.observations[rows, index].astype(np.float64)
+    order = {feature: place for place, feature in reversed([*enumerate(queried)])}
+    for column in sorted(
+        state_columns(demonstrations.features),
+        key=lambda one: min(order.get(at, len(queried)) for at in one.places),
+    ):
+        index = column.places[0]
+        name = f"{column.title} ({column.unit})" if column.unit else column.title
         if name in (*columns, "Episode", "Step"):
             name = f"{name} [{index}]"  # a column of a table has a name of its own
+        if column.of_words:
+            columns[name] = list(column.words(demonstrations.observations[rows]))
+            continue
+        values = demonstrations.observations[rows, index].astype(np.float64)
         limits = [
             float(limit)
             for bounds in rule.bounds

@@ -15,6 +15,7 @@ from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import done_text, number_text, sentence
@@ -162,12 +163,7 @@ def step_view(
     in_force = steps.rules[row].tolist() if rule_set is not None else []
     asking = [rule_set.rules[rule] for rule in in_force if rule >= 0] if rule_set else []
     named = rule_set.source.features if rule_set is not None else features
-    state = tuple(
-        (feature.name, value, feature.unit)
-        for feature, value in zip(
-            features, state_values(steps.observation[row], named, asking), strict=True
-        )
-    )
+    state = state_rows(steps.observation[row], features, named, asking)
     return StepView(
         int(steps.step[row]),
         tuple(views),
@@ -175,6 +171,34 @@ def step_view(
         state,
         bool(steps.outside[row]),
         steps.invalid[row] or "",
+    )
+
+
+def state_rows(
+    state: NDArray[np.float32],
+    features: Sequence[Feature],
+    known: Sequence[Feature],
+    rules: Sequence[Rule],
+) -> tuple[tuple[str, str, str], ...]:
+    """A state for a table.
+
+    Args:
+        state: Shape (d,).
+        features: The d features.
+        known: The same as the rules know them, with their demonstrated values.
+        rules: Those in force.
+
+    Returns:
+        Name, value and unit of each feature; the word of each column of words.
+    """
+    values = state_values(state, known, rules)
+    return tuple(
+        (
+            column.title,
+            column.words(state[None])[0] if column.of_words else values[column.places[0]],
+            column.unit,
+        )
+        for column in state_columns(features)
     )
 
 

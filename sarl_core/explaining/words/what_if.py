@@ -119,13 +119,13 @@ def outside_texts(
     if rule.box is None:
         return ()
     texts = []
-    for value, least, most, feature in zip(
-        state, rule.box.least, rule.box.most, features, strict=True
+    for at, (value, least, most, feature) in enumerate(
+        zip(state, rule.box.least, rule.box.most, features, strict=True)
     ):
         if least <= value <= most:
             continue
         if feature.indicator is not None:
-            texts.append(f"{feature.statement(value > least)}, which was never seen there")
+            texts.append(f"{word_text(at, state, features)}, which was never seen there")
             continue
         below = value < least
         edge = least if below else most
@@ -135,7 +135,7 @@ def outside_texts(
             f"{with_unit(number_text(edge, apart_from=value), feature)}, the "
             f"{'smallest' if below else 'largest'} that was seen"
         )
-    return tuple(texts)
+    return tuple(dict.fromkeys(texts))  # several features may tell of one word
 
 
 def feature_change_text(change: FeatureChange, feature: Feature) -> str:

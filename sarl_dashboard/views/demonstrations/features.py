@@ -11,8 +11,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.demonstrations import feature_figure
 from sarl_core.explaining.figures.distributions import FeatureRow, histogram_by_label
 from sarl_core.explaining.html.step_card import legend
+from sarl_core.explaining.words.states import word_shares
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
-from sarl_core.mining.language import label_text
+from sarl_core.mining.language import label_text, share_text
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.text import escaped
@@ -91,16 +92,35 @@ def show_features(
                     f"**{escaped(names[index])}**" + (f" :gray[{escaped(unit)}]" if unit else "")
                 )
                 chart(figure, f"feature_{index}", f"Distribution of {names[index]}, by action")
+    numbers = [
+        row
+        for row, feature in zip(rows, demonstrations.features, strict=True)
+        if feature.indicator is None
+    ]
+    words = [
+        (column, word, share)
+        for column, shares in word_shares(demonstrations).items()
+        for word, share in shares.items()
+    ]
+    if words:
+        columns, held, often = zip(*words, strict=True)
+        st.dataframe(
+            {"Words of": columns, "Word": held, "Steps": list(map(share_text, often))},
+            hide_index=True,
+            height="content" if len(words) <= 24 else 480,
+        )
+    if not numbers:
+        return
     st.dataframe(
         {
-            "Feature": names,
-            "Unit": [row.unit or "–" for row in rows],
-            "Least": [decimal_on_scale(row.low, row.low, row.high) for row in rows],
-            "Median": [decimal_on_scale(row.median, row.low, row.high) for row in rows],
-            "Largest": [decimal_on_scale(row.high, row.low, row.high) for row in rows],
+            "Feature": [row.name for row in numbers],
+            "Unit": [row.unit or "–" for row in numbers],
+            "Least": [decimal_on_scale(row.low, row.low, row.high) for row in numbers],
+            "Median": [decimal_on_scale(row.median, row.low, row.high) for row in numbers],
+            "Largest": [decimal_on_scale(row.high, row.low, row.high) for row in numbers],
         },
         hide_index=True,
-        height="content" if len(names) <= 24 else 480,
+        height="content" if len(numbers) <= 24 else 480,
         column_config={
             column: st.column_config.NumberColumn(format="%.12g")
             for column in ("Least", "Median", "Largest")

@@ -7,6 +7,7 @@ from typing import Any, cast
 import streamlit as st
 
 from sarl_core.explaining.words.edits import conflict_text
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.language import action_text
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.components.tables import table_height
@@ -63,6 +64,9 @@ def _conflict_rows(of: Base, verdicts: Verdicts) -> dict[str, list[Any]]:
         rows["Example episode"] = demonstrations.episodes[examples].tolist()
         rows["Example step"] = demonstrations.steps[examples].tolist()
     examples = [one.example for one in verdicts.conflicts]
-    for at, feature in enumerate(rule_set.source.features):
-        rows[feature.name] = basis.ground.states[examples, at].tolist()
+    states = basis.ground.states[examples]
+    for column in state_columns(rule_set.source.features):
+        rows[column.title] = (
+            column.words(states) if column.of_words else states[:, column.places[0]].tolist()
+        )
     return rows

@@ -11,7 +11,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.audit import audit_tracks, feature_lines, step_texts
 from sarl_core.explaining.figures.replay import Timeline, intervention_strip
 from sarl_core.explaining.html.step_card import state_table
-from sarl_core.explaining.words.replay import state_values
+from sarl_core.explaining.words.replay import state_rows
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
@@ -57,15 +57,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
         show_step(held, current, choice)
         features, state = held.rule_set.source.features, held.observations[current]
         asking = [held.rule_set[place] for place in held.rules[current].tolist() if place >= 0]
-        values = state_values(state, features, asking)
-        st.html(
-            state_table(
-                [
-                    (feature.name, value, feature.unit)
-                    for feature, value in zip(features, values, strict=True)
-                ]
-            )
-        )
+        st.html(state_table(state_rows(state, features, features, asking)))
     with left:  # last, because it may take a while
         show_scene(demonstrations, episode, current)
 
