@@ -40,11 +40,13 @@ def diff(
     with terminal.working("Comparing"):
         from sarl_core.demonstrations.recoding import recoded
         from sarl_core.mining.editing.difference import comparable
+        from sarl_core.mining.editing.shared_words import in_shared_words
         from sarl_core.mining.rule_order import rules_for
         from sarl_core.mining.rule_set import RuleSet
         from sarl_core.shielding.disagreement import SAMPLED_STATES, disagreement, sampled_states
 
         one, other = RuleSet.load(first), RuleSet.load(second)
+        one, other, words = in_shared_words(one, other)
         other, notes = comparable(one, other)
         if demonstrations is None:
             states = sampled_states([one, other])
@@ -69,7 +71,7 @@ def diff(
             names=names,
             states_from=str(demonstrations or "random over the range of the thresholds"),
         )
-        terminal.print_json({**document, "notes": list(notes)})
+        terminal.print_json({**document, "notes": [*words, *notes]})
     else:
         lines = difference_lines(difference, names=names, states_from=states_from)
-        terminal.print_lines([*lines, *(f"note: {note}" for note in notes)])
+        terminal.print_lines([*lines, *(f"note: {note}" for note in (*words, *notes))])

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import Ground, deciding, ground_of, labels_at, regions
@@ -177,7 +178,8 @@ def sampled_states(
 
     Returns:
         Shape (count, d), float32: each feature uniform from a little below its least threshold to
-        a little above its largest; 0 where nothing asks about it.
+        a little above its largest; 0 where nothing asks about it. A column of words holds each of
+        them as often.
     """
     width = len(rule_sets[0].source.features)
     low, high = np.full(width, np.inf), np.full(width, -np.inf)
@@ -193,5 +195,12 @@ def sampled_states(
     margin = np.where(bounded, np.where(high > low, _MARGIN * (high - low), alone), 0.0)
     largest = float(np.finfo(np.float32).max)
     low, high = np.clip(low - margin, -largest, largest), np.clip(high + margin, -largest, largest)
-    drawn = np.random.default_rng(seed).random((count, width))
-    return np.asarray(low * (1.0 - drawn) + high * drawn, dtype=np.float32)
+    generator = np.random.default_rng(seed)
+    drawn = generator.random((count, width))
+    states = np.asarray(low * (1.0 - drawn) + high * drawn, dtype=np.float32)
+    indicators = [one.indicator for one in rule_sets[0].source.features]
+    for places in columns_of_words(indicators).values():
+        several = max(len(places), 2)  # of two words one feature is enough
+        words = np.eye(several, dtype=np.float32)[generator.integers(several, size=count)]
+        states[:, places] = words[:, : len(places)]
+    return states

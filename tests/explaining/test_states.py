@@ -35,7 +35,7 @@ STATES = np.array([[0, 0, 1, 9.5, 1, 0], [1, 0, 0, 3.0, 0, 1], [0, 0, 0, 3.0, 0,
 
 def log() -> Demonstrations:
     rows = "".join(
-        f"{i // 10},{MODES[i % 3]},{i % 7}.5,{'firm soft'.split()[i % 2]},"
+        f"{i // 10},{MODES[i % 3]},{i % 7}.5,{['firm', 'soft'][i % 2]},"
         f"{'up' if i % 3 else 'down'}\n"
         for i in range(60)
     )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.difference import said_text, what_text
+from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.language import action_text, conditions_text, label_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
@@ -112,8 +113,12 @@ def example_rows(
         columns["Expert did"] = [
             label_text(label, action) if 0 <= label < action.n_labels else NO_ID for label in did
         ]
-    for at, feature in enumerate(disagreement.first.source.features):
-        columns[feature.name] = states[rows, at].tolist()
+    for column in state_columns(disagreement.first.source.features):
+        columns[column.title] = (
+            list(column.words(states[rows]))
+            if column.of_words
+            else states[rows, column.places[0]].tolist()
+        )
     return columns
 
 

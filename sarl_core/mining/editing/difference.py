@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sarl_core.environments.feature_order import NamedFeatures, only_counts
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
+from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.rule_order import Fitted, fitted_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
@@ -123,9 +124,10 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
 
 def _of_other_features(first: RuleSet, second: RuleSet) -> InputError:
     names = (tuple(one.name for one in each.source.features) for each in (first, second))
+    words = "".join(f"; {note}" for note in in_shared_words(first, second).notes)
     return InputError(
-        f"the two rule sets are for different features ({'; '.join(map(_listed, names))}); give "
-        "two of the same environment"
+        f"the two rule sets are for different features ({'; '.join(map(_listed, names))}{words}); "
+        "give two of the same environment"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,18 +11,20 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import SarlError
+from sarl_core.demonstrations.recoding import recoded
+from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.html.confusion import confusion_html
 from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
 from sarl_core.explaining.words.difference import decided_text, rows_text
 from sarl_core.mining.editing.difference import comparable
+from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_order import fits
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
-from sarl_dashboard.components.settings import switch
+from sarl_dashboard.components.settings import notes_notice, switch
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
@@ -80,12 +83,17 @@ def _compare(first: Side, second: Side) -> RuleSetComparison:
     names = (first.name, second.name)
     if first.name == second.name:
         names = (f"{first.name} (first)", f"{second.name} (second)")
+    one, other, notes = in_shared_words(first.rule_set, second.rule_set)
+    notes_notice(notes)
     demonstrations = chosen_demonstrations()
-    if demonstrations is not None and not (
-        fits(first.rule_set, demonstrations) and fits(second.rule_set, demonstrations)
-    ):
-        demonstrations = None
-    return RuleSetComparison(first.rule_set, second.rule_set, demonstrations, names)
+    if demonstrations is not None:
+        with suppress(InputError):  # of other features, which are asked about next
+            demonstrations = recoded(
+                demonstrations, one.source.features, called="the demonstrations"
+            )
+        if not (fits(one, demonstrations) and fits(other, demonstrations)):
+            demonstrations = None
+    return RuleSetComparison(one, other, demonstrations, names)
 
 
 @cached(show_spinner="Comparing …")
