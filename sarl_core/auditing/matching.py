@@ -18,6 +18,7 @@ from sarl_core.environments.feature_order import (
 )
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 
 _CURE = "give a log of what the rules were mined for"
@@ -168,9 +169,9 @@ def _labels(
         row = int(np.argmax(unknown))
         raise InputError(
             f"{called} holds the {dimension.name!r} {demonstrated.labels[own[row]]!r} in row "
-            f"{row + 1} ({int(unknown.sum()):,} rows in all), which the rules do not know: they "
-            f"were mined from {shortened(dimension.label_names)}; leave those rows out, or mine "
-            "from demonstrations with it"
+            f"{row + 1} ({counted(int(unknown.sum()), 'row')} in all), which the rules do not "
+            f"know: they were mined from {shortened(dimension.label_names)}; leave those rows out, "
+            "or mine from demonstrations with it"
         )
     return np.asarray(labels, dtype=np.int64)
 

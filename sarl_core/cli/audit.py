@@ -132,11 +132,11 @@ def audit(
             except InputError as error:
                 raise InputError(_with_path(error, path)) from error
 
-        rotated: InputError | None = None
+        stopped: InputError | None = None
         if follow:
             from sarl_core.auditing.growing import GrowingLog
 
-            held, rotated = _followed(GrowingLog(log, columns, missing), partial(hold, log), guards)
+            held, stopped = _followed(GrowingLog(log, columns, missing), partial(hold, log), guards)
         else:
             held = hold(log)
         comparison = None if compare is None else LogComparison(held, hold(compare))
@@ -151,16 +151,15 @@ def audit(
         _print(held, comparison, f"{log} against {rules}")
         if out is not None:
             terminal.print_lines([f"Wrote {out}."])
-    if rotated is not None:
-        raise rotated
+    if stopped is not None:
+        raise stopped
     _guard(held, guards)
 
 
 def _followed(
     growing: GrowingLog, hold: Callable[[Demonstrations], Audit], guards: list[GuardCondition]
 ) -> tuple[Audit, InputError | None]:
-    """Audit a log again and again while it grows, until Ctrl-C or until it is rotated."""
-    from sarl_core.auditing.growing import RotatedError
+    """Audit a log again and again while it grows, until Ctrl-C or until it cannot be read on."""
     from sarl_core.mining.language import share_text
 
     held: Audit | None = None
@@ -183,7 +182,7 @@ def _followed(
         if held is None:
             raise
         return held, None
-    except RotatedError as error:
+    except InputError as error:  # it was rotated, or a new line is none of the log
         if held is None:
             raise
         return held, error

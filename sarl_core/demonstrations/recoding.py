@@ -93,6 +93,7 @@ def _require_known(coded: Coded, features: Sequence[Feature], called: str) -> No
         word = coded.words[int(coded.codes[rows[0]])]
         raise InputError(
             f"{called} holds the {indicators[0].column} {quoted(word)} in row {rows[0] + 1} "
-            f"({len(rows):,} rows in all), which the rules do not know: they were mined from "
-            f"{shortened(words)}; leave those rows out, or mine from demonstrations with it"
+            f"({len(rows):,} row{'s'[: len(rows) > 1]} in all), which the rules do not know: they "
+            f"were mined from {shortened(words)}; leave those rows out, or mine from "
+            "demonstrations with it"
         )

@@ -121,6 +121,24 @@ def test_a_log_that_is_rotated_ends_with_what_was_read(
     assert "cannot be followed" in capsys.readouterr().err
 
 
+def test_a_line_that_cannot_be_read_ends_with_what_was_read_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "run.csv"
+    before = HEAD + "0,0,0,0,0.1,0,1\n0,1,0,0,0.1,0,0\n"
+    log.write_text(before)
+
+    def wait(seconds: float) -> None:
+        with log.open("a") as file:
+            file.write("0,2,0,oops,0.1,0,0\n")
+
+    monkeypatch.setattr("time.sleep", wait)
+    assert main(["audit", RULES, str(log), "--follow", "--json"]) == 2
+    out, error = capsys.readouterr()
+    assert json.loads(out)["steps"] == 2
+    assert "holds 'oops' in row 3" in error
+
+
 def test_steps_that_lack_a_value_are_counted_and_do_not_end_a_job(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

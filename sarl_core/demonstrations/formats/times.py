@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.formats.columns import Guess
-from sarl_core.demonstrations.formats.mapping.roles import SECONDS, settled_by
+from sarl_core.demonstrations.formats.mapping.roles import SECONDS
 from sarl_core.demonstrations.formats.opened_table import TableColumn
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.errors import InputError, quoted
@@ -109,7 +110,7 @@ def with_seconds(
     if certain or name in guess.roles:
         raise InputError(
             f"column {quoted(name)} {holds}; write seconds, or times as 2026-03-02 07:00:02, or "
-            f"{settled_by(name, 'ignore')}"
+            f"leave it out with --column {shlex.quote(f'{name}=ignore')}"
         )
     columns = replace(guess.columns, time=None)
     reasons = {column: why for column, why in guess.reasons.items() if column != name}
