@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.auditing import near
 from sarl_core.auditing.clock import Clock, clock_of
 from sarl_core.auditing.drift import Drift, by_episode, rule_counts
@@ -103,9 +104,7 @@ class Audit:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        make_read_only(self)
 
     def __repr__(self) -> str:
         """As `Audit(steps=15000, episodes=45, coverage=0.71, broken=204)`."""

@@ -245,16 +245,11 @@ def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
     finished = document["episodes_finished"]
     unfinished = "" if finished is None else f" ({finished:,} of them finished)"
     facts = [("episodes", f"{document['episodes']:,}{unfinished}")]
-    for name in ("lengths", "returns"):
+    for name, decimals in (("lengths", 0), ("returns", 1)):
         spread = document[name]
         if spread is not None:
-            facts.append(
-                (
-                    name,
-                    f"mean {spread['mean']:,.1f}, from {spread['min']:,.1f} to "
-                    f"{spread['max']:,.1f}",
-                )
-            )
+            least, most = (f"{spread[end]:,.{decimals}f}" for end in ("min", "max"))
+            facts.append((name, f"mean {spread['mean']:,.1f}, from {least} to {most}"))
     facts.append(
         (
             "contradictions",

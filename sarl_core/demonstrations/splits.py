@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.decimals import float32_around, short_decimal
 
 FEWEST_DIGITS = 3
@@ -43,8 +44,7 @@ class Splits:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for values in (self.thresholds, self.below, self.above):
-            values.flags.writeable = False
+        make_read_only(self)
 
     @classmethod
     def of(cls, values: NDArray[np.float32], thresholds: Floats) -> Splits:

@@ -10,6 +10,7 @@ from msgspec import Struct
 from msgspec.structs import asdict
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.documents import Count, MisfitError, Number, Share
 
 
@@ -68,8 +69,7 @@ class LearningEpisodes:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for column in fields(self):
-            getattr(self, column.name).flags.writeable = False
+        make_read_only(self)
 
     def __len__(self) -> int:
         """Number of episodes E."""

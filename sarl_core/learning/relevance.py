@@ -8,13 +8,14 @@ rule set is judged by the same steps, and none of them helps the learner along.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import PolicyAgent
+from sarl_core.arrays import make_read_only
 from sarl_core.environments.description import describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
@@ -68,10 +69,7 @@ class Relevance:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for column in fields(self):
-            value = getattr(self, column.name)
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        make_read_only(self)
 
     @property
     def obeyed(self) -> NDArray[np.int64]:

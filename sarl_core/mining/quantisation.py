@@ -14,6 +14,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
@@ -46,8 +47,7 @@ class Quantisation:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        self.counts.flags.writeable = False
-        self.medians.flags.writeable = False
+        make_read_only(self)
 
     @property
     def occupancy(self) -> Floats:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError, quoted, require
@@ -127,9 +128,7 @@ class PolicyTree:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        make_read_only(self)
 
     def __repr__(self) -> str:
         """Its size, as `PolicyTree('push', nodes=301, depth=14, steps=15000)`."""

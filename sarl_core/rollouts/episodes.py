@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent, EpisodicAgent
+from sarl_core.arrays import make_read_only
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import ends_tell, failed
 from sarl_core.errors import SarlError, require_whole
@@ -123,10 +124,7 @@ class Episodes:
         for name, value in nothing:
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.full(len(self.seeds), value))
-        for column in fields(self):
-            value = getattr(self, column.name)
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        make_read_only(self)
 
     def __len__(self) -> int:
         """Number of episodes E."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.shielding.shield import Shield
 
@@ -29,8 +30,7 @@ class RuleUse:
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for column in fields(self):
-            getattr(self, column.name).flags.writeable = False
+        make_read_only(self)
 
     def part(self, start: int, stop: int) -> RuleUse:
         """Some of the episodes.

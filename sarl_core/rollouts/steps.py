@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.spaces import Actions
+from sarl_core.arrays import make_read_only
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,8 +64,7 @@ class StepTable:
         for name, value, kind in nothing:
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.full(len(self.step), value, dtype=kind))
-        for column in fields(self):
-            getattr(self, column.name).flags.writeable = False
+        make_read_only(self)
 
     def __len__(self) -> int:
         """Number of steps T."""

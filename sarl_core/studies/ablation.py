@@ -8,13 +8,14 @@ nothing there, exactly.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.arrays import make_read_only
 from sarl_core.rollouts.episodes import Episodes, cut_text
 from sarl_core.rollouts.rule_use import RuleUse
 from sarl_core.rollouts.statistics import MeanInterval, mean_interval
@@ -96,10 +97,7 @@ class Ablation:
             object.__setattr__(self, "cut", np.zeros_like(self.failed))
         if not len(self.undecided):
             object.__setattr__(self, "undecided", self.cut & ~self.failed)
-        for column in fields(self):
-            value = getattr(self, column.name)
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+        make_read_only(self)
 
     @property
     def base_failures(self) -> int:
