@@ -22,6 +22,7 @@ from sarl_core.mining.language import number_text
 from sarl_core.mining.rule_set import RuleSet
 
 _BEYOND = 0.02  # of a rule's own states lie outside their 1 % and 99 % quantiles
+_HALF = 0.5  # of a feature that says which word a column holds
 
 
 def _rule_names(rule_set: RuleSet) -> list[tuple[str, str]]:
@@ -67,11 +68,14 @@ def drift_from_rules(
     rules = against_expected(Shares(counts[:, known], lengths), np.array(expected), episodes)
     beyond, ruled, usual = _beyond(rule_set, matched.observations, in_force, starts)
     features: tuple[Moved, ...] = ()
-    if ruled.sum():
-        before, now, low, high = against_expected(Shares(beyond, ruled), usual, episodes)
+    # A word has no middle; whether it is one that a rule has never met, the breaks outside say.
+    numbers = [at for at, one in enumerate(rule_set.source.features) if one.indicator is None]
+    if ruled.sum() and numbers:
+        shares = Shares(beyond[:, numbers], ruled)
+        before, now, low, high = against_expected(shares, usual[numbers], episodes)
         said = "states outside the middle 98 % of the data of the rule that applies"
         features = moved(
-            [(one.name, said) for one in rule_set.source.features],
+            [(rule_set.source.features[at].name, said) for at in numbers],
             # Fewer than usual is no drift: a narrower log looks like the demonstrations.
             (before, now, low, np.maximum(high, 0.0)),
         )
@@ -133,6 +137,9 @@ def drift_from_demonstrations(
     Returns:
         What moved.
     """
+    features = rule_set.source.features
+    numbers = [at for at, one in enumerate(features) if one.indicator is None]
+    words = [at for at, one in enumerate(features) if one.indicator is not None]
     edges = quarters(before[1])
     sides = []
     for log, observations, in_force in (now, before):
@@ -141,7 +148,8 @@ def drift_from_demonstrations(
             Shares(
                 np.hstack(
                     [
-                        *(by_episode(observations <= edge, starts) for edge in edges),
+                        *(by_episode((observations <= edge)[:, numbers], starts) for edge in edges),
+                        by_episode(observations[:, words] > _HALF, starts),
                         rule_counts(rule_set, in_force, starts),
                     ]
                 ),
@@ -149,10 +157,13 @@ def drift_from_demonstrations(
             )
         )
     names = [
-        (feature.name, f"states at or below {number_text(float(edge))} {feature.unit}".rstrip())
+        (
+            features[at].name,
+            f"states at or below {number_text(float(row[at]))} {features[at].unit}".rstrip(),
+        )
         for row in edges
-        for feature, edge in zip(rule_set.source.features, row, strict=True)
-    ]
+        for at in numbers
+    ] + [(features[at].statement(True), "states in which it is so") for at in words]
     all_moved = moved([*names, *_rule_names(rule_set)], differences(sides[0], sides[1]))
     return Drift(
         "the demonstrations",

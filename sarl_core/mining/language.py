@@ -155,7 +155,7 @@ def flag_text(feature: Feature, bounds: Bounds) -> str:
     return f"{'' if holds else 'no '}{feature.name}"
 
 
-def asked(rule: Rule, features: Sequence[Feature]) -> tuple[tuple[Bounds, ...], ...]:
+def least_conditions(rule: Rule, features: Sequence[Feature]) -> tuple[tuple[Bounds, ...], ...]:
     """The least that says what a rule asks: of a column of words exactly one is the case.
 
     Args:
@@ -202,18 +202,18 @@ def _least(
     return [tuple(bounds)]
 
 
-def asked_bounds(rule: Rule, features: Sequence[Feature]) -> tuple[Bounds, ...]:
+def least_bounds(rule: Rule, features: Sequence[Feature]) -> tuple[Bounds, ...]:
     """The same, interval by interval."""
-    return tuple(one for entry in asked(rule, features) for one in entry)
+    return tuple(one for entry in least_conditions(rule, features) for one in entry)
 
 
 def merged_length(rule: Rule, features: Sequence[Feature]) -> int:
     """Number of features and columns of words that a rule asks about."""
-    return len(asked(rule, features))
+    return len(least_conditions(rule, features))
 
 
 def neither_text(entry: Sequence[Bounds], features: Sequence[Feature]) -> str | None:
-    """What an entry of `asked` is that leaves out several words of a column.
+    """What an entry of `least_conditions` is that leaves out several words of a column.
 
     Args:
         entry: One or several intervals.
@@ -232,11 +232,11 @@ def neither_text(entry: Sequence[Bounds], features: Sequence[Feature]) -> str | 
     return f"{columns[0]} is neither {', '.join(words[:-1])} nor {words[-1]}"
 
 
-def _asked_texts(
+def _condition_texts(
     rule: Rule, features: Sequence[Feature], text: Callable[[Bounds], str], *, the: str = ""
 ) -> list[str]:
     texts: list[str] = []
-    for entry in asked(rule, features):
+    for entry in least_conditions(rule, features):
         neither = neither_text(entry, features)
         texts += map(text, entry) if neither is None else [f"{the}{neither}"]
     return texts
@@ -398,7 +398,9 @@ def conditions_text(rule: Rule, rule_set: RuleContents) -> str:
         As "pole angle > 0.02 rad and cart velocity ≤ 0.3 m/s"; "always" without conditions.
     """
     features = rule_set.source.features
-    parts = _asked_texts(rule, features, lambda one: short_condition(one, features[one.feature]))
+    parts = _condition_texts(
+        rule, features, lambda one: short_condition(one, features[one.feature])
+    )
     return " and ".join(parts) if parts else "always"
 
 
@@ -429,7 +431,7 @@ def sentence(
         beside = () if state is None else (float(state[bounds.feature]),)
         return condition_text(bounds, features[bounds.feature], beside=beside)
 
-    parts = _asked_texts(rule, features, text_of, the="the ")
+    parts = _condition_texts(rule, features, text_of, the="the ")
     if not parts:
         text = f"Always {action}"
     elif len(parts) == 1:

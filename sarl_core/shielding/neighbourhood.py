@@ -194,8 +194,8 @@ class Neighbourhood:
         word = fits.argmax(axis=1)
         wanted[:, places] = np.where(lacks[:, None], words[word], here[places])
         # Where any other word will do, it is the present one that is too much.
-        told = np.where(fits.sum(axis=1) == len(places) - 1, np.argmin(fits, axis=1), word)
-        differs[:, places] = lacks[:, None] & (np.arange(len(places)) == told[:, None])
+        changed = np.where(fits.sum(axis=1) == len(places) - 1, np.argmin(fits, axis=1), word)
+        differs[:, places] = lacks[:, None] & (np.arange(len(places)) == changed[:, None])
         return np.asarray(fits.any(axis=1))
 
     def lines(self, state: ArrayLike, action: Any) -> tuple[FeatureLine, ...]:

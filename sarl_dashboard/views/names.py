@@ -6,7 +6,7 @@ from typing import Any
 
 import streamlit as st
 
-from sarl_core.decimals import decimal_on_scale
+from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, names_of
 from sarl_core.mining.language import sentence
@@ -29,7 +29,9 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
             "Came as": list(own.features),
             **{
                 title: [
-                    decimal_on_scale(value, *ends) if feature.indicator is None else None
+                    decimal_text(decimal_on_scale(value, *ends))
+                    if feature.indicator is None
+                    else "–"
                     for feature, value, *ends in zip(
                         raw.features, values.tolist(), low.tolist(), high.tolist(), strict=True
                     )
@@ -122,8 +124,8 @@ def editor(table: str, raw: Demonstrations) -> None:
             "Name": column.TextColumn(width=170, max_chars=200, help="Click to change it"),
             "Unit": column.TextColumn(width=72, max_chars=40, help="As rad or m/s; may be empty"),
             "Came as": column.TextColumn(help="The name in the data as they were read"),
-            "Least": column.NumberColumn(format="%.12g", width=78),
-            "Largest": column.NumberColumn(format="%.12g", width=82),
+            "Least": column.TextColumn(width=78),
+            "Largest": column.TextColumn(width=82),
             "Action": column.NumberColumn(format="%d", width="small"),
         },
     )

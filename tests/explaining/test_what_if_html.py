@@ -10,7 +10,9 @@ import pytest
 from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.fields import Indicator
 from sarl_core.explaining.html.what_if import changes_html, decision_html, misses_html, way_html
+from sarl_core.explaining.html.what_if_bars import lines_html
 from sarl_core.explaining.templates import style_sheet
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
@@ -218,3 +220,34 @@ def test_the_way_says_when_a_person_gave_the_rule_its_place():
     assert placed in found
     assert "queries" in found
     assert placed not in words(way_html("", None))
+
+
+def test_a_column_of_words_has_one_bar_with_a_part_for_each_word():
+    features = (
+        *(Feature(f"mode is {word}", "", Indicator("mode", word)) for word in ("a", "b", "c")),
+        Feature("ground is firm", "", Indicator("ground", "firm", "soft")),
+    )
+    rule_set = replace(
+        RULES,
+        rules=(rule("0.1", [(1, ">", 0.5)], 1), rule("0.2", [(3, "<=", 0.5), (0, ">", 0.5)], 0)),
+        source=replace(RULES.source, features=features),
+    )
+    state = (1.0, 0.0, 0.0, 1.0)
+    lines = Neighbourhood(Shield(rule_set)).lines(np.array(state, dtype=np.float32), 1)
+    picture = lines_html(lines, [(0.0, 1.0)] * 4, state, features, 0, rule_set)
+    rows = ElementTree.fromstring(f"<root>{picture}</root>").findall(".//div[@class='row']")
+    assert [row.find("div[@class='name']").text for row in rows] == ["mode", "ground"]
+    said = [[part.get("title") for part in row.findall(".//span[@title]")] for row in rows]
+    right, left = "<i>right", "left"
+    assert said == [
+        [
+            f"mode is a: {right}, as the agent wants",
+            f"mode is b: {right}, by a rule",
+            f"mode is c: {right}, as the agent wants",
+        ],
+        [f"ground is soft: {left}, by a rule", f"ground is firm: {right}, as the agent wants"],
+    ]
+    assert rows[0].get("aria-label").startswith(f"mode is a: {right}")
+    ends = [[one.text for one in row.findall("div/div/span")][-3:] for row in rows]
+    assert ends[0] == ["a", "b", "c"]
+    assert ends[1][-2:] == ["soft", "firm"]

@@ -17,7 +17,7 @@ from sarl_core.explaining.html.rule_card import rule_card
 from sarl_core.explaining.html.rule_matrix import rule_matrix
 from sarl_core.explaining.words.what_if import condition_views
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import asked_bounds, conditions_text, merged_length, sentence
+from sarl_core.mining.language import conditions_text, least_bounds, merged_length, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import FILTERED, Condition, Rule
 from sarl_core.mining.tree import Source
@@ -78,7 +78,7 @@ def test_a_column_of_words_is_said_once(
 def test_it_is_true_of_the_same_states(words: list[str], count: int, holds: bool) -> None:
     conditions = [*not_(*words[1 : count + 1 - holds])] + [is_(words[0])] * holds
     rule = rules_of(*conditions)[0]
-    said = asked_bounds(rule, FEATURES)
+    said = least_bounds(rule, FEATURES)
     states = np.zeros((len(MODES), len(FEATURES)), dtype=np.float32)
     states[range(len(MODES)), range(len(MODES))] = 1.0
     as_said = np.ones(len(states), dtype=bool)

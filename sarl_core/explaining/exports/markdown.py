@@ -11,10 +11,10 @@ from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
 from sarl_core.mining.language import (
     action_text,
-    asked,
     counted,
     flag_text,
     is_flag,
+    least_conditions,
     neither_text,
     one_line,
     share_text,
@@ -76,7 +76,7 @@ def _text(text: str) -> str:
 def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
     features = rule_set.source.features
     intervals: list[str] = []
-    for entry in asked(rule, features):
+    for entry in least_conditions(rule, features):
         neither = neither_text(entry, features)
         each = (_interval(one, features[one.feature]) for one in entry)
         intervals += each if neither is None else [_text(neither)]

@@ -21,6 +21,7 @@ from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import label_text
 
 _ROW_HEIGHT = 84  # pixels, of a feature
+_NO_OR_YES = {"tickvals": [0, 1], "ticktext": ["no", "yes"]}
 _TITLE = 18  # of these
 
 
@@ -115,7 +116,11 @@ def feature_lines(
             y=values[:, row],
             yaxis=f"y{axis}",
             mode="lines+markers",
-            line={"width": 1.6, "color": MUTED_COLOUR},  # no action's colour
+            line={
+                "width": 1.6,
+                "color": MUTED_COLOUR,  # no action's
+                "shape": "linear" if feature.indicator is None else "hvh",
+            },
             marker={"size": 1, "opacity": 0},
             customdata=np.stack([places, numbers], axis=1),
             hovertemplate="step %{customdata[1]}: %{y:.4g}" + plain(unit) + "<extra></extra>",
@@ -141,6 +146,7 @@ def feature_lines(
                     "automargin": False,
                     "zeroline": False,
                 }
+                | ({} if feature.indicator is None else _NO_OR_YES)
             }
         )
         figure.add_annotation(

@@ -29,7 +29,14 @@ def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup
         way is.
     """
     features = rule_set.source.features
-    nearest = min((query.distance for query in path.queries), default=None)
+    nearest = min(
+        (
+            query.distance
+            for query in path.queries
+            if features[query.condition.feature].indicator is None
+        ),
+        default=None,
+    )
     queries = []
     for query in path.queries:
         feature = features[query.condition.feature]
@@ -40,8 +47,8 @@ def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup
             (
                 query_text(query.condition, features, beside=(query.value,)),
                 f"{number} {feature.unit}" if feature.unit else number,
-                number_text(query.distance),
-                query.distance == nearest,
+                number_text(query.distance) if feature.indicator is None else "–",
+                query.distance == nearest and feature.indicator is None,
             )
         )
     rule = None if path.rule is None else rule_set.rules[path.rule]

@@ -56,8 +56,8 @@ def rule_card(rule: Rule, rule_set: RuleSet, *, threshold: float | None) -> Mark
     words = [rule_set.name_of(rule)]
     if reached:
         words.append(measures_text(rule))
-    asked_about = merged_length(rule, rule_set.source.features)
-    words.append(f"{counted(rule.length, 'condition')} on {counted(asked_about, 'feature')}")
+    length = merged_length(rule, rule_set.source.features)
+    words.append(f"{counted(rule.length, 'condition')} on {counted(length, 'feature')}")
     sureness, colour, bar = "", "", Markup()
     if reached and threshold is not None:
         sureness, colour = _sureness(rule, threshold)

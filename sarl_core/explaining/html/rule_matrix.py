@@ -18,9 +18,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.templates import render, style_sheet
 from sarl_core.mining.language import (
     action_text,
-    asked_bounds,
     counted,
     label_text,
+    least_bounds,
     number_text,
     share_text,
     short_condition,
@@ -111,8 +111,8 @@ class RuleMatrix:
         Returns:
             One a feature that it asks about.
         """
-        asked = asked_bounds(rule, self.rule_set.source.features)
-        by_feature = {bounds.feature: bounds for bounds in asked}
+        bounds_of_rule = least_bounds(rule, self.rule_set.source.features)
+        by_feature = {bounds.feature: bounds for bounds in bounds_of_rule}
         return {
             column.feature: _bar(by_feature[column.feature], column)
             for column in self.columns
@@ -133,7 +133,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
     """
     features = rule_set.source.features
     queried = sorted(
-        {one.feature for rule in rule_set.rules for one in asked_bounds(rule, features)}
+        {one.feature for rule in rule_set.rules for one in least_bounds(rule, features)}
     )
     if demonstrations is not None and demonstrations.observations.shape[1] != len(features):
         demonstrations = None

@@ -10,11 +10,11 @@ from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Feature
-from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.path import label_key
 from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
+from sarl_core.explaining.words.states import StateColumn, state_columns
 from sarl_core.explaining.words.what_if import with_unit
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import label_text, number_text
@@ -63,25 +63,17 @@ def lines_html(
         there is room; the present value is marked on it.
     """
     labels = rule_set.actions[dimension]
-    columns = columns_of_words([feature.indicator for feature in features])
-    several = {at: places for places in columns.values() if len(places) > 1 for at in places}
+    at = {feature: place for place, feature in enumerate(features)}
     rows = []
-    for place, (line, ends, value, feature) in enumerate(
-        zip(lines, ranges, values, features, strict=True)
-    ):
-        words = sorted(several.get(place, ()), key=lambda at: lines[at].feature)
-        if not words:
-            parts = stretches(line, ends, dimension, rule_set)
-            rows.append(_row(parts, ends, value, feature, labels))
-        elif place == min(words):
-            done = [
-                _looks(lines[at], len(lines[at].starts) - 1, dimension, rule_set) for at in words
-            ]
-            rows.append(
-                _row_of_words(
-                    [features[at] for at in words], [values[at] for at in words], done, labels
-                )
-            )
+    for column in state_columns(features):
+        places = [at[feature] for feature in column.features]
+        if column.of_words:
+            own = [(lines[place], values[place]) for place in places]
+            rows.append(_row_of_words(column, own, dimension, rule_set))
+        else:
+            (place,) = places
+            parts = stretches(lines[place], ranges[place], dimension, rule_set)
+            rows.append(_row(parts, ranges[place], values[place], features[place], labels))
     return render("states/lines", labels=label_key(labels), rows=rows)
 
 
@@ -126,31 +118,42 @@ def _looks(line: FeatureLine, stretch: int, dimension: int, rule_set: RuleSet) -
 
 
 def _row_of_words(
-    features: Sequence[Feature],
-    values: Sequence[float],
-    done: Sequence[tuple[int, bool]],
-    labels: LabelledDimension,
+    column: StateColumn,
+    lines: Sequence[tuple[FeatureLine, float]],
+    dimension: int,
+    rule_set: RuleSet,
 ) -> _Row:
-    """A column of words: as many parts as it has words, all as wide."""
-    said = [feature.statement(True) for feature in features]
-    indicators = [feature.indicator for feature in features if feature.indicator is not None]
-    does = [_done((0.0, 0.0, *looks), labels) for looks in done]
-    width = 100 / len(features)
-    here = max(range(len(values)), key=values.__getitem__)
+    """A column of words, with the line and the value of each of its features: a part for each."""
+    if len(lines) > 1:
+        said = [feature.statement(True) for feature in column.features]
+        points = [(line, 1.0) for line, _ in lines]
+        here = max(range(len(lines)), key=lambda at: lines[at][1])
+    else:
+        ((line, value),) = lines
+        said = [column.features[0].statement(holds) for holds in (False, True)]
+        points = [(line, 0.0), (line, 1.0)]
+        here = int(value > _BETWEEN)
+    looks = [
+        _looks(
+            line, int(np.searchsorted(line.starts, value, side="right")) - 1, dimension, rule_set
+        )
+        for line, value in points
+    ]
+    labels = rule_set.actions[dimension]
+    does = [
+        f"{one}: {_done((0.0, 0.0, *how), labels)}" for one, how in zip(said, looks, strict=True)
+    ]
+    width = 100 / len(said)
     return _Row(
-        indicators[0].column,
-        f"{said[here]}: {does[here]}; "
-        + "; ".join(f"{one}: {does[at]}" for at, one in enumerate(said) if at != here),
+        column.title,
+        "; ".join([does[here], *(one for at, one in enumerate(does) if at != here)]),
         said[here],
         f"{width * (here + 0.5):.2f}%",
         [
-            (
-                f"{said[at]}: {does[at]}",
-                f"left:{width * at:.2f}%;width:{width:.2f}%;background:{_colour(*looks)}",
-            )
-            for at, looks in enumerate(done)
+            (one, f"left:{width * at:.2f}%;width:{width:.2f}%;background:{_colour(*looks[at])}")
+            for at, one in enumerate(does)
         ],
-        [one.value for one in indicators],
+        [one.partition(" is ")[2] for one in said],
         of_words=True,
     )
 
@@ -171,17 +174,13 @@ def _row(
     widest_first = sorted(parts, key=lambda part: part[0] - part[1])
     near = decimal_text(decimal_on_scale(value, low, high))
     now = f"{feature.name} is {with_unit(near, feature)}"
-    if feature.indicator is not None:
-        now = feature.statement(value > _BETWEEN)
     return _Row(
         feature.name,
         f"{now}: {_described(parts, value, feature, labels)}",
         now,
         percent((value - low) / (high - low)),
         [_part(part, ends, feature, labels) for part in widest_first],
-        ["no", "yes"]
-        if feature.indicator is not None
-        else [
+        [
             with_unit(number_text(end, apart_from=other), feature)
             for end, other in ((low, high), (high, low))
         ],
@@ -229,9 +228,6 @@ def _described(
 
 
 def _between(start: float, end: float, feature: Feature) -> str:
-    if feature.indicator is not None:
-        holds = [one for one in (False, True) if (start < _BETWEEN, end > _BETWEEN)[one]]
-        return " or ".join("yes" if one else "no" for one in holds)
     return (
         f"{number_text(start, apart_from=end)} to "
         f"{with_unit(number_text(end, apart_from=start), feature)}"

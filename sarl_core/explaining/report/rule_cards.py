@@ -21,10 +21,10 @@ from sarl_core.mining.digits import value_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     action_text,
-    asked,
     counted,
     done_text,
     is_flag,
+    least_conditions,
     neither_text,
     number_text,
     sentence,
@@ -263,7 +263,7 @@ def _conditions(
 ) -> tuple[ConditionRow, ...]:
     features = rule_set.source.features
     rows: list[ConditionRow] = []
-    for entry in asked(rule, features):
+    for entry in least_conditions(rule, features):
         neither = neither_text(entry, features)
         if neither is not None:
             rows.append(ConditionRow(neither, "", Markup()))

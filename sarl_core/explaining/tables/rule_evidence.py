@@ -13,7 +13,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.splits import written_value
 from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.digits import limit_texts
-from sarl_core.mining.language import asked_bounds, label_text, number_text, query_text
+from sarl_core.mining.language import label_text, least_bounds, number_text, query_text
 from sarl_core.mining.rules import Bounds, Condition, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 
@@ -117,7 +117,7 @@ def feature_evidence(
     """
     rows = tree.rows(node_of(rule))
     evidence = []
-    for bounds in asked_bounds(rule, demonstrations.features):
+    for bounds in least_bounds(rule, demonstrations.features):
         values = demonstrations.observations[:, bounds.feature]
         edges = _edges(values, values[rows], bounds, _BINS)
         evidence.append(

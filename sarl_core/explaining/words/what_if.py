@@ -16,9 +16,9 @@ from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import (
-    asked,
     done_text,
     is_flag,
+    least_conditions,
     neither_text,
     number_text,
     short_condition,
@@ -61,7 +61,7 @@ def condition_views(
     """
     features = rule_set.source.features
     views = []
-    for entry in asked(rule, features):
+    for entry in least_conditions(rule, features):
         neither = neither_text(entry, features)
         if neither is not None:
             views.append(ConditionView(neither, word_text(entry[0].feature, state, features), "–"))
