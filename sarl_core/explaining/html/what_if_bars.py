@@ -143,15 +143,15 @@ def _row_of_words(
     does = [
         f"{one}: {_done((0.0, 0.0, *how), labels)}" for one, how in zip(said, looks, strict=True)
     ]
-    width = 100 / len(said)
+    width = 1 / len(said)
     return _Row(
         column.title,
         "; ".join([does[here], *(one for at, one in enumerate(does) if at != here)]),
         said[here],
-        f"{width * (here + 0.5):.2f}%",
+        percent(width * (here + 0.5)),
         [
-            (one, f"left:{width * at:.2f}%;width:{width:.2f}%;background:{_colour(*looks[at])}")
-            for at, one in enumerate(does)
+            (one, f"left:{percent(width * at)};width:{percent(width)};background:{_colour(*how)}")
+            for at, (one, how) in enumerate(zip(does, looks, strict=True))
         ],
         [one.partition(" is ")[2] for one in said],
         of_words=True,
