@@ -19,7 +19,7 @@ from sarl_core.learning.study_files import (
     FORMAT,
     PLAN,
     VERSION,
-    Compared,
+    ComparedAgent,
     LearningRun,
     LearningStudy,
     load_run,
@@ -229,7 +229,7 @@ def _claim(folder: Path, plan: LearningPlan) -> None:
         plan.rules.save(folder / "rules.json")
 
 
-def _compared(plan: LearningPlan, agent: Agent, progress: Progress | None) -> Compared:
+def _compared(plan: LearningPlan, agent: Agent, progress: Progress | None) -> ComparedAgent:
     """The agent that the learners are compared with, on their episodes."""
     total = len(plan.arms) * len(plan.seeds) * plan.steps
 
@@ -245,8 +245,8 @@ def _compared(plan: LearningPlan, agent: Agent, progress: Progress | None) -> Co
 
     alone = tried(None)
     if plan.rules is None:
-        return Compared(agent.name, alone, None)
-    return Compared(agent.name, alone, tried(Shield(plan.rules, projection=plan.projection)))
+        return ComparedAgent(agent.name, alone, None)
+    return ComparedAgent(agent.name, alone, tried(Shield(plan.rules, projection=plan.projection)))
 
 
 def _finished(folder: Path, arm: LearningArm, seed: int) -> bool:

@@ -71,7 +71,7 @@ class LearningRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparedAgent:
     """An agent that has learned nothing here, on the episodes by which learners are judged.
 
     Attributes:
@@ -105,7 +105,7 @@ class LearningStudy:
     arms: tuple[LearningArm, ...]
     seeds: tuple[int, ...]
     runs: tuple[LearningRun, ...]
-    compared: Compared | None = None
+    compared: ComparedAgent | None = None
 
     @property
     def finished(self) -> tuple[LearningRun, ...]:
@@ -199,7 +199,7 @@ def policy_path(folder: Path, arm: LearningArm, seed: int) -> Path:
     return folder / POLICIES / f"{arm.name}-{seed}.npz"
 
 
-def save_compared(folder: Path, compared: Compared) -> None:
+def save_compared(folder: Path, compared: ComparedAgent) -> None:
     """Write what an agent that learners are compared with has done.
 
     Args:
@@ -339,7 +339,7 @@ def _entry(run: LearningRun) -> dict[str, Any]:
     }
 
 
-def _compared_entry(compared: Compared) -> dict[str, Any]:
+def _compared_entry(compared: ComparedAgent) -> dict[str, Any]:
     return {
         "agent": compared.agent,
         "alone": compared.alone.to_dict(),
@@ -347,12 +347,12 @@ def _compared_entry(compared: Compared) -> dict[str, Any]:
     }
 
 
-def _load_compared(path: Path) -> Compared:
+def _load_compared(path: Path) -> ComparedAgent:
     try:
         stored = conformed(read_json(path), _StoredCompared)
     except MisfitError as error:
         raise InputError(f"{path} lacks a part ({error}); delete it") from error
-    return Compared(stored.agent, stored.alone, stored.shielded)
+    return ComparedAgent(stored.agent, stored.alone, stored.shielded)
 
 
 # What a file says at least.

@@ -18,7 +18,7 @@ from sarl_core.explaining.figures.learning import (
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, verdict
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.curves import Columns, Trial
-from sarl_core.learning.study_files import Compared, LearningRun, LearningStudy
+from sarl_core.learning.study_files import ComparedAgent, LearningRun, LearningStudy
 from sarl_core.learning.summary import summarise_compared, summarise_study
 
 RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
@@ -177,7 +177,9 @@ def test_freedom_is_said_where_it_was_kept(study: LearningStudy) -> None:
 
 def test_an_agent_for_comparison_stands_below_and_is_a_line(study: LearningStudy) -> None:
     trial = Trial((70.0, 90.0), 1, 0.0, 0.0, failed=(True, False))
-    beside = replace(study, compared=Compared("crane:operator", trial, replace(trial, crashes=0)))
+    beside = replace(
+        study, compared=ComparedAgent("crane:operator", trial, replace(trial, crashes=0))
+    )
     summaries, compared = summarise_study(beside), summarise_compared(beside)
     assert any(
         "“crane:operator” without the shield returns 80.0 and fails in 50 %, and with it returns "

@@ -57,10 +57,10 @@ def numbers(replay: ReplayPair) -> None:
             help=f"{FREEDOM_HELP}.",
         )
     (with_them,), (without,) = ending_texts(shielded), ending_texts(plain)
-    told = f"With the rules {with_them}. Without them {without}."
+    ends = f"With the rules {with_them}. Without them {without}."
     if with_them == without:
-        told = f"With the rules, and without them, {without}."
-    st.caption(told + _cost(shielded, plain))
+        ends = f"With the rules, and without them, {without}."
+    st.caption(ends + _cost(shielded, plain))
     beyond, withheld = int(shielded.outside[0]), int(shielded.withheld[0])
     if beyond:
         st.caption(
