@@ -10,10 +10,19 @@ import streamlit as st
 from sarl_core.explaining.words.markdown import markdown_text
 
 escaped = markdown_text
+# What sentences say to those who type commands: the forms on the pages do the same.
+_OPTIONS = re.compile(r"with --column .* \(on the page Demonstrations: in the form\)")
+_IN_BRACKETS = re.compile(r" \((--missing drop, in Python [^)]*|--column [^)]*=[a-z]+)\)")
+
+
+def on_page(text: str) -> str:
+    """A message without the options of the command line that the page has a form for."""
+    return _IN_BRACKETS.sub("", _OPTIONS.sub("in the form for the columns", text))
 
 
 def in_full(text: str) -> str:
     """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
+    text = on_page(text)
     first = text.split(" ", 1)[0]
     return escaped(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
 

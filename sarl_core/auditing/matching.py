@@ -63,6 +63,7 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
     _check_units(rule_set, log, places, called)
     names = tuple(dimension.name for dimension in log.action_dimensions)
     order = tuple(range(len(names)))
+    _check_count(rule_set, names, called)
     if len(names) > 1 or len(rule_set.actions) > 1:
         lined = line_up(
             NamedFeatures(called, names, log.env_id),
@@ -89,6 +90,19 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
             actions[:, column] = np.array(dimension.actions)[labels[:, column]]
     single = len(rule_set.actions) == 1 and not rule_set.actions[0].is_interval
     return MatchedLog(observations, labels, actions[:, 0] if single else actions, notes)
+
+
+def _check_count(rule_set: RuleSet, names: tuple[str, ...], called: str) -> None:
+    """Refuse a log of more or fewer actions."""
+    theirs = tuple(dimension.name for dimension in rule_set.actions)
+    if len(names) == len(theirs):
+        return
+    joined = "or say which of its columns are one action together (--column left+right=action)"
+    raise InputError(
+        f"{called} has {counted(len(names), 'action')} ({shortened(names)}) and the rules have "
+        f"{len(theirs)} ({shortened(theirs)}); {_CURE}"
+        + (f", {joined}" if len(names) > len(theirs) else "")
+    )
 
 
 def _feature_places(
@@ -122,7 +136,7 @@ def _check_units(rule_set: RuleSet, log: Demonstrations, places: list[int], call
         if unit and feature.unit.strip() and unit != feature.unit.strip():
             raise InputError(
                 f"{called} gives {feature.name!r} in {unit} and the rules ask about it in "
-                f"{feature.unit}; convert the column"
+                f"{feature.unit}; convert it"
             )
 
 

@@ -16,7 +16,7 @@ from sarl_core.cli.options import (
     Columns,
     Divider,
     EnvOfFile,
-    File,
+    Files,
     Json,
     MaxSteps,
     MissingName,
@@ -45,7 +45,7 @@ _NOBODY = "none"
 @with_columns
 def aggregate(
     context: typer.Context,
-    file: File,
+    files: Files,
     out: Annotated[
         Path,
         out_option(
@@ -141,7 +141,7 @@ def aggregate(
             max_steps=max_steps,
             choose=choose,
         )
-        start = read_demonstrations(file, env, columns, missing)
+        start = read_demonstrations(files, env, columns, missing)
         environment = env or recorded_environment(start)
         agents = _agents(agent, expert, environment, normalise)
         read = start.notes

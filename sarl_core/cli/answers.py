@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 _MOST_RULES = 5
 
 
-def describe_demonstrations(demonstrations: Demonstrations, path: Path) -> dict[str, Any]:
+def describe_demonstrations(demonstrations: Demonstrations, path: Path | str) -> dict[str, Any]:
     """What is in demonstrations.
 
     Args:
         demonstrations: N pairs.
-        path: Their file.
+        path: Their file, or what several are called together.
 
     Returns:
         A document for JSON.
@@ -278,7 +278,7 @@ def describe_rules(
 
     Args:
         rule_set: The rules.
-        path: Their file.
+        path: Their file, or what several are called together.
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
 
@@ -322,7 +322,7 @@ def print_rules(
 
     Args:
         rule_set: The rules.
-        path: Their file.
+        path: Their file, or what several are called together.
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
     """

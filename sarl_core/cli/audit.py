@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.inputs import path_of, read_demonstrations
 from sarl_core.cli.options import (
     Columns,
     Json,
@@ -41,11 +41,12 @@ def audit(
     rules: Annotated[
         Path, typer.Argument(metavar="RULES.json", help="The rules.", show_default=False)
     ],
-    log: Annotated[
-        Path,
+    logs: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="LOG",
-            help="What somebody did: demonstrations in any format that is read.",
+            metavar="LOG...",
+            help="What somebody did: demonstrations in any format that is read; several files are "
+            "one log.",
             show_default=False,
         ),
     ],
@@ -121,7 +122,7 @@ def audit(
             else read_demonstrations(demonstrations, None, columns, missing)
         )
 
-        def hold(path: Path, steps: Demonstrations | None = None) -> Audit:
+        def hold(path: Path | list[Path], steps: Demonstrations | None = None) -> Audit:
             try:
                 return against(
                     rule_set,
@@ -130,25 +131,34 @@ def audit(
                     demonstrations=mined_from,
                 )
             except InputError as error:
-                raise InputError(_with_path(error, path)) from error
+                called = path_of(path) if isinstance(path, list) else str(path)
+                raise InputError(_with_path(error, called)) from error
 
         stopped: InputError | None = None
         if follow:
             from sarl_core.auditing.growing import GrowingLog
 
-            held, stopped = _followed(GrowingLog(log, columns, missing), partial(hold, log), guards)
+            if len(logs) > 1:
+                raise InputError("--follow follows one log as it grows; give one file")
+            growing = GrowingLog(logs[0], columns, missing)
+            held, stopped = _followed(growing, partial(hold, logs[0]), guards)
         else:
-            held = hold(log)
+            held = hold(logs)
         comparison = None if compare is None else LogComparison(held, hold(compare))
         if out is not None:
             from sarl_core.explaining.exports.audit import save_audit
 
-            save_audit(held, out, title=f"{log.name} against {rules.name}", comparison=comparison)
+            save_audit(
+                held,
+                out,
+                title=f"{path_of(logs, short=True)} against {rules.name}",
+                comparison=comparison,
+            )
     document = _document(held, comparison, guards)
     if as_json:
         terminal.print_json(document)
     else:
-        _print(held, comparison, f"{log} against {rules}")
+        _print(held, comparison, f"{path_of(logs)} against {rules}")
         if out is not None:
             terminal.print_lines([f"Wrote {out}."])
     if stopped is not None:
@@ -188,8 +198,8 @@ def _followed(
         return held, error
 
 
-def _with_path(error: InputError, path: Path) -> str:
-    return str(error) if str(path) in str(error) else f"{path}: {error}"
+def _with_path(error: InputError, path: str) -> str:
+    return str(error) if path in str(error) else f"{path}: {error}"
 
 
 def _document(

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.inputs import path_of, read_agent, read_demonstrations
 from sarl_core.cli.options import (
     AgentName,
     Columns,
     Env,
     EnvOfFile,
-    File,
+    Files,
     Json,
     MissingName,
     Normalise,
@@ -75,7 +75,7 @@ def record(
 @with_environment
 @with_columns
 def check(
-    file: File,
+    files: Files,
     columns: Columns,
     missing: MissingName = "refuse",
     env: EnvOfFile = None,
@@ -98,18 +98,18 @@ def check(
     Example: `python -m sarl_core check data/demonstrations/lunar_lander.parquet`
     """
     if suggest is not None:
-        _suggest_columns(file, columns, suggest, as_json)
+        _suggest_columns(files, columns, suggest, as_json)
         return
-    _tell_demonstrations(read_demonstrations(file, env, columns, missing), file, as_json)
+    _tell_demonstrations(read_demonstrations(files, env, columns, missing), path_of(files), as_json)
 
 
-def _suggest_columns(file: Path, columns: Columns, out: Path, as_json: bool) -> None:
+def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bool) -> None:
     terminal.check_output(out, (".json",))
     from sarl_core.cli.answers import print_suggestion
     from sarl_core.demonstrations.formats import preview_columns
     from sarl_core.demonstrations.formats.mapping.roles import save_roles
 
-    previews = preview_columns(file, columns=columns)
+    previews = preview_columns(files, columns=columns)
     save_roles(
         out, {one.name: one.role for one in previews}, {one.name: one.why for one in previews}
     )
@@ -119,7 +119,7 @@ def _suggest_columns(file: Path, columns: Columns, out: Path, as_json: bool) -> 
         print_suggestion(previews, out)
 
 
-def _tell_demonstrations(demonstrations: Demonstrations, path: Path, as_json: bool) -> None:
+def _tell_demonstrations(demonstrations: Demonstrations, path: Path | str, as_json: bool) -> None:
     from sarl_core.cli.answers import describe_demonstrations, print_demonstrations
 
     document = describe_demonstrations(demonstrations, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -51,16 +52,30 @@ def read_agent(
     return made
 
 
+def path_of(files: Sequence[Path], *, short: bool = False) -> str:
+    """What files are called in an answer.
+
+    Args:
+        files: As the argument names them.
+        short: Whether the folder is left out.
+
+    Returns:
+        The path of one; of several, that of the first, and how many more there are.
+    """
+    first = files[0].name if short else str(files[0])
+    return first if len(files) == 1 else f"{first} and {len(files) - 1:,} more"
+
+
 def read_demonstrations(
-    file: Path,
+    files: Path | list[Path],
     env_id: EnvironmentOrId | None,
     columns: Roles,
     missing: Literal["refuse", "drop"] = "refuse",
 ) -> Demonstrations:
-    """Read a file of demonstrations.
+    """Read a file of demonstrations, or several that are one set.
 
     Args:
-        file: As the argument names it.
+        files: As the argument names them.
         env_id: Of the option ``--env``, or None.
         columns: What was said of columns with ``--columns`` and ``--column``.
         missing: Of the option ``--missing``.
@@ -73,7 +88,9 @@ def read_demonstrations(
     """
     from sarl_core.demonstrations.formats import load_demonstrations
 
-    return load_demonstrations(file, env_id=env_id, columns=columns, missing=missing)
+    if isinstance(files, list) and len(files) == 1:
+        files = files[0]  # which may be a pattern
+    return load_demonstrations(files, env_id=env_id, columns=columns, missing=missing)
 
 
 def read_shield(

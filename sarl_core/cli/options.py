@@ -13,12 +13,12 @@ import typer
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
 
-File = Annotated[
-    Path,
+Files = Annotated[
+    list[Path],
     typer.Argument(
-        metavar="FILE",
-        help="Demonstrations: a file, a folder or its ZIP, or several files by a pattern in "
-        'quotation marks ("runs/*.csv").',
+        metavar="FILE...",
+        help="Demonstrations: a file, a folder or its ZIP, or several files that are one set; also "
+        'as a pattern ("runs/*.csv").',
         show_default=False,
     ),
 ]
@@ -200,8 +200,9 @@ MissingName = Annotated[
     Literal["refuse", "drop"],
     typer.Option(
         "--missing",
-        help="What becomes of steps that lack a value (an empty cell, NaN, null, NA): refuse the "
-        "file and say how many there are, or drop those steps; the others keep their numbers.",
+        help="What becomes of steps that lack a value (an empty cell, NaN, null, NA) or hold an "
+        "infinite one: refuse the file and say where, or drop those steps and say how many they "
+        "are; the others keep their numbers.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]

@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.inputs import path_of, read_demonstrations
 from sarl_core.cli.options import (
     Columns,
     Divider,
     EnvOfFile,
-    File,
+    Files,
     Json,
     MissingName,
     out_option,
@@ -26,7 +26,7 @@ from sarl_core.errors import InputError
 @with_environment
 @with_columns
 def mine(
-    file: File,
+    files: Files,
     out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
     columns: Columns,
     missing: MissingName = "refuse",
@@ -138,7 +138,7 @@ def mine(
         if setting is not None:
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
-        demonstrations = read_demonstrations(file, env, columns, missing)
+        demonstrations = read_demonstrations(files, env, columns, missing)
         oddities = describe_oddities(demonstrations)
         tried = split = None
         if hold_out is not None:
@@ -177,7 +177,7 @@ def mine(
 @with_environment
 @with_columns
 def landscape(
-    file: File,
+    files: Files,
     out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],
     columns: Columns,
     missing: MissingName = "refuse",
@@ -217,12 +217,12 @@ def landscape(
         from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        recorded = read_demonstrations(file, env, columns, missing)
+        recorded = read_demonstrations(files, env, columns, missing)
         trees = grow_policy_trees(recorded, divider=divider)
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
-        title = f"{source.env_id or file.name}: {source.steps:,} steps"
+        title = f"{source.env_id or path_of(files, short=True)}: {source.steps:,} steps"
         save_landscape(plane, names, out, title=title)
     if as_json:
         terminal.print_json({**landscape_document(plane, names), "notes": list(recorded.notes)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -107,7 +108,7 @@ def _complain(sentence: str) -> None:
 def _sentence_and_code(error: BaseException) -> tuple[str, int]:
     """An exception as a sentence and an exit code."""
     if isinstance(error, typer.TyperException):
-        return error.format_message(), 2
+        return error.format_message() + _one_file_advice(error.format_message()), 2
     if isinstance(error, StoppedError):
         return str(error), _INTERRUPTED
     if isinstance(error, SarlError):
@@ -118,6 +119,14 @@ def _sentence_and_code(error: BaseException) -> tuple[str, int]:
         extra = f"sarl-explorer[{_EXTRAS[error.name]}]"
         return f"this needs {error.name}, which is not installed; run pip install '{extra}'", 1
     return f"{type(error).__name__}: {error} (run it again with --debug to see where)", 1
+
+
+def _one_file_advice(message: str) -> str:
+    """What to do where a shell made several files of a pattern, and one argument is wanted."""
+    extra = re.search(r"unexpected extra argument\S* \((.*)\)", message)
+    if extra is None or not any(Path(name).exists() for name in extra[1].split(" ")):
+        return ""
+    return '; of several files that are one, quote the pattern ("runs/*.csv") or give the folder'
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual
 from sarl_dashboard.state.rule_choice import EDITED
 from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
 from sarl_dashboard.state.url import with_own
+from sarl_dashboard.text import in_full
 
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
 Width = Literal["stretch"] | int
@@ -139,7 +140,7 @@ def search_box() -> tuple[str, ...]:
 def notes_notice(notes: Iterable[str]) -> None:
     """Say how it was found out which feature is which, and what else a visitor should know."""
     for note in dict.fromkeys(notes):
-        st.info(f"{note[0].upper()}{note[1:]}.", icon=":material/info:")
+        st.info(in_full(note), icon=":material/info:")
 
 
 def no_boxes_notice(rule_sets: list[RuleSet], outside: Outside) -> None:

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from sarl_core import RuleSet, load_demonstrations
+from sarl_core.cli.app import main
 
 ROOT = Path(__file__).resolve().parents[2]
 LANDER = str(ROOT / "data" / "demonstrations" / "lunar_lander.parquet")
@@ -375,3 +376,26 @@ def test_json_is_all_there_is_on_standard_output(tmp_path):
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)["episodes"]) == 2
     assert "hello from reset" in done.stderr
+
+
+def test_files_that_a_shell_made_of_a_pattern_are_one_set(run, tmp_path):
+    for number in (10, 9, 1):
+        rows = "".join(f"{x},{int(x > 7)}\n" for x in range(number, 16))
+        (tmp_path / f"run_{number}.csv").write_text(f"gap,action\n{rows}")
+    names = [str(path) for path in sorted(tmp_path.glob("*.csv"))]
+    for given in (names, [str(tmp_path / "*.csv")]):
+        answer = json.loads(run("check", *given, "--json"))
+        assert (answer["steps"], answer["episodes"]) == (28, 3)
+    rules = str(tmp_path / "rules.json")
+    run("mine", *names, "--support", "0.1", "--confidence", "0.9", "--out", rules)
+    assert json.loads(run("audit", rules, *names, "--json"))["steps"] == 28
+
+
+def test_where_one_file_is_wanted_several_are_refused_with_what_to_do(capsys, tmp_path, cart_rules):
+    rules = str(cart_rules)
+    assert main(["audit", rules, CART, CART, "--follow"]) == 2
+    assert "give one file" in capsys.readouterr().err
+    assert main(["report", rules, "--demonstrations", CART, CART, "--out", "report.html"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert 'quote the pattern ("runs/*.csv") or give the folder' in error

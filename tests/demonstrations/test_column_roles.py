@@ -256,3 +256,16 @@ def test_features_stand_in_the_order_in_which_a_person_says_them():
     columns = {"lane": "feature", "x_10": "feature", "x_2": "feature"}
     read = read_demonstrations(content, "rig.csv", columns=columns)
     assert read.feature_names == ("lane", "x_10", "x_2")
+
+
+def test_a_word_for_observations_is_no_name_where_every_role_is_said():
+    content = table(obs_speed=SPEED, obs_gap=GAP, action=BRAKE, episode=EPISODE)
+    said = {"obs_speed": "feature:m/s", "obs_gap": "feature", "action": "action"}
+    read = read_demonstrations(content, "rig.csv", columns={**said, "episode": "episode"})
+    assert read.feature_names == ("speed", "gap")
+    assert read.feature_names == read_demonstrations(content, "rig.csv").feature_names
+    beside = table(state=LANE, pressure=GAP, action=BRAKE, episode=EPISODE)
+    read = read_demonstrations(
+        beside, "rig.csv", columns={"state": "feature", "pressure": "feature"}
+    )
+    assert read.feature_names == ("state", "pressure")

@@ -141,3 +141,17 @@ def test_seconds_since_1970_are_no_feature_however_they_rise():
     for scaled in (1, 1e3, 1e9):
         content = frame.assign(stamp=stamp * scaled).to_csv(index=False).encode()
         assert read_demonstrations(content, "rig.csv").feature_names == ("x",)
+
+
+@pytest.mark.parametrize("sign", ["#", "%", "//"])
+def test_a_comment_further_down_is_none_of_the_rows(sign: str) -> None:
+    rows = f"1,2,0\n3,4,1\n  {sign} the operator changed\n5,6,0\n{sign} a, b, c\n7,8,1\n"
+    read = read_demonstrations(f"{sign} rig 7\nx,y,action\n{rows}".encode(), "rig.csv")
+    assert read.observations[:, 0].tolist() == [1, 3, 5, 7]
+    wrong = rows.replace("6", "six")
+    with pytest.raises(InputError, match=r"holds 'six' in row 3 \(line 6\)"):
+        read_demonstrations(f"{sign} rig 7\nx,y,action\n{wrong}".encode(), "rig.csv")
+    with pytest.raises(InputError, match="row 3"):  # no head says that these are comments
+        read_demonstrations(f"x,y,action\n{rows}".encode(), "rig.csv")
+    with pytest.raises(InputError, match="row 3"):
+        preview_columns(f"x,y,action\n{rows}".encode(), "rig.csv")

@@ -75,3 +75,20 @@ def test_what_would_leave_nothing_is_refused() -> None:
         read("fill")
     with pytest.raises(InputError, match=r"column 'episode' is empty in row 2"):
         read("drop", "episode,obs_x,action\n0,1,0\n,2,1\n1,3,1\n")
+
+
+def test_an_infinite_value_is_left_out_and_counted_beside_what_is_missing() -> None:
+    text = CSV.replace("3.5", "inf").replace("4.5", "-inf").replace("5.5", "1e39")
+    log = read("drop", text)
+    assert log.observations[:, 0].tolist() == [1.5, 2.5]
+    note = next(note for note in log.notes if "left out" in note)
+    assert note.startswith("5 of 7 steps lack a value or hold an infinite one and were left out")
+    assert "column 'obs_wind' is empty or not a number (NaN) in 2 of 7 rows" in note
+    assert "column 'obs_wind' is infinite in 3 of 7 rows" in note
+    alone = read("drop", "obs_x,action\n1,0\ninf,1\n2,1\n")
+    assert any(
+        note.startswith("1 of 3 steps holds an infinite value and was left out")
+        for note in alone.notes
+    )
+    with pytest.raises(InputError, match="'obs_x' is infinite in row 2"):
+        read("refuse", "obs_x,action\n1,0\ninf,1\n2,1\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 
 from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
@@ -31,7 +32,8 @@ IS_TIME = "it is a time"
 """Why a column is no feature."""
 _BY_NAME = "its name says so"
 _BY_PERSON = "as it was mapped"
-_NO_OBSERVATION = "the features' names begin with a word for observations, and its own does not"
+NO_OBSERVATION = "the features' names begin with a word for observations, and its own does not"
+_LONGEST_LIST = 200  # characters of the names that a sentence lists
 _NUMBERED = re.compile(r"([^\d]*?)[ _.\-\[(]?(\d{1,9})[\])]?")
 
 
@@ -114,6 +116,12 @@ class ColumnMap:
         """The columns that are neither observations nor actions, by what they hold."""
         named = {role: getattr(self, role) for role in SINGLES}
         return {role: name for role, name in named.items() if name is not None}
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The names in place of the columns' own, by column."""
+        observed = zip(self.observations, self.feature_names or (), strict=False)
+        return {**dict(observed), **dict(zip(self.actions, self.action_names or (), strict=False))}
 
     @property
     def used(self) -> tuple[str, ...]:
@@ -289,17 +297,17 @@ def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
         if name not in taken and (why := _why_unused(name, names)) is not None
     }
     left = [name for name in names if name not in taken and name not in unused]
-    prefixed = _prefixed(left)
-    if prefixed:
-        reasons |= dict.fromkeys(prefixed, "its name begins with a word for observations")
-        unused |= {name: _NO_OBSERVATION for name in left if name not in prefixed}
+    worded = prefixed(left)
+    if worded:
+        reasons |= dict.fromkeys(worded, "its name begins with a word for observations")
+        unused |= {name: NO_OBSERVATION for name in left if name not in worded}
         unclear = []
     else:
         unclear = [name for name in left if _unclear(name)]
         reasons |= dict.fromkeys(
             (name for name in left if name not in unclear), "no other use fits its name"
         )
-    guessed = [name for name in prefixed or left if name not in unclear]
+    guessed = [name for name in worded or left if name not in unclear]
     features = tuple(name for name in names if name in said["feature"] or name in guessed)
     columns = ColumnMap.of_roles(
         # Where a person says of each that it is one, so do they stand.
@@ -309,10 +317,10 @@ def guess_roles(names: Sequence[str], roles: Roles | None = None) -> Guess:
     )
     reasons |= dict.fromkeys(roles, _BY_PERSON)
     unused |= dict.fromkeys((*said["ignore"], *said["time"][1:]), _BY_PERSON)
-    return Guess(columns, reasons, unused, tuple(unclear), bool(prefixed), roles)
+    return Guess(columns, reasons, unused, tuple(unclear), bool(worded), roles)
 
 
-def _prefixed(names: Sequence[str]) -> list[str]:
+def prefixed(names: Sequence[str]) -> list[str]:
     """The columns that a word for observations tells from the others; none if none does."""
     plainly = [name for name in names if stripped(name, PLAIN_OBSERVATIONS) is not None]
     if plainly != [name for name in plainly if _bare(name)]:
@@ -417,7 +425,7 @@ def guess_notes(guess: Guess) -> tuple[str, ...]:
     for why, left in by_reason.items():
         one = len(left) == 1
         note = f"the column{'' if one else 's'} {listed(left)} {'was' if one else 'were'} not used"
-        notes.append(note if why == _NO_OBSERVATION else f"{note}: {why}")
+        notes.append(note if why == NO_OBSERVATION else f"{note}: {why}")
     return tuple(notes)
 
 
@@ -468,14 +476,18 @@ def refuse_doubled(names: Sequence[str]) -> None:
 
 def listed(names: Iterable[str], limit: int = 12) -> str:
     """Names for a sentence, the first few of them."""
-    names = list(names)
-    first = ", ".join(map(quoted, names[:limit]))
-    return first if len(names) <= limit else f"{first} and {len(names) - limit:,} more"
+    every = list(map(quoted, names))
+    lengths = accumulate(map(len, every))
+    first = every[: max(1, min(limit, sum(length <= _LONGEST_LIST for length in lengths)))]
+    left = len(every) - len(first)
+    return ", ".join(first) + (f" and {left:,} more" if left else "")
 
 
 def _actions(names: Sequence[str]) -> tuple[str, ...]:
     by_name = {plain(name): name for name in reversed(names)}
-    alone = next((by_name[word] for word in SINGLE_ACTION if word in by_name), None)
+    elsewhere = [word for word in by_name if vocabulary.ACTION_ELSEWHERE.fullmatch(word)]
+    single = (*SINGLE_ACTION[:-1], *elsewhere, *SINGLE_ACTION[-1:])
+    alone = next((by_name[word] for word in single if word in by_name), None)
     letter = alone is not None and plain(alone) == "a"
     if alone is not None and not letter:
         return (alone,)
@@ -523,12 +535,7 @@ def _why_unused(name: str, names: Sequence[str]) -> str | None:
 def _likeliest_action(guess: Guess, names: Sequence[str]) -> str:
     """The column to name in a sentence where no name says that it is the action."""
     others = [name for name in names if name not in guess.columns.singles.values()]
-    likely = [
-        name
-        for name in others
-        if vocabulary.is_perhaps_action(name) or vocabulary.CONTROLS.fullmatch(plain(name))
-    ]
-    return (likely or others or list(names))[-1]
+    return (vocabulary.likely_actions(others) or others or list(names))[-1]
 
 
 def _is(pattern: str, word: str) -> bool:

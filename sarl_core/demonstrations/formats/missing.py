@@ -1,4 +1,4 @@
-"""Steps that lack a value: an empty cell, NaN, null or NA among observations, actions, rewards."""
+"""Steps that lack a value (an empty cell, NaN, null, NA), or hold an infinite one."""
 
 from __future__ import annotations
 
@@ -12,18 +12,22 @@ from sarl_core.errors import InputError
 
 Missing = Literal["refuse", "drop"]
 """What becomes of such steps: the file is refused, or they are left out."""
+Holes = Mapping[str, NDArray[np.bool_]]
+"""For each column, as messages call it, where it has no value, (N,)."""
 _LISTED = 4  # columns in a sentence
 
 
 def complete_rows(
-    holes: Mapping[str, NDArray[np.bool_]],
+    holes: Holes,
+    infinite: Holes,
     rows: NDArray[np.int64] | None,
     missing: Missing,
 ) -> tuple[NDArray[np.int64], str]:
     """The steps that lack nothing.
 
     Args:
-        holes: For each column, as messages call it, where it has no value, (N,); one or more.
+        holes: Where columns have no value.
+        infinite: Where they have an infinite one; one or more columns in the two together.
         rows: Shape (N,), the rows the steps had in the file, from 0; None if they are those.
         missing: What becomes of the others.
 
@@ -34,14 +38,10 @@ def complete_rows(
         InputError: With the columns, how many steps, and the first row; if they are refused, or
             hardly any would be left.
     """
-    lacking = np.logical_or.reduce(list(holes.values()))
+    lacking = np.logical_or.reduce([*holes.values(), *infinite.values()])
     n, count = len(lacking), int(np.count_nonzero(lacking))
-    counts = [(name, int(np.count_nonzero(hole))) for name, hole in holes.items()]
-    (first, most), *others = sorted(counts, key=lambda one: -one[1])
-    where = f"{first} is empty or not a number (NaN) in {most:,} of {n:,} rows"
-    where += "".join(f", {name} in {each:,}" for name, each in others[: _LISTED - 1])
-    if len(others) >= _LISTED:
-        where += f", {len(others) - _LISTED + 1:,} more columns in some"
+    parts = [(holes, "is empty or not a number (NaN)"), (infinite, "is infinite")]
+    where = ", and ".join(_where(columns, what) for columns, what in parts if columns)
     if missing == "refuse":
         row = int(np.argmax(lacking))
         number = 1 + (row if rows is None else int(rows[row]))
@@ -55,8 +55,21 @@ def complete_rows(
             "the columns that are empty instead"
         )
     one = count == 1
+    wrong = [f"lack{'s' * one} a value"] * bool(holes)
+    wrong += [f"hold{'s' * one} an infinite {'one' if holes else 'value'}"] * bool(infinite)
     return np.flatnonzero(~lacking), (
-        f"{count:,} of {n:,} steps {'lacks' if one else 'lack'} a value and "
-        f"{'was' if one else 'were'} left out ({where}); the others keep their episodes and their "
-        "step numbers"
+        f"{count:,} of {n:,} steps {' or '.join(wrong)} and {'was' if one else 'were'} left out "
+        f"({where}); the others keep their episodes and their step numbers"
     )
+
+
+def _where(columns: Holes, what: str) -> str:
+    """In how many rows columns are so, those with the most first."""
+    counts = [(name, int(np.count_nonzero(hole))) for name, hole in columns.items()]
+    (first, most), *others = sorted(counts, key=lambda one: -one[1])
+    n = len(columns[first])
+    where = f"{first} {what} in {most:,} of {n:,} rows"
+    where += "".join(f", {name} in {each:,}" for name, each in others[: _LISTED - 1])
+    if len(others) >= _LISTED:
+        where += f", {len(others) - _LISTED + 1:,} more columns in some"
+    return where

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
@@ -275,10 +275,15 @@ def _checked(recording: Recording) -> Recording:
 
 def _complete(recording: Recording, missing: Missing) -> Recording:
     """Refuse or leave out steps without one of their values, and check the rewards."""
-    holes = _holes(recording)
-    if holes:
+    holes = _marked(recording, np.isnan)
+    if recording.missing_actions is not None:
+        without = zip(recording.action_columns, recording.missing_actions.T, strict=True)
+        holes |= {name: hole for name, hole in without if hole.any()}
+    # A state with an infinite value is none either; it is refused by its own name.
+    infinite = _marked(recording, np.isinf) if missing == "drop" else {}
+    if holes or infinite:
         episodes, steps = _some(recording.episodes), recording.steps
-        left, note = complete_rows(holes, recording.rows, missing)
+        left, note = complete_rows(holes, infinite, recording.rows, missing)
 
         def of_left(values: NDArray[Any] | None) -> Any:
             return None if values is None else values[left]
@@ -308,8 +313,10 @@ def _complete(recording: Recording, missing: Missing) -> Recording:
     )
 
 
-def _holes(recording: Recording) -> dict[str, NDArray[np.bool_]]:
-    """For each column that lacks values where it does, (N,)."""
+def _marked(
+    recording: Recording, test: Callable[[NDArray[Any]], NDArray[np.bool_]]
+) -> dict[str, NDArray[np.bool_]]:
+    """For each column of numbers of which a test is true where it is, (N,)."""
     n = len(recording.actions)
     actions = recording.actions.reshape(n, -1)
     blocks: list[tuple[Sequence[str], NDArray[Any]]] = [
@@ -320,15 +327,18 @@ def _holes(recording: Recording) -> dict[str, NDArray[np.bool_]]:
         rewards = as_numbers(recording.rewards, _called(recording, "reward"))
         if rewards.shape == (n,):
             blocks.append(((_called(recording, "reward"),), rewards[:, None]))
-    holes = {
-        name: np.isnan(column)
+    marked = {
+        name: test(column)
         for names, block in blocks
-        if block.dtype.kind == "f" and block.size and np.isnan(block.min())
+        if block.dtype.kind == "f" and block.size and not _is_finite(block)
         for name, column in zip(names, block.T, strict=True)
     }
-    if recording.missing_actions is not None:
-        holes |= dict(zip(recording.action_columns, recording.missing_actions.T, strict=True))
-    return {name: hole for name, hole in holes.items() if hole.any()}
+    return {name: places for name, places in marked.items() if places.any()}
+
+
+def _is_finite(block: NDArray[Any]) -> bool:
+    """Whether every number is one; without an array of their size."""
+    return bool(np.isfinite([block.min(), block.max()]).all())
 
 
 def _called(recording: Recording, role: str) -> str:

@@ -55,7 +55,7 @@ from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 
 Content = bytes | bytearray | memoryview | BinaryIO
-Source = str | Path | Content | list[tuple[Content, str]]
+Source = str | Path | Content | list[tuple[Content, str]] | list[Path]
 _PATTERN = frozenset("*?[")
 
 
@@ -78,9 +78,9 @@ def load_demonstrations(
         columns: Which columns of a table hold what: a `ColumnMap` of all that are read, or the
             roles of some, as `{"brake": "action", "speed": "feature:m/s"}`; the others, and None,
             go by their names.
-        missing: What becomes of steps that lack a value (an empty cell, NaN, null, NA) among
-            observations, actions and rewards: "refuse" the file, or "drop" them. What is left of
-            an episode keeps its number and the numbers of its steps.
+        missing: What becomes of steps that lack a value (an empty cell, NaN, null, NA) or hold an
+            infinite one among observations, actions and rewards: "refuse" the file, or "drop"
+            them. What is left of an episode keeps its number and the numbers of its steps.
 
     Returns:
         The demonstrations; their `notes` say what had to be guessed, and what was left out.
@@ -228,7 +228,7 @@ def table_columns(source: Source, name: str | None = None) -> tuple[str, ...]:
     """Columns of a tabular file, or of several, for a person to map.
 
     Args:
-        source: A path, the content of a file, or content and name of several files.
+        source: A path, or several; the content of a file, or content and name of several.
         name: The file's name, needed with content.
 
     Returns:
@@ -267,9 +267,13 @@ def _opened_table(source: Source, name: str | None) -> Iterator[Table | None]:
     """The table in what `table_columns` takes; errors in it begin with the file's name."""
     if isinstance(source, list):
         if len(source) > 1:
-            yield None if _are_pair([each for _, each in source]) else _table_of(_given(source))
+            yield _table_of_several(source)
             return
-        ((source, name),) = source
+        (only,) = source
+        source, name = only if isinstance(only, tuple) else (only, name)
+    if isinstance(source, (str, Path)) and len(paths := _named_by(Path(source))) > 1:
+        yield _table_of_several(paths)
+        return
     on_disk = Path(source) if isinstance(source, (str, Path)) else None
     name = name or str(on_disk or "the file")
     with naming(name):
@@ -284,6 +288,16 @@ def _opened_table(source: Source, name: str | None) -> Iterator[Table | None]:
         form = format_of(name)
         content = unpacked(content, name)
         yield form.open_table(content) if form.open_table is not None else None
+
+
+def _table_of_several(source: list[tuple[Content, str]] | list[Path]) -> Table | None:
+    files = [(path, path.name) if isinstance(path, Path) else path for path in source]
+    if _are_pair([name for _, name in files]):
+        return None
+    paths = [path for path, _ in files if isinstance(path, Path)]
+    if paths:
+        return _table_of(files_at(paths, f"{len(paths)} files"))
+    return _table_of(_given([(data, name) for data, name in files if not isinstance(data, Path)]))
 
 
 def _named_by(path: Path) -> list[Path]:
@@ -370,7 +384,8 @@ def _read_set(
             )
         return to_demonstrations(opened, description, missing)
     chosen = columns if columns is not None else opened.columns
-    recording = recording_from_table(opened.table, chosen, description)
+    names = opened.columns.names if opened.columns is not None else None
+    recording = recording_from_table(opened.table, chosen, description, names)
     recording = replace(recording, notes=(*opened.notes, *recording.notes))
     return to_demonstrations(recording, description, missing)
 

@@ -21,6 +21,7 @@ from sarl_core.demonstrations.formats.columns import (
     guess_notes,
     guess_roles,
     listed,
+    prefixed,
     require_clear,
     unclear_columns,
 )
@@ -44,7 +45,10 @@ _OWN_SINGLES = ("episode", "step", "reward", "terminated", "truncated", "time")
 
 
 def recording_from_table(
-    table: Table, columns: ColumnMap | Roles | None, description: EnvironmentDescription | None
+    table: Table,
+    columns: ColumnMap | Roles | None,
+    description: EnvironmentDescription | None,
+    names: Mapping[str, str] | None = None,
 ) -> Recording:
     """Read the columns of a table that are needed.
 
@@ -52,6 +56,7 @@ def recording_from_table(
         table: The opened file.
         columns: Which columns hold what, or what some of them are; None to go by their names.
         description: The environment, if known; it tells a table without names apart.
+        names: What is known to be the names of what columns hold, whoever says what they are.
 
     Returns:
         What the table holds.
@@ -98,12 +103,17 @@ def recording_from_table(
     single = {role: read[name].with_gaps for role, name in chosen.singles.items()}
     fields, marked = episode_fields(single, chosen)
     named = columns is not None or table.named
-    called = chosen.feature_names or (names_of_features(guess, table.named) if named else None)
+    called = chosen.feature_names or _named(
+        chosen.observations, names_of_features(guess, table.named) if named else None, names
+    )
     block = observation_block(read, chosen.observations, called)
     coarse = coarse_notes(table, block, rows)
-    names, units = block.names, units_of(block.columns, guess.roles, table.metadata.column_units)
-    if names is not None and not chosen.feature_names:
-        names, written = without_units(names)
+    feature_names, units = (
+        block.names,
+        units_of(block.columns, guess.roles, table.metadata.column_units),
+    )
+    if feature_names is not None and not chosen.feature_names:
+        feature_names, written = without_units(feature_names)
         units = tuple(known or behind for known, behind in zip(units, written, strict=True))
     vector = is_vector(chosen.actions, of_the_file)
     actions = stated_actions(read, chosen.actions, guess.roles, rows)
@@ -112,16 +122,18 @@ def recording_from_table(
         actions=action_block(actions, chosen.actions, vector),
         observation_columns=tuple(f"column {name!r}" for name in block.columns),
         action_columns=tuple(f"column {name!r}" for name in chosen.actions),
-        feature_names=names,
+        feature_names=feature_names,
         feature_units=units if any(units) else None,
         indicators=block.indicators,
         action_words=label_words(actions, chosen.actions),
         missing_actions=missing_block(actions, chosen.actions),
         action_names=chosen.action_names
-        or (
+        or _named(
+            chosen.actions,
             action_names(chosen.actions)
             if named and of_the_file.issuperset(chosen.actions)
-            else None
+            else None,
+            names,
         ),
         **fields,
         rows=rows,
@@ -259,9 +271,21 @@ def given(columns: ColumnMap, why: str) -> Guess:
 
 
 def names_of_features(guess: Guess, named: bool) -> tuple[str, ...] | None:
-    """What the features are called; a word that all names begin with says nothing."""
+    """What the features are called; a word that names of features begin with says nothing."""
     columns = guess.columns.observations
-    return feature_names(columns) if guess.prefixed or not named else columns
+    bare = guess.prefixed or not named or (guess.roles and prefixed(columns))
+    return feature_names(columns) if bare else columns
+
+
+def _named(
+    columns: Sequence[str], called: tuple[str, ...] | None, names: Mapping[str, str] | None
+) -> tuple[str, ...] | None:
+    """What columns hold is called, under the names that are known of some of them."""
+    if not names or not names.keys() & set(columns):
+        return called
+    return tuple(
+        names.get(column, own) for column, own in zip(columns, called or columns, strict=True)
+    )
 
 
 def units_of(columns: Sequence[str], roles: Roles, units: Mapping[str, str]) -> tuple[str, ...]:

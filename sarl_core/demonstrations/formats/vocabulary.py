@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 OBSERVATIONS = "obs|observations?|states?|features?"
 PLAIN_OBSERVATIONS = "obs|observations?"  # the names of nothing else begin so
 ACTIONS = "actions?|acts?"
 SINGLE_ACTION = ("action", "actions", "act", "acts", "a")
+# The same in other languages, where it means nothing else.
+ACTION_ELSEWHERE = re.compile(
+    r"aktion(en)?|handlung(en)?|acci[oó]n(es)?|azion[ei]|a[cç][aã]o|a[cç][oõ]es|actie"
+    r"|行動|動作|动作|操作"
+)
 
 _COUNTED = "(_?(id|ids|index|idx|no|nr|num|number|count))?"
 # A date alone says of no step when it was, so that it is one of the times that nobody reads.
@@ -17,15 +22,26 @@ _HOW = "(_(s|sec|secs|seconds|ms|us|ns|utc|unix))?"
 _TIMES = (
     rf"{_WHICH}(time|time_?stamp|date_?time|ts){_HOW}"
     r"|.*_timestamp|elapsed(_(s|sec|secs|seconds|ms))?|utc|unix|ms|secs?|seconds|t_(s|ms)"
+    r"|zeit(punkt|stempel)?|uhrzeit|horodatage|tiempo|tijd|時刻|時間|时间|日時"
+)
+_RUNS = (
+    "(run|demo|demonstration|trial|trip|session|versuch|durchlauf|durchgang|lauf|fahrt|essai"
+    "|ensayo|prova|試行|回)"
 )
 # Of a name as `plain` gives it; the first pattern that a column matches takes the role.
 ROLES: Mapping[str, tuple[str, ...]] = {
     "episode": (
         rf"(episode|ep|eps|traj|trajectory|rollout)s?{_COUNTED}",
-        rf"(run|demo|demonstration|trial){_COUNTED}",
+        r"[eé]pisodi?[eons]*|trayectoria|traiettoria|エピソード|回合",
+        rf"{_RUNS}{_COUNTED}",
     ),
-    "step": (rf"(step|time_?step|env_?step)s?{_COUNTED}", "t", rf"(frame|tick){_COUNTED}"),
-    "reward": ("rewards?|rews?", "r"),
+    "step": (
+        rf"(step|time_?step|env_?step)s?{_COUNTED}",
+        r"zeitschritt|schritt|ステップ|步",
+        "t",
+        rf"(frame|tick){_COUNTED}",
+    ),
+    "reward": ("rewards?|rews?|belohnung|r[eé]compense|recompensa|ricompensa|報酬|奖励", "r"),
     "terminated": ("(is_?)?(terminated|terminal|termination|done)s?",),
     "truncated": ("(is_?)?(truncated|truncation|timeout)s?",),
     "first": ("is_?first|is_?start|first_step|episode_starts?",),
@@ -33,20 +49,21 @@ ROLES: Mapping[str, tuple[str, ...]] = {
     "time": (_TIMES,),
 }
 # Words for a role that may as well name a feature; what the column holds decides.
-DOUBTFUL_ROLES = re.compile(rf"(run|demo|demonstration|trial|frame|tick){_COUNTED}|t")
+DOUBTFUL_ROLES = re.compile(rf"({_RUNS}|frame|tick){_COUNTED}|t")
 # Numbers that a data frame wrote along.
 ROW_NUMBERS = re.compile(
     r"|#|index|idx|unnamed:_\d+|__index_level_\d+__|(row|line)_?(id|index|idx|no|nr|num|number)"
 )
-TIMES = re.compile(f"{_TIMES}|{_WHICH}date{_HOW}")
+TIMES = re.compile(f"{_TIMES}|{_WHICH}date{_HOW}|datum|fecha|日期")
 # What learners write along, and no agent sees.
 BOOKKEEPING = re.compile(
     r"discounts?|(action_)?log_?p(robs?)?|advantages?|returns?_to_go|rtg|infos?(_.*)?"
 )
 UNCLEAR = re.compile(r"id|.*_ids?|uid|uuid|seeds?|returns?|values?|q_values?")
 CONTROLS = re.compile(
-    r"brakes?|braking|throttle|gas|steer(ing)?(_.*)?|pedal|torque|force|thrust|u|move|button"
-    r"|decision|choice|(.*_)?(cmd|command|control|action)"
+    r"brakes?|braking|accelerat(e|or)|coast|throttle|gas|steer(ing)?(_.*)?|pedal|torque|force"
+    r"|thrust|u|move|button|decision|choice|(.*_)?(cmd|command|control|action)"
+    r"|befehl|entscheidung|commande|comando|mando|指令"
 )
 
 _CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([ap]m)?\s*(z|utc|[+-]\d{2}:?\d{2})?"
@@ -138,6 +155,11 @@ def is_perhaps_action(name: str) -> bool:
     return _PERHAPS_ACTION.fullmatch(plain(name)) is not None and not (
         says_before(name) or only_next(name)
     )
+
+
+def likely_actions(names: Iterable[str]) -> list[str]:
+    """The columns whose names may be those of actions."""
+    return [name for name in names if is_perhaps_action(name) or CONTROLS.fullmatch(plain(name))]
 
 
 def is_time(word: str) -> bool:

@@ -3,41 +3,27 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Mapping
 
 import streamlit as st
+from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-from sarl_core.demonstrations.formats import (
-    ColumnPreview,
-    ColumnRole,
-    preview_columns,
-    read_files,
-)
+from sarl_core.demonstrations.formats import ColumnRole, read_files
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
+from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.state.data import chosen_demonstrations, set_upload
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.demonstrations.mapping import (
-    FEATURES,
-    chosen_roles,
-    fill_in,
-    mapping_form,
-)
 
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
-# What a sentence says to those who type commands.
-_IN_FORM = re.compile(
-    r"say (which|so) with --column .* \(on the page Demonstrations: in the form\)"
-)
 _LOGGER = logging.getLogger(__name__)
 
 
-def uploaded_files() -> list[tuple[memoryview, str]]:
-    """Content and name of each file in the uploader."""
-    return [(file.getbuffer(), file.name) for file in st.session_state.get("upload_files") or []]
+def uploaded_files() -> list[UploadedFile]:
+    """The files in the uploader."""
+    return list(st.session_state.get("upload_files") or [])
 
 
 def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
@@ -48,7 +34,7 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
     """
     st.session_state.pop("_upload_error", None)
     st.session_state["_upload_columns"] = columns
-    files = uploaded_files()
+    files = [(file.getbuffer(), file.name) for file in uploaded_files()]
     if not files:
         return
     try:
@@ -90,24 +76,27 @@ def environment() -> Environment | None:
     return registered(env_id) if env_id else None
 
 
-def read_mapped() -> None:
+def _form() -> ColumnForm:
+    return ColumnForm.of_files("map", uploaded_files())
+
+
+def _read_mapped() -> None:
     """Read again, with the columns as they stand in the form."""
-    names = [one.name for one in _previews(uploaded_files())]
     try:
-        roles = chosen_roles(names)
+        roles = _form().roles()
     except InputError as error:
         st.session_state["_upload_error"] = str(error)
         return
+    finally:
+        st.session_state["_upload_mapped"] = True
     read_upload(roles)
 
 
 def read_new_upload() -> None:
-    """Read what was uploaded just now; offer the form where the columns are not clear."""
-    st.session_state.pop(FEATURES, None)  # the form is filled in anew
+    """Read what was uploaded just now; open the form where the columns are not clear."""
+    st.session_state["_upload_mapped"] = False
     read_upload()
-    error = st.session_state.get("_upload_error") or ""
-    # An error about a row is not mended by another map; one about columns is.
-    st.session_state["map_columns"] = "column" in error and not re.search(r"\brow \d", error)
+    _form().open_for(st.session_state.get("_upload_error"))
 
 
 def upload_section(*, expanded: bool) -> None:
@@ -139,39 +128,27 @@ def upload_section(*, expanded: bool) -> None:
             help="Names, units and bounds are taken from it where the file has none. Any id "
             "that Gymnasium knows.",
         )
-        error = st.session_state.get("_upload_error")
-        if error:
-            refuse(_IN_FORM.sub("say which in the form below", error))
-            if chosen_demonstrations() is not None:
-                st.caption("Nothing has changed: the set below is still the one chosen.")
-        files = uploaded_files()
-        lacking = error is not None and _LEFT_OUT in error
-        if files and (lacking or st.session_state.get("upload_missing")):
-            st.toggle(
-                "Leave out the steps that lack a value",
-                key="upload_missing",
-                on_change=_read_again,
-                help="An empty cell, NaN, null or NA among observations, actions and rewards. "
-                "What is left of an episode keeps its number and the numbers of its steps.",
-            )
-        previews = _previews(files)
-        if previews and st.toggle("Map the columns myself", key="map_columns"):
-            if FEATURES not in st.session_state:
-                fill_in(previews)
-            mapping_form(previews, read_mapped)
+        form = _form()
+        # What is wrong with a choice in the form stands beside its button.
+        in_form = form.is_open and bool(st.session_state.get("_upload_mapped"))
+        if not in_form:
+            _problem()
+        form.draw(_read_mapped, _problem if in_form else None)
 
 
-def _previews(files: list[tuple[memoryview, str]]) -> tuple[ColumnPreview, ...]:
-    """Columns of an uploaded table, () where it has none that can be read."""
-    if not files:
-        return ()
-    uploaded = tuple(file.file_id for file in st.session_state["upload_files"])
-    held = st.session_state.get("_previews")
-    if held is None or held[0] != uploaded:
-        try:
-            held = (uploaded, preview_columns(list(files)))
-        except Exception:  # `read_upload` has said why
-            held = (uploaded, ())
-        st.session_state["_previews"] = held
-    previews: tuple[ColumnPreview, ...] = held[1]
-    return previews
+def _problem() -> None:
+    """What was wrong with the last reading, and what may be done about it."""
+    error = st.session_state.get("_upload_error")
+    if error:
+        refuse(error)
+        if chosen_demonstrations() is not None:
+            st.caption("Nothing has changed: the set below is still the one chosen.")
+    lacking = error is not None and _LEFT_OUT in error
+    if uploaded_files() and (lacking or st.session_state.get("upload_missing")):
+        st.toggle(
+            "Leave out the steps that lack a value",
+            key="upload_missing",
+            on_change=_read_again,
+            help="An empty cell, NaN, null or NA among observations, actions and rewards. "
+            "What is left of an episode keeps its number and the numbers of its steps.",
+        )

@@ -150,6 +150,23 @@ def ones_of(column: TableColumn) -> NDArray[np.bool_] | None:
     return ones if bool(np.all(ones | (column.values == 0))) else None
 
 
+def labels_together(names: Sequence[str], columns: Sequence[NDArray[np.bool_]]) -> tuple[str, ...]:
+    """The labels of columns that are one action.
+
+    Args:
+        names: Of the columns.
+        columns: Where each is 1, of shape (N,).
+
+    Returns:
+        What the columns say apart from a beginning that all share; before them a word for none of
+        them, where there are such rows.
+    """
+    words = _words(names)
+    if np.logical_or.reduce(list(columns)).all():
+        return words
+    return (next(word for word in _NONE if word not in words), *words)
+
+
 def _one_of(names: Sequence[str], columns: Sequence[TableColumn]) -> TableColumn:
     """The column of words that says which of several is 1."""
     ones = []
@@ -169,11 +186,10 @@ def _one_of(names: Sequence[str], columns: Sequence[TableColumn]) -> TableColumn
             f"the columns {listed(both)} are both 1 in row {row + 1}, so they are not one action; "
             "map each as an action of its own"
         )
-    words = _words(names)
+    words = labels_together(names, ones)
     codes = np.argmax(ones, axis=0)
-    if not counts.all():
-        nothing = next(word for word in _NONE if word not in words)
-        words, codes = (nothing, *words), np.where(counts > 0, codes + 1, 0)
+    if len(words) > len(names):
+        codes = np.where(counts > 0, codes + 1, 0)
     return replace(columns[0], values=codes.astype(np.int64), words=words)
 
 

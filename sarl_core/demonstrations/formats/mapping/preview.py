@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.formats.column_values import counters, settle
+from sarl_core.demonstrations.fields import TRUTH
+from sarl_core.demonstrations.formats.column_values import counters, numbers_episodes, settle
 from sarl_core.demonstrations.formats.columns import (
+    NO_OBSERVATION,
     ColumnMap,
     Guess,
     UnclearColumnsError,
@@ -20,11 +22,13 @@ from sarl_core.demonstrations.formats.mapping.joined import joined, ones_of
 from sarl_core.demonstrations.formats.mapping.roles import ActionKind, ColumnRole, RoleName, Roles
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.tables import without_times
+from sarl_core.demonstrations.formats.vocabulary import likely_actions
 from sarl_core.demonstrations.requirements import FEW_VALUES, is_whole, without_fraction
 from sarl_core.errors import InputError
 
 _FIRST = 4  # values that are shown of a column
-_NOTHING = "nothing"
+_NOTHING, _TRUTHS = "nothing", "true or false"
+_LONGEST_WHOLE = 1e15  # a greater number is not written digit by digit
 
 
 @dataclass(frozen=True)
@@ -97,13 +101,15 @@ def _readable(table: Table) -> dict[str, TableColumn]:
     """The columns that can be read at all."""
     try:
         return table.read(ColumnMap((), table.names))
-    except InputError:
+    except InputError as error:
         read: dict[str, TableColumn] = {}
         for name in table.names:
             try:
                 read |= table.read(ColumnMap((), (name,)))
             except InputError:
                 continue
+        if not read:
+            raise error
         return read
 
 
@@ -115,6 +121,7 @@ def _settled(guess: Guess, read: Mapping[str, TableColumn]) -> tuple[Guess, dict
     unread = {name: "it cannot be read" for name in guess.columns.used if name not in read}
     guess = replace(guess, unclear=(), unused={**guess.unused, **counted, **unread})
     guess = _without(guess, unread)
+    guess = _with_actions(_with_episodes(guess, read), read)
     guess, held, _ = without_times(guess, read)
     words = {name for name, column in held.items() if column.words}
     while True:
@@ -126,6 +133,63 @@ def _settled(guess: Guess, read: Mapping[str, TableColumn]) -> tuple[Guess, dict
             guess = _without(guess, error.columns)
         except InputError:
             return guess, unclear
+
+
+def _with_episodes(guess: Guess, read: Mapping[str, TableColumn]) -> Guess:
+    """The same with the column that numbers the episodes where none is called so."""
+    columns = guess.columns
+    if {"episode", "first", "last", "terminated", "truncated"} & columns.singles.keys():
+        return guess
+    free = [name for name in columns.observations if name in read and name not in guess.roles]
+    counts = [name for name in free if not read[name].words and numbers_episodes(read[name].values)]
+    if len(counts) != 1:
+        return guess
+    left = _without(guess, counts)
+    why = "no column is called the episode, and this one stays and goes on by one"
+    return replace(
+        left,
+        columns=replace(left.columns, episode=counts[0]),
+        reasons={**left.reasons, counts[0]: why},
+    )
+
+
+def _with_actions(guess: Guess, read: Mapping[str, TableColumn]) -> Guess:
+    """The same with the columns that are likely the actions where none is called so.
+
+    Whoever looks at the guess confirms it; nothing is read by it in silence.
+    """
+    columns = guess.columns
+    if columns.actions:
+        return guess
+    free = [
+        name
+        for name in read
+        if name not in guess.roles
+        and (name in columns.observations or guess.unused.get(name) == NO_OBSERVATION)
+    ]
+    words = [name for name in free if read[name].words and not read[name].is_time]
+    few = [name for name in free if not read[name].words and _is_few(read[name].values)]
+    if actions := likely_actions(free):
+        why = "no column is called an action, and this name may be that of one"
+    elif len(words) == 1:
+        actions, why = words, "no column is called an action, and this one alone holds words"
+    elif not words and len(few) == 1:
+        actions, why = few, "no column is called an action, and this one alone holds few numbers"
+    else:
+        return guess
+    left = _without(guess, actions)
+    return replace(
+        left,
+        columns=replace(left.columns, actions=tuple(actions)),
+        reasons={**left.reasons, **dict.fromkeys(actions, why)},
+        unused={name: why for name, why in left.unused.items() if name not in actions},
+    )
+
+
+def _is_few(values: NDArray[Any]) -> bool:
+    """Whether a column may hold labels: some whole numbers, which do not number the episodes."""
+    different = len(np.unique(values))
+    return is_whole(values) and 2 <= different <= FEW_VALUES and not numbers_episodes(values)
 
 
 def _without(guess: Guess, names: Collection[str]) -> Guess:
@@ -177,9 +241,11 @@ def _kind(column: TableColumn) -> str:
     if not len(values):
         return _NOTHING
     if column.words:
+        if {*map(str.lower, column.words)} <= {*TRUTH}:
+            return _TRUTHS
         return "times" if column.is_time else "words"
     if values.dtype.kind == "b":
-        return "true or false"
+        return _TRUTHS
     return "whole numbers" if without_fraction(values).all() else "numbers"
 
 
@@ -199,4 +265,7 @@ def _first(column: TableColumn) -> tuple[str, ...]:
 def _text(value: bool | float, words: tuple[str, ...]) -> str:
     if words:
         return words[int(value)]
-    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"
+    if isinstance(value, bool):
+        return str(value).lower()
+    whole = float(value).is_integer() and abs(value) < _LONGEST_WHOLE
+    return f"{value:.0f}" if whole else f"{value:.6g}"

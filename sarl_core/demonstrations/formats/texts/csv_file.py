@@ -290,7 +290,7 @@ def open_csv(data: memoryview, *, like: CsvTable | None = None) -> CsvTable:
     data = _as_text(data)
     head = read_head(data, like.delimiter if like is not None else None)
     check_names(head.names)
-    body = data[head.start :]
+    body = _without_comments(data[head.start :], head.comment)
     decimal = like.decimal if like is not None else _decimal(body, head.delimiter)
     return CsvTable(
         head.names, head.named, head.delimiter, decimal, body, head.line, dict(head.units)
@@ -371,6 +371,17 @@ def _as_text(data: memoryview) -> memoryview:
                 f"it is not UTF-8 in line {line} (byte 0x{data[wrong]:02x}); save it as UTF-8"
             ) from None
     return data
+
+
+def _without_comments(body: memoryview, sign: str) -> memoryview:
+    """The rows with nothing in the lines that are comments, so that lines keep their numbers.
+
+    A file with quotation marks stays as it is: a text of several lines may stand between them.
+    """
+    pattern = re.compile(rb"(?m)^[ \t]*" + re.escape(sign.encode()) + rb"[^\r\n]*")
+    if not sign or re.search(rb'"', body) or pattern.search(body) is None:
+        return body
+    return memoryview(pattern.sub(b"", bytes(body)))
 
 
 def _decimal(body: memoryview, delimiter: str) -> str:

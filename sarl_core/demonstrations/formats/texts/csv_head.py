@@ -38,6 +38,7 @@ class CsvHead:
         units: Of columns, as far as a row below the header gives them.
         start: Where the first row begins, in bytes.
         line: Its line, from 1.
+        comment: What the comments before the header begin with, "" where there are none.
     """
 
     names: tuple[str, ...]
@@ -46,6 +47,7 @@ class CsvHead:
     units: Mapping[str, str]
     start: int
     line: int
+    comment: str = ""
 
 
 class _HeadLine(NamedTuple):
@@ -63,7 +65,8 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
 
     Returns:
         Its names, and where its rows begin. Lines of comments (`#`, `%`, `//`), `sep=;` and a row
-        of units are no rows; the last comment is the header where no other line is.
+        of units are no rows; the last comment is the header where no other line is. A line that
+        begins as such a comment is none further down either.
 
     Raises:
         InputError: If there is nothing in it, or its first lines cannot be read.
@@ -80,10 +83,12 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
             )
         delimiter = cast("Delimiter", stated[1])
         line = next(lines, None)
-    comment = ""
+    comment, sign = "", ""
     while line is not None and (marker := _COMMENT.match(line.text)):
-        comment = line.text[marker.end() :].strip()
+        comment, sign = line.text[marker.end() :].strip(), marker[1]
         line = next(lines, None)
+    if sign:
+        lines = (one for one in lines if not one.text.lstrip().startswith(sign))
     if line is None:
         raise InputError(
             "there are no steps, only a header; give at least two observations with their actions"
@@ -92,12 +97,12 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
     first = _fields(line.text, delimiter)
     names = _fields(comment, delimiter)
     if names and len(names) == len(first) and any(map(_is_number, first)):
-        return CsvHead(_with_all_names(names), True, delimiter, {}, line.start, line.number)
+        return CsvHead(_with_all_names(names), True, delimiter, {}, line.start, line.number, sign)
     second, third = next(lines, None), next(lines, None)
     below = _fields(second.text, delimiter) if second is not None else []
     if not _is_header(first, below):
         names = [f"column {number}" for number in range(1, len(first) + 1)]
-        return CsvHead(tuple(names), False, delimiter, {}, line.start, line.number)
+        return CsvHead(tuple(names), False, delimiter, {}, line.start, line.number, sign)
     if second is None:
         raise InputError(
             "there are no steps, only a header; give at least two observations with their actions"
@@ -111,7 +116,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
             if (unit := _unit(text))
         }
         second = third
-    return CsvHead(names_of_all, True, delimiter, units, second.start, second.number)
+    return CsvHead(names_of_all, True, delimiter, units, second.start, second.number, sign)
 
 
 def _lines(data: memoryview) -> Iterator[_HeadLine]:
