@@ -118,12 +118,6 @@ class ColumnMap:
         return {role: name for role, name in named.items() if name is not None}
 
     @property
-    def names(self) -> dict[str, str]:
-        """The names in place of the columns' own, by column."""
-        observed = zip(self.observations, self.feature_names or (), strict=False)
-        return {**dict(observed), **dict(zip(self.actions, self.action_names or (), strict=False))}
-
-    @property
     def used(self) -> tuple[str, ...]:
         """Every column that is named, observations first."""
         return (*self.observations, *self.actions, *self.singles.values())
@@ -522,7 +516,12 @@ def _why_unused(name: str, names: Sequence[str]) -> str | None:
         return IS_TIME
     if vocabulary.BOOKKEEPING.fullmatch(word):
         return "it is no part of a state"
-    roles = (role for role, all_of in vocabulary.ROLES.items() for one in all_of if _is(one, word))
+    roles = (
+        role
+        for role, all_of in vocabulary.ROLES.items()
+        for one in all_of
+        if re.fullmatch(one, word)
+    )
     role = next(roles, None)
     if role is not None and len(word) > 1:
         return f"another column is the {ROLE_WORDS[role]}"
@@ -536,10 +535,6 @@ def _likeliest_action(guess: Guess, names: Sequence[str]) -> str:
     """The column to name in a sentence where no name says that it is the action."""
     others = [name for name in names if name not in guess.columns.singles.values()]
     return (vocabulary.likely_actions(others) or others or list(names))[-1]
-
-
-def _is(pattern: str, word: str) -> bool:
-    return re.fullmatch(pattern, word) is not None
 
 
 def _unclear(name: str) -> bool:

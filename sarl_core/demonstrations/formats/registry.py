@@ -384,10 +384,21 @@ def _read_set(
             )
         return to_demonstrations(opened, description, missing)
     chosen = columns if columns is not None else opened.columns
-    names = opened.columns.names if opened.columns is not None else None
+    names = _names_of(opened.columns)
     recording = recording_from_table(opened.table, chosen, description, names)
     recording = replace(recording, notes=(*opened.notes, *recording.notes))
     return to_demonstrations(recording, description, missing)
+
+
+def _names_of(columns: ColumnMap | None) -> dict[str, str]:
+    """What a data set itself calls its features and actions, by their columns."""
+    if columns is None:
+        return {}
+    features = zip(columns.observations, columns.feature_names or (), strict=False)
+    return {
+        **dict(features),
+        **dict(zip(columns.actions, columns.action_names or (), strict=False)),
+    }
 
 
 def _read_named(
