@@ -18,6 +18,7 @@ from sarl_core.explaining.colours import (
 from sarl_core.explaining.figures.replay import Timeline, Track
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.mining.language import label_text
 
 _ROW_HEIGHT = 84  # pixels, of a feature
@@ -173,14 +174,14 @@ def feature_lines(
             hoverdistance=-1,
         )
     )
-    ticks = np.unique(np.linspace(0, len(values) - 1, min(7, len(values))).round().astype(int))
+    ticks = round_ticks(first, first + len(values) - 1, 7, whole=True)
     figure.update_xaxes(
         title={"text": "step", "standoff": 2},
         anchor="y" if len(features) == 1 else f"y{len(features)}",
         fixedrange=True,
         range=timeline.range,
-        tickvals=ticks,
-        ticktext=[str(first + tick) for tick in ticks.tolist()],
+        tickvals=[tick - first for tick in ticks],
+        ticktext=[tick_text(tick) for tick in ticks],
         zeroline=False,
         automargin=False,
     )
