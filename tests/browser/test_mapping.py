@@ -87,7 +87,7 @@ def test_a_choice_stays_after_an_error_and_is_read_once_it_is_right(screen: Page
     assert chosen(screen, "actions") == ["operator_says", "pressed"]
     expect(screen.get_by_label("Least possible pressed")).to_have_value("100")
 
-    choose(screen, "Step", "pressed")
+    choose(screen, "Step:", "pressed")
     assert chosen(screen, "actions") == ["operator_says"]
     choose(screen, "Reward", "pressed")
     read(screen)
@@ -134,7 +134,7 @@ def test_the_columns_of_a_log_are_said_on_the_page_audit(screen: Page) -> None:
     expect(form.get_by_role("button", name="Save as columns.json")).to_have_count(0)
     expect(screen.get_by_text("There are no actions in the form")).to_be_visible()
     choose(screen, "Actions", "pushed")
-    choose(screen, "Step", "lean")  # which leaves the features, and is no number
+    choose(screen, "Step:", "lean")  # which leaves the features, and is no number
     read(screen)
     expect(screen.get_by_text("which is no number")).to_be_visible()
     choose(screen, "Features", "lean")
