@@ -92,3 +92,12 @@ def test_an_infinite_value_is_left_out_and_counted_beside_what_is_missing() -> N
     )
     with pytest.raises(InputError, match="'obs_x' is infinite in row 2"):
         read("refuse", "obs_x,action\n1,0\ninf,1\n2,1\n")
+
+
+def test_a_column_without_any_value_is_no_feature() -> None:
+    rows = "".join(f"{row / 8},,{row % 2}\n" for row in range(4))
+    demonstrations = read(text=f"wind,comment,action\n{rows}")
+    assert demonstrations.feature_names == ("wind",)
+    assert "the column 'comment' was not used: it is empty" in demonstrations.notes
+    with pytest.raises(InputError, match="in 4 of 4 rows"):  # it is said to be one
+        read(text=f"obs_wind,obs_comment,action\n{rows}")

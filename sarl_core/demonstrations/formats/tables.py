@@ -88,6 +88,7 @@ def recording_from_table(
     read, rows, dropped = _without_empty_ends(table.read(guess.columns), guess.columns)
     guess, read, numbered = without_times(guess, read)
     if guessed:
+        guess = _without_empty_columns(guess, read)
         words = {name for name, column in read.items() if column.words}
         guess = settle(guess, {name: column.values for name, column in read.items()}, words)
     guess, read = with_seconds(guess, read, table.metadata.column_units, rows, certain=not guessed)
@@ -579,6 +580,13 @@ def _without_empty_ends(
     rows = np.flatnonzero(~ends)
     shorter = {name: column.at(rows) for name, column in read.items()}
     return shorter, rows, ("the last row of each episode has no action and was dropped",)
+
+
+def _without_empty_columns(guess: Guess, read: Mapping[str, TableColumn]) -> Guess:
+    """A guess without features that hold nothing, if it is by no name that says they are some."""
+    holes = {name: _empty(read[name]) for name in guess.columns.observations}
+    empty = {name: "it is empty" for name, hole in holes.items() if hole is not None and hole.all()}
+    return guess if guess.prefixed or len(empty) == len(holes) else guess.without(empty)
 
 
 def _empty(column: TableColumn) -> NDArray[np.bool_] | None:
