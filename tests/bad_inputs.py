@@ -365,7 +365,7 @@ BAD_INPUTS: dict[str, tuple[str, bytes, tuple[str, ...]]] = {
         csv_bytes(*ROWS, header=HEADER.replace("y", "ü")).replace(b"\xc3\xbc", b"\xfc"),
         ("not UTF-8", "line 1"),
     ),
-    "UTF-16 csv": ("demo.csv", csv_bytes(*ROWS).decode().encode("utf-16"), ("UTF-16", "UTF-8")),
+    "UTF-32 csv": ("demo.csv", csv_bytes(*ROWS).decode().encode("utf-32"), ("UTF-32", "UTF-8")),
     "binary csv": ("demo.csv", bytes(range(1, 250)) + b"\0" * 9, ("no text",)),
     "open quotation mark csv": ("demo.csv", changed(2, '0,1,"0.25,1.25,1'), ("row 2",)),
     "truncated parquet": ("demo.parquet", parquet_bytes()[:-20], ("cut off",)),

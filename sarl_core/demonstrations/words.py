@@ -5,6 +5,7 @@ The words of a column stand in one order everywhere: that of an ordered category
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from sarl_core.errors import InputError, quoted
 MOST_WORDS = 30
 """Of a feature: each is one more that a person has to tell apart in every rule."""
 _LISTED = 12
+_BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?\d")
 
 
 class Coded(NamedTuple):
@@ -103,6 +105,12 @@ def indicators_of(column: str, words: Sequence[str]) -> tuple[Indicator, ...]:
     Raises:
         InputError: If there are too many words.
     """
+    if len(words) > MOST_WORDS and all(map(_BEGINS_AS_NUMBER.match, words)):
+        raise InputError(
+            f"{quoted(column)} holds {len(words):,} different texts that begin as numbers do, "
+            f"{_listed(words[:3])}; write plain numbers, without units, signs or commas between "
+            "thousands, or leave the column out"
+        )
     if len(words) > MOST_WORDS:
         raise InputError(
             f"{quoted(column)} holds {len(words):,} different words, {_listed(words)}, more than "

@@ -155,3 +155,25 @@ def test_a_comment_further_down_is_none_of_the_rows(sign: str) -> None:
         read_demonstrations(f"x,y,action\n{rows}".encode(), "rig.csv")
     with pytest.raises(InputError, match="row 3"):
         preview_columns(f"x,y,action\n{rows}".encode(), "rig.csv")
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        ("Crane 4, March 2026", ""),
+        ('"Crane 4, March 2026",,,', ",,,"),
+        ("Crane 4", "operator,Ann", "serial,4711"),
+    ],
+)
+def test_a_title_above_the_header_is_no_header(above: tuple[str, ...]):
+    titled = read(*above, NAMES, *ROWS)
+    assert titled.observations.tolist() == read(NAMES, *ROWS).observations.tolist()
+    assert any("lines above the header" in note and "Crane 4" in note for note in titled.notes)
+    with pytest.raises(InputError, match=rf"row 2 \(line {len(above) + 3}\)"):
+        read(*above, NAMES, ROWS[0], "0.25,7,1", *ROWS[2:])
+
+
+def test_a_first_row_with_few_fields_is_no_title():
+    with pytest.raises(InputError, match="no header"):
+        read("1,,,,,", *["1,2,3,4,5,6"] * 3)
+    assert not any("above" in note for note in read(NAMES, *ROWS).notes)

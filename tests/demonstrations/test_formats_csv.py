@@ -46,6 +46,34 @@ def test_decimal_comma() -> None:
         read_demonstrations(csv_bytes("0.5;1;0", "1;0,5;1", header="obs_x;obs_y;action"), "d.csv")
 
 
+def test_decimal_comma_beside_dates_and_sentences_with_points() -> None:
+    rows = [f"2{day}.03.2024;0,{day};crane no. 4.5 of 7;{day % 2}" for day in range(4)]
+    demonstrations = read_demonstrations(
+        csv_bytes(*rows, header="Datum;wind;crane;action"), "demo.csv"
+    )
+    assert demonstrations.observations[:, 0].tolist() == np.float32([0, 0.1, 0.2, 0.3]).tolist()
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_text_in_utf_16_as_spreadsheets_save_it(encoding: str) -> None:
+    text = "Fahrt;Höhe;Aktion\r\n0;0,5;Höher\r\n0;1,5;Senken\r\n"
+    mark = "" if encoding == "utf-16" else "\ufeff"
+    demonstrations = read_demonstrations((mark + text).encode(encoding), "demo.csv")
+    assert demonstrations.feature_names == ("Höhe",)
+    assert demonstrations.observations[:, 0].tolist() == [0.5, 1.5]
+    assert demonstrations.action_dimensions[0].labels == ("Höher", "Senken")
+
+
+@pytest.mark.parametrize("field", ["{:,.1f}", "{:.1f} %", "{:.0f} m/s"])
+def test_numbers_with_something_around_them_are_said_to_be_no_words(field: str) -> None:
+    rows = [f'"{field.format(1000.0 + row)}",{row % 2}' for row in range(40)]
+    with pytest.raises(InputError) as error:
+        read_demonstrations(csv_bytes(*rows, header="load,action"), "demo.csv")
+    said = str(error.value)
+    assert "'load' holds 40 different texts that begin as numbers do" in said
+    assert "write plain numbers" in said
+
+
 def test_delimiter_inside_quoted_names() -> None:
     demonstrations = read_demonstrations(
         b'"obs_a;b","obs_c|""d""",action\n1,2,0\n3,4,1\n', "demo.csv"

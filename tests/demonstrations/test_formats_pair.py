@@ -98,7 +98,7 @@ def test_one_observation_more_than_actions(tmp_path: Path) -> None:
         (b"1;2\n3;x\n4;5\n", ACTIONS, ("obs.csv: column 'column 2' holds 'x' in row 2",)),
         (b"1;2\n3;nan\n4;5\n", ACTIONS, ("obs.csv", "'column 2'", "empty", "row 2")),
         (OBSERVATIONS, b"0\n1\nleft\n", ("actions.csv: column 'column 1' holds 'left' in row 3",)),
-        (b"\xff\xfe1\0", ACTIONS, ("obs.csv: it is text in UTF-16",)),
+        (b"\xff\xfe1", ACTIONS, ("obs.csv: it is damaged text in UTF-16",)),
         (b"PAR1....", ACTIONS, ("obs.csv: it is named .csv, but its content is Parquet",)),
     ],
 )

@@ -109,7 +109,10 @@ def format_of(name: str) -> FileFormat:
     extension = extension_of(name)
     if extension not in FORMATS:
         says = f"ends in {extension!r}" if extension else "has no extension"
-        raise InputError(f"it {says}, which is none of {', '.join(EXTENSIONS)}; convert it")
+        raise InputError(
+            f"it {says}, which is none of {', '.join(EXTENSIONS)}; if it is a table in text, name "
+            "it .csv, else convert it"
+        )
     return FORMATS[extension]
 
 

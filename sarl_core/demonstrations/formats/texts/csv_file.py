@@ -27,12 +27,8 @@ from sarl_core.demonstrations.requirements import without_fraction
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory, table_memory
 
-_BOMS = {
-    codecs.BOM_UTF32_LE: "UTF-32",
-    codecs.BOM_UTF32_BE: "UTF-32",
-    codecs.BOM_UTF16_LE: "UTF-16",
-    codecs.BOM_UTF16_BE: "UTF-16",
-}
+_UTF_32 = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _MOST_DIFFERENT = 1_000  # texts of a column that are kept once each
 _BLOCK = 2**22  # bytes that are looked through at once
 _FEED, _RETURN = b"\n\r"
@@ -57,6 +53,7 @@ class CsvTable:
         body: The file from its first data row on.
         first_line: Line of the first data row, from 1.
         units: Of columns, where a row below the header gives them.
+        title: What stands above the header and is no comment, "" for nothing.
     """
 
     names: tuple[str, ...]
@@ -66,15 +63,20 @@ class CsvTable:
     body: memoryview
     first_line: int
     units: Mapping[str, str] = field(default_factory=dict)
+    title: str = ""
 
     @property
     def metadata(self) -> Metadata:
         """CSV carries units at most."""
-        if not self.units:
-            return Metadata()
-        name, unit = next(iter(self.units.items()))
-        note = f"the row below the header gives units, as {quoted(unit)} for {quoted(name)}"
-        return Metadata(notes=(note,), column_units=self.units)
+        notes: list[str] = []
+        if self.title:
+            notes.append(f"the lines above the header were not read, {quoted(self.title)} first")
+        if self.units:
+            name, unit = next(iter(self.units.items()))
+            notes.append(
+                f"the row below the header gives units, as {quoted(unit)} for {quoted(name)}"
+            )
+        return Metadata(notes=tuple(notes), column_units=self.units)
 
     def read(self, columns: ColumnMap) -> dict[str, TableColumn]:
         """Numbers of the columns that a map uses.
@@ -293,7 +295,14 @@ def open_csv(data: memoryview, *, like: CsvTable | None = None) -> CsvTable:
     body = _without_comments(data[head.start :], head.comment)
     decimal = like.decimal if like is not None else _decimal(body, head.delimiter)
     return CsvTable(
-        head.names, head.named, head.delimiter, decimal, body, head.line, dict(head.units)
+        head.names,
+        head.named,
+        head.delimiter,
+        decimal,
+        body,
+        head.line,
+        dict(head.units),
+        head.title,
     )
 
 
@@ -348,10 +357,16 @@ def _decimals(values: Any) -> Any:
 
 
 def _as_text(data: memoryview) -> memoryview:
-    """The file without its byte order mark, if it is text in UTF-8."""
-    for mark, encoding in _BOMS.items():
-        if bytes(data[: len(mark)]) == mark:
-            raise InputError(f"it is text in {encoding}; save it as UTF-8")
+    """The file in UTF-8 and without its byte order mark; it may have been in UTF-16, as Excel's."""
+    start = bytes(data[:4])
+    if start in _UTF_32:
+        raise InputError("it is text in UTF-32; save it as UTF-8")
+    if start.startswith(_UTF_16):
+        require_memory(4 * len(data))  # as it stands, as text, and in UTF-8
+        try:
+            return memoryview(str(data, "utf-16").encode())
+        except UnicodeDecodeError as error:
+            raise InputError("it is damaged text in UTF-16; save it as UTF-8") from error
     if bytes(data[:3]) == codecs.BOM_UTF8:
         data = data[3:]
     codes = np.frombuffer(data, dtype=np.uint8)
@@ -385,7 +400,18 @@ def _without_comments(body: memoryview, sign: str) -> memoryview:
 
 
 def _decimal(body: memoryview, delimiter: str) -> str:
-    """A comma if there are commas and no points, and the comma does not separate fields."""
+    """A comma if numbers hold commas and none a point, and the comma does not separate fields.
+
+    Points of dates (21.03.2024), versions and sentences say nothing.
+    """
     if delimiter == "," or re.search(rb",", body) is None:
         return "."
-    return "," if re.search(rb"\.", body) is None else "."
+    return "," if re.search(rb"\.", body) is None or not _holds_point(body, delimiter) else "."
+
+
+def _holds_point(body: memoryview, delimiter: str) -> bool:
+    """Whether some field is a number with a decimal point."""
+    sign = re.escape(delimiter.encode())
+    number = rb"[+-]?(?:\d+\.\d*|\.\d+)(?:[eE][+-]?\d+)?"
+    field = rb'(?:^|(?<=[\r\n"]|' + sign + rb")) *" + number + rb' *(?=[\r\n"]|' + sign + rb"|$)"
+    return re.search(field, body) is not None

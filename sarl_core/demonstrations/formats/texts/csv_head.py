@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Literal, NamedTuple, cast
 
 from sarl_core.errors import InputError, quoted
@@ -18,6 +19,8 @@ _STATED = re.compile(r'"?sep=(.)"?', re.I)  # as Excel writes it
 _COMMENT = re.compile(r'\s*"?(#|%|//)')
 _MAX_LINE = 2**24  # characters of a header
 _LONGEST_UNIT = 24
+_AROUND = '",;| \t'  # a title, where a spreadsheet has filled its line
+_LOOKED_AT = 20  # lines below the first, to tell a title from the header
 _NOTHING = frozenset({"", "-", "--", "?", "na", "n/a", "#n/a", "<na>", "nan", "null", "none"})
 # What stands in a row of units where there is none, or in a row of types.
 _NO_UNITS = _NOTHING | frozenset(
@@ -39,6 +42,7 @@ class CsvHead:
         start: Where the first row begins, in bytes.
         line: Its line, from 1.
         comment: What the comments before the header begin with, "" where there are none.
+        title: The first line of what stands above the header and is no comment, "" for nothing.
     """
 
     names: tuple[str, ...]
@@ -48,6 +52,7 @@ class CsvHead:
     start: int
     line: int
     comment: str = ""
+    title: str = ""
 
 
 class _HeadLine(NamedTuple):
@@ -64,9 +69,9 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
         delimiter: Between two fields, where that is known.
 
     Returns:
-        Its names, and where its rows begin. Lines of comments (`#`, `%`, `//`), `sep=;` and a row
-        of units are no rows; the last comment is the header where no other line is. A line that
-        begins as such a comment is none further down either.
+        Its names, and where its rows begin. Lines of comments (`#`, `%`, `//`), `sep=;`, a title
+        and a row of units are no rows; the last comment is the header where no other line is. A
+        line that begins as such a comment is none further down either.
 
     Raises:
         InputError: If there is nothing in it, or its first lines cannot be read.
@@ -93,6 +98,10 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
         raise InputError(
             "there are no steps, only a header; give at least two observations with their actions"
         )
+    ahead = [line, *islice(lines, _LOOKED_AT)]
+    above = _title_lines([one.text for one in ahead], delimiter)
+    title = ahead[0].text.strip(_AROUND) if above else ""
+    line, lines = ahead[above], chain(ahead[above + 1 :], lines)
     delimiter = delimiter or _delimiter(line.text)
     first = _fields(line.text, delimiter)
     names = _fields(comment, delimiter)
@@ -116,7 +125,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
             if (unit := _unit(text))
         }
         second = third
-    return CsvHead(names_of_all, True, delimiter, units, second.start, second.number, sign)
+    return CsvHead(names_of_all, True, delimiter, units, second.start, second.number, sign, title)
 
 
 def _lines(data: memoryview) -> Iterator[_HeadLine]:
@@ -131,6 +140,21 @@ def _lines(data: memoryview) -> Iterator[_HeadLine]:
         if text.strip():
             yield _HeadLine(text, start, number)
         start, number = match.end(), number + 1
+
+
+def _title_lines(texts: Sequence[str], delimiter: Delimiter | None) -> int:
+    """How many of the first lines are a title or facts on the table: the header comes after them.
+
+    They fill at most half as many fields as the header and the last of the lines do.
+    """
+    sign = delimiter or _delimiter(texts[-1])
+    rows = [[field for field in _fields(text, sign) if field.strip()] for text in texts]
+    wide = len(rows[-1])
+    header = next((place for place, row in enumerate(rows) if 2 * len(row) > wide), 0)
+    names = (
+        header + 1 < len(rows) and len(rows[header]) > 2 and not any(map(_is_number, rows[header]))
+    )
+    return header if names else 0
 
 
 def _delimiter(line: str) -> Delimiter:
