@@ -201,9 +201,10 @@ class _Lanes:
         except Exception as error:  # other people's code, which may raise anything
             raise self._broken(lane, "at its reset", error) from error
         if misfit := self.adapter.misfit(observation):
-            raise InputError(
-                f"{self.env_id} gives observations that are not of its space ({misfit}); let it, "
-                "or the wrapper around it, say in observation_space what it gives"
+            raise self._fault(
+                f"{self.env_id} gives an observation that is not of its space ({misfit}) in the "
+                f"episode with seed {self.seeds[lane.episode]}, at its reset; let it, or the "
+                "wrapper around it, say in observation_space what it gives"
             )
         state = self.adapter.flat(observation)
         self.states = np.concatenate([self.states, state[None]])

@@ -33,7 +33,7 @@ _FEWEST = 2  # steps that demonstrations have
 
 
 class RecordingFaultError(InputError):
-    """An agent of the caller's own failed while it was recorded.
+    """The agent or the environment failed, or gave what is no number, while it was recorded.
 
     Attributes:
         recorded: The steps before it.
@@ -69,7 +69,8 @@ def record(
 
     Raises:
         InputError: If a number is out of range or the agent does not fit the environment.
-        RecordingFaultError: If an agent of the caller's own fails after two steps or more.
+        RecordingFaultError: If an agent of the caller's own, or the environment, fails after two
+            steps or more, or an observation or a reward is no finite number.
         CancelledError: If `progress` returned False.
     """
     require_whole("steps", steps, 1)
@@ -91,12 +92,50 @@ def record(
             outcomes += [] if error.played is None else [error.played]
             if (done := sum(int(outcome.lengths.sum()) for outcome in outcomes)) < _FEWEST:
                 raise
+            _require_numbers(env_id, actor.name, seed, outcomes, min(done, steps))
             part = _demonstrations(env_id, actor.name, seed, outcomes, min(done, steps))
             raise RecordingFaultError(str(error), part) from error
         episodes += count
         done += int(outcomes[-1].lengths.sum())
+        _require_numbers(env_id, actor.name, seed, outcomes, min(done, steps))
         report(progress, min(done, steps), steps)
     return _demonstrations(env_id, actor.name, seed, outcomes, steps)
+
+
+def _require_numbers(
+    env_id: EnvironmentOrId, agent: str, seed: int, outcomes: list[EpisodeArrays], steps: int
+) -> None:
+    """Stop at the first of some steps that no demonstrations can hold, and keep those before it."""
+    table = outcomes[-1].steps
+    if table is None:
+        return
+    before = sum(int(outcome.lengths.sum()) for outcome in outcomes[:-1])
+    values = np.column_stack([table.observation, table.reward])[: steps - before]
+    rows, columns = np.nonzero(~np.isfinite(values))
+    if not len(rows):
+        return
+    row, column = int(rows[0]), int(columns[0])
+    names = describe_environment(env_id).feature_names
+    fault = "not a number (NaN)" if np.isnan(values[row, column]) else "infinite"
+    what = f"a reward that is {fault}"
+    if column < len(names):
+        # The player makes what is no observation of the space a row of NaN.
+        whole = len(names) > 1 and np.isnan(values[row, :-1]).all()
+        what = (
+            "what is no observation of its space"
+            if whole
+            else f"an observation {names[column]!r} that is {fault}"
+        )
+    played = sum(len(outcome.lengths) for outcome in outcomes[:-1]) + int(table.episode[row])
+    sentence = (
+        f"{env_id} gives {what} at step {table.step[row]} of the episode with seed "
+        f"{seed + played}; mend it, or put a wrapper around it that does"
+    )
+    if before + row < _FEWEST:
+        raise InputError(sentence)
+    raise RecordingFaultError(
+        sentence, _demonstrations(env_id, agent, seed, outcomes, before + row)
+    )
 
 
 def _demonstrations(

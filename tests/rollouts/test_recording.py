@@ -1,12 +1,14 @@
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
+from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.episodes import rollout
-from sarl_core.rollouts.recording import record
+from sarl_core.rollouts.recording import RecordingFaultError, record
 from sarl_core.rollouts.trial import make_agent
 
 
@@ -117,3 +119,55 @@ def test_progress_and_stopping() -> None:
 def test_numbers_out_of_range_are_named(arguments: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="must be at least"):
         record("CartPole-v1", "novice", **arguments)
+
+
+class BlindAtStep5(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """A sensor that fails at step 5 of the second episode."""
+
+    sight: Any = np.array([0, np.nan, 0, 0], dtype=np.float32)
+    reward = 1.0
+
+    def reset(self, **kwargs: Any) -> Any:
+        self.left = 5 if kwargs["seed"] == 1 else -1
+        return super().reset(**kwargs)
+
+    def step(self, action: Any) -> Any:
+        self.left -= 1
+        observation, _, *rest = super().step(action)
+        blind = self.left == 0
+        return (self.sight if blind else observation, self.reward if blind else 1.0, *rest)
+
+
+class Short(BlindAtStep5):
+    """An observation of another length."""
+
+    sight = np.zeros(3, dtype=np.float32)
+
+
+class Unpaid(BlindAtStep5):
+    """An infinite reward, and nothing wrong with what is seen."""
+
+    sight, reward = np.zeros(4, dtype=np.float32), np.inf
+
+
+@pytest.mark.parametrize(
+    ("wrapper", "step", "fault"),
+    [
+        (BlindAtStep5, 5, r"'feature 1' that is not a number \(NaN\) at step 5 of the episode"),
+        (Short, 5, "what is no observation of its space at step 5 of the episode with seed 1"),
+        (Unpaid, 4, "a reward that is infinite at step 4 of the episode with seed 1"),
+    ],
+)
+def test_what_came_before_a_value_that_is_none_is_kept(
+    wrapper: type, step: int, fault: str
+) -> None:
+    blind = Environment("CartPole-v1", wrappers=(f"{__name__}:{wrapper.__name__}",))
+    with pytest.raises(RecordingFaultError, match=fault) as caught:
+        record(blind, "expert", steps=1_200)
+    recorded = caught.value.recorded
+    assert recorded.episode_lengths.tolist() == [500, step]
+    assert recorded.observations[:500].tobytes() == (
+        record("CartPole-v1", "expert", steps=500).observations.tobytes()
+    )
+    few = record(blind, "expert", steps=500 + step)
+    assert few.observations.tobytes() == recorded.observations.tobytes()
