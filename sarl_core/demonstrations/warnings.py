@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -21,7 +22,8 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
 
     Returns:
         One sentence each: notes from reading, constant or doubled features, features that give
-        the action or the time, labels that never occur, a single action.
+        the action or the time, labels that never occur or are written in two ways, a single
+        action.
     """
     return (
         *demonstrations.notes,
@@ -65,6 +67,10 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
                 "only rule is to do that always"
             )
         elif dimension.kind == "discrete":
+            warnings += _shortened(
+                _alike(dimension.name, dimension.labels),
+                f"labels of action {dimension.name!r} differ from another one only in capitals",
+            )
             counts = np.bincount(dimension.labels_of(column), minlength=len(dimension.labels))
             warnings += _shortened(
                 [
@@ -75,6 +81,20 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
                 f"labels of action {dimension.name!r} never occur",
             )
     return warnings
+
+
+def _alike(action: str, labels: Sequence[str]) -> list[str]:
+    """Labels that a person would take for one another: rules tell them apart."""
+    first: dict[str, str] = {}
+    alike: list[str] = []
+    for label in labels:
+        known = first.setdefault(label.casefold(), label)
+        if known != label:
+            alike.append(
+                f"labels {known!r} and {label!r} of action {action!r} differ only in capitals; if "
+                "they are one action, write them alike"
+            )
+    return alike
 
 
 def _shortened(sentences: list[str], rest: str) -> list[str]:

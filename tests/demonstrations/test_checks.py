@@ -50,6 +50,15 @@ def test_label_that_never_occurs() -> None:
     assert warnings == ("label 'stay' of action 'push' never occurs",)
 
 
+def test_labels_that_differ_only_in_capitals() -> None:
+    names = (("STOP", "hoist", "stop"),)
+    warnings = find_warnings(example(GOOD, [0, 2, 1], label_names=names, action_names=("crane",)))
+    assert warnings == (
+        "labels 'STOP' and 'stop' of action 'crane' differ only in capitals; if they are one "
+        "action, write them alike",
+    )
+
+
 def test_many_labels_that_never_occur_are_counted() -> None:
     names = (tuple(map(str, range(1000))),)
     warnings = find_warnings(example(GOOD, [0, 999, 0], label_names=names))
