@@ -118,3 +118,11 @@ def test_the_first_rows_are_shown_with_the_role(tmp_path: Path) -> None:
         for one in preview_columns(io.BytesIO(table.to_csv(index=False).encode()), "log.csv")
     }
     assert (roles["time"], roles["date"]) == ("time", "ignore")
+
+
+def test_durations_are_amounts_of_seconds():
+    table = {"wait": pd.to_timedelta([1.5, 60, 0.25, 3], unit="s"), "action": [0, 1, 0, 1]}
+    out = io.BytesIO()
+    pd.DataFrame(table).to_parquet(out)
+    read = read_demonstrations(out.getvalue(), "rig.parquet")
+    assert read.observations[:, 0].tolist() == [1.5, 60, 0.25, 3]

@@ -317,6 +317,8 @@ def column_from_arrow(name: str, column: Any, start: int = 0) -> TableColumn:
         column, kind = pc.cast(column, kind.value_type), kind.value_type
     if pa.types.is_decimal(kind):
         column, kind = pc.cast(column, pa.float64()), pa.float64()
+    if pa.types.is_duration(kind):
+        column, kind = _seconds(column), pa.float64()
     if not _is_numeric(kind):
         place = pc.index(pc.is_valid(column), True).as_py()
         if place < 0:
@@ -379,6 +381,15 @@ def _words(name: str, column: Any, *, ordered: bool) -> Coded:
         )
     texts = pc.cast(whole.dictionary, pa.large_string()).to_pylist()
     return in_order(codes, [text or "" for text in texts], ordered=ordered)
+
+
+def _seconds(column: Any) -> Any:
+    """How long durations last."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    microseconds = pc.cast(column, pa.duration("us"), safe=False)
+    return pc.divide(pc.cast(microseconds, pa.int64()), pa.scalar(1e6))
 
 
 def _numbers(column: Any) -> NDArray[Any]:
