@@ -358,10 +358,10 @@ def _decimals(values: Any) -> Any:
 
 def _as_text(data: memoryview) -> memoryview:
     """The file in UTF-8 and without its byte order mark; it may have been in UTF-16, as Excel's."""
-    start = bytes(data[:4])
-    if start in _UTF_32:
+    mark = bytes(data[:4])
+    if mark in _UTF_32:
         raise InputError("it is text in UTF-32; save it as UTF-8")
-    if start.startswith(_UTF_16):
+    if mark.startswith(_UTF_16):
         require_memory(4 * len(data))  # as it stands, as text, and in UTF-8
         try:
             return memoryview(str(data, "utf-16").encode())
