@@ -128,7 +128,7 @@ class OwnAgent:
     def _called(self, function: Callable[..., Any], *values: Any, **named: Any) -> Any:
         try:
             return function(*values, **named)
-        except Exception as error:  # the caller's own code, which may raise anything
+        except (Exception, SystemExit) as error:  # the caller's own code, which may raise anything
             raise AgentFaultError(
                 f"the agent {self.name} raised {reason(error)}; mend it"
             ) from error
@@ -169,7 +169,7 @@ def own_agent(spec: str, env_id: EnvironmentOrId, *, stochastic: bool = False) -
     if inspect.isclass(thing) or (callable(thing) and _makes(thing)):
         try:
             thing = thing()
-        except Exception as error:  # the caller's own code, which may raise anything
+        except (Exception, SystemExit) as error:  # the caller's own code, which may raise anything
             raise InputError(
                 f"the agent {spec} cannot be made ({reason(error)}); mend it, or name what "
                 "needs no arguments"

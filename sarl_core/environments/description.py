@@ -18,7 +18,7 @@ import numpy as np
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import numbered
 from sarl_core.environments.imports import named_object, reason
-from sarl_core.environments.naming import own_names, package_labels, picture_in
+from sarl_core.environments.naming import own_names, package_labels, picture_in, text_in
 from sarl_core.errors import InputError
 from sarl_core.limits import MAX_FEATURES
 
@@ -192,7 +192,7 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
             env: Any = gymnasium.make(
                 f"{module}:{env_id}" if module else env_id, disable_env_checker=True, **parameters
             )
-    except Exception as error:  # other people's code, which may raise anything
+    except (Exception, SystemExit) as error:  # other people's code, which may raise anything
         text = str(error).strip()
         if (unknown := _UNKNOWN.search(text)) and unknown[1] in environment.keywords:
             raise InputError(
@@ -248,7 +248,7 @@ def _wrapped(env: Any, name: str) -> Any:
             )
         try:
             outer = wrapper(env)
-        except Exception as error:  # the caller's code, which may raise anything
+        except (Exception, SystemExit) as error:  # the caller's code, which may raise anything
             raise InputError(
                 f"the wrapper {name!r} cannot be put around the environment ({reason(error)}); "
                 "it is called with the environment alone"
@@ -295,6 +295,11 @@ def _feature_count(env_id: str, space: Any) -> int:
         raise InputError(
             f"{env_id} gives observations {place}, as images do, which rules cannot read; choose "
             "an environment with features, or put a wrapper around it that gives them"
+        )
+    if text_in(space):
+        raise InputError(
+            f"{env_id} gives observations with text in them, whose signs are no features; put a "
+            "wrapper around it that gives numbers, or a Discrete where the words are few"
         )
     try:
         d = int(spaces.utils.flatdim(space))

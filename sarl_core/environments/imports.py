@@ -30,7 +30,7 @@ def named_object(text: str, what: str) -> Any:
         raise InputError(f"{what} {text!r} must be module:name, as my_crane:Crane; write it so")
     try:
         member: Any = importlib.import_module(module)
-    except Exception as error:  # the caller's code, which may raise anything
+    except (Exception, SystemExit) as error:  # the caller's code, which may raise anything
         raise InputError(
             f"{what} {text!r} cannot be imported ({reason(error)}); check the name, and that the "
             "module lies in the folder you call from or is installed"

@@ -213,6 +213,23 @@ def picture_in(space: Any, name: str = "") -> str:
     return ""
 
 
+def text_in(space: Any) -> bool:
+    """Whether a part of a space is text: flattened it is codes of signs, which mean nothing.
+
+    Args:
+        space: An observation space.
+
+    Returns:
+        True also where the text is one of several things that may come.
+    """
+    from gymnasium import spaces
+
+    if isinstance(space, (spaces.Dict, spaces.Tuple, spaces.OneOf)):
+        parts = space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces
+        return any(text_in(part) for part in parts)
+    return isinstance(space, spaces.Text)
+
+
 def _is_picture(space: Any) -> bool:
     shape = tuple(space.shape)
     in_bytes = space.dtype == np.uint8

@@ -279,7 +279,7 @@ def _function_signal(text: str, kind: str) -> _Signal:
             try:
                 # A copy: a function that changes it shall not change the record.
                 value = function(observation.copy(), action, float(reward), bool(terminated), info)
-            except Exception as error:  # the caller's code, which may raise anything
+            except (Exception, SystemExit) as error:  # the caller's code, which may raise anything
                 raise InputError(
                     f"the {kind} {text!r} failed {where(index)} ({reason(error)}); it is called "
                     "with (observation, action, reward, terminated, info)"

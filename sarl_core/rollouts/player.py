@@ -198,7 +198,7 @@ class _Lanes:
             self.agent.begin_episode(int(self.seeds[lane.episode]))
         try:
             observation, _ = lane.env.reset(seed=int(self.seeds[lane.episode]))
-        except Exception as error:  # other people's code, which may raise anything
+        except (Exception, SystemExit) as error:  # other people's code, which may raise anything
             raise self._broken(lane, "at its reset", error) from error
         if misfit := self.adapter.misfit(observation):
             raise self._fault(
@@ -232,7 +232,7 @@ class _Lanes:
             try:
                 observation, reward, terminated, truncated, info = lane.env.step(actions[index])
                 rewards[index] = reward
-            except Exception as error:  # other people's code, which may raise anything
+            except (Exception, SystemExit) as error:  # other people's code, as above
                 where = f"at step {self.lengths[lane.episode]}"
                 raise self._broken(lane, where, error) from error
             following[index] = adapter.flat(observation)
@@ -283,7 +283,7 @@ class _Lanes:
         self.states = following
         return self._end(ended, episodes)
 
-    def _broken(self, lane: _Lane, where: str, error: Exception) -> EpisodeFaultError:
+    def _broken(self, lane: _Lane, where: str, error: BaseException) -> EpisodeFaultError:
         """What to say of an environment that raises in the middle of its work."""
         return self._fault(
             f"{self.env_id} failed in the episode with seed {self.seeds[lane.episode]}, {where} "

@@ -25,6 +25,13 @@ class Fails(gymnasium.Wrapper):
             raise RuntimeError("the cable broke")
         return self.env.step(action)
 
+class Leaves(Fails):
+    def step(self, action):
+        try:
+            return super().step(action)
+        except RuntimeError:
+            raise SystemExit(0)
+
 def tenfold(env):
     return gymnasium.wrappers.TransformReward(env, lambda reward: 10 * reward)
 """
@@ -64,6 +71,21 @@ def test_what_raises_in_an_episode_says_which_and_when(
     said = capsys.readouterr().err
     assert code == 2
     assert "in the episode with seed 11, at step 6 (RuntimeError: the cable broke)" in said
+
+
+def test_what_leaves_the_program_ends_an_episode_and_is_no_success(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    env = ("--env", "CartPole-v1", "--wrapper", "crane_wrappers:Leaves")
+    out = here / "kept.csv"
+    code = main(["record", *env, "--agent", "novice", "--steps", "50", "--out", str(out)])
+    said = capsys.readouterr().err
+    assert code == 2
+    assert "in the episode with seed 0, at step 6 (SystemExit: 0)" in said
+    assert len(load_demonstrations(out)) == 6
+    (here / "leaving.py").write_text("raise SystemExit(0)\n")
+    assert main(["evaluate", "--env", "CartPole-v1", "--agent", "leaving:agent"]) == 2
+    assert "cannot be imported (SystemExit: 0)" in capsys.readouterr().err
 
 
 def test_arguments_without_an_environment_are_refused(

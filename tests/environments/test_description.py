@@ -142,6 +142,8 @@ def test_observations_are_flattened(register: Register) -> None:
     [
         ({"observation_space": spaces.Box(0, 255, (8, 8, 3), np.uint8)}, "images"),
         ({"observation_space": spaces.Sequence(VECTOR)}, "no fixed length"),
+        ({"observation_space": spaces.Text(5)}, "with text in them"),
+        ({"observation_space": spaces.Dict(word=spaces.Text(5), x=VECTOR)}, "with text in them"),
         ({"observation_space": spaces.Box(-1, 1, (9999,))}, "9,999 features"),
         ({"action_space": spaces.Tuple([spaces.Discrete(2)])}, "Tuple"),
         ({"fails": True}, "cannot be made .no licence."),
