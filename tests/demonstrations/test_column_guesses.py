@@ -320,3 +320,10 @@ def test_names_of_any_length_are_read_or_refused_in_a_short_sentence() -> None:
     assert len(read(**{f"obs_{digits[:290]}": noise(0)}, action=LABELS)) == N
     assert len(refusal(**{f"obs_{digits}": noise(0)}, action=LABELS)) < 500
     assert len(refusal(**{digits: noise(0)}, x=noise(1))) < 500
+
+
+@pytest.mark.parametrize("name", ["Trip No.", "run nr.", "Fahrt Nr."])
+def test_a_number_that_is_written_short_is_that_of_an_episode(name: str) -> None:
+    held = read(**{"wind": noise(1), "action": LABELS, name: EPISODES})
+    assert held.feature_names == ("wind",)
+    assert held.episodes.tolist() == EPISODES.tolist()

@@ -78,9 +78,10 @@ _STATES = frozenset({"s", "o", "ob", "obs", "state", "states", "observation", "o
 
 
 def plain(name: str) -> str:
-    """A name without case, unit and separators: "Time Step (ms)" is "time_step"."""
+    """A name without case, unit, separators and a last point: "Time Step (ms)" is "time_step"."""
     text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.strip())
     text = re.sub(r"[ _]*(\[[^\]\d]*\]|\([^)\d]*\))$", "", text) or text
+    text = text.rstrip(".") or text
     return re.sub(r"[ .\-/_]+", "_", text.lower()) if not text.startswith("__") else text.lower()
 
 
