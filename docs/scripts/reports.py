@@ -13,7 +13,8 @@ from sarl_core.rollouts.seeds import FRESH
 from sarl_core.studies.comparison import Arm, compare
 
 ROOT = Path(__file__).resolve().parents[2]
-EPISODES = 100
+EPISODES = {"driving": 300}  # crashes are rare there
+USUAL_EPISODES = 100
 
 
 def sarl(line: str) -> None:
@@ -22,7 +23,7 @@ def sarl(line: str) -> None:
         raise SystemExit(f"failed: {line}")
 
 
-def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
+def comparison(env_id: str, rules: Path, called: str, out: Path, episodes: int) -> None:
     """Novice and expert, each alone and under the rules, on the same seeds."""
     shields = (("no shield", None), (called, RuleSet.load(rules)))
     arms = [
@@ -30,7 +31,7 @@ def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
         for agent in ("novice", "expert")
         for name, rule_set in shields
     ]
-    results = compare(env_id, arms, episodes=EPISODES, seed=FRESH, jobs=os.cpu_count() or 1)
+    results = compare(env_id, arms, episodes=episodes, seed=FRESH, jobs=os.cpu_count() or 1)
     frame = results.to_frame()
     frame.insert(0, "projection", [arm.projection if arm.rules else "" for arm in arms])
     frame.insert(0, "seed", FRESH)
@@ -42,7 +43,8 @@ def comparison(env_id: str, rules: Path, called: str, out: Path) -> None:
 def report(task: str, rules: str, env_id: str, called: str) -> None:
     """One report and its comparison."""
     csv, out = (f"docs/reports/{task}.{suffix}" for suffix in ("csv", "html"))
-    comparison(env_id, Path(rules), called, Path(csv))
+    episodes = EPISODES.get(task, USUAL_EPISODES)
+    comparison(env_id, Path(rules), called, Path(csv), episodes)
     data = f"data/demonstrations/{task}.parquet"
     sarl(f"report {rules} --demonstrations {data} --comparison {csv} --out {out}")
 
@@ -50,6 +52,7 @@ def report(task: str, rules: str, env_id: str, called: str) -> None:
 if __name__ == "__main__":
     os.chdir(ROOT)  # so that the commands in the reports are those of a checkout
     report("lunar_lander", "data/rules/lunar_lander_compact.json", "LunarLander-v3", "compact")
+    report("driving", "data/rules/driving_compact.json", "Driving-v0", "compact")
     filtered = "cartpole_filtered.json"
     try:
         mined = f"mine data/demonstrations/cartpole.parquet --setting filtered --out {filtered}"

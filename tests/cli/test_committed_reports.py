@@ -17,8 +17,9 @@ ROOT = Path(__file__).resolve().parents[2]
 REPORTS = sorted((ROOT / "docs" / "reports").glob("*.html"))
 
 
-def test_there_are_two() -> None:
-    assert [path.name for path in REPORTS] == ["cartpole.html", "lunar_lander.html"]
+def test_there_are_three() -> None:
+    names = [path.name for path in REPORTS]
+    assert names == ["cartpole.html", "driving.html", "lunar_lander.html"]
 
 
 @pytest.mark.parametrize("report", REPORTS, ids=lambda path: path.stem)

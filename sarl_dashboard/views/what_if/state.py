@@ -9,6 +9,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.words import Coded, indicated, spelled, words_of
+from sarl_core.mining.language import counted
 from sarl_core.shielding.sampling import Span, random_state, within
 from sarl_dashboard.jobs.replays import latest
 from sarl_dashboard.text import escaped
@@ -159,7 +160,7 @@ def sliders(situation: Situation) -> NDArray[np.float32]:
         _set(state, situation, index)
     rest = order[FIRST:]
     if rest:
-        with st.expander(f"{len(rest)} more features", icon=":material/unfold_more:"):
+        with st.expander(counted(len(rest), "more feature"), icon=":material/unfold_more:"):
             for index in rest:
                 _set(state, situation, index)
     return state
