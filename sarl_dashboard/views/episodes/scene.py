@@ -14,7 +14,7 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.state.environments import registered
 from sarl_dashboard.text import in_full
 
-_MOST_STEPS = 1_000  # of an episode that is played again while somebody waits
+_MOST_STEPS = 2_000  # of an episode that is played again while somebody waits, 20 s at most
 
 
 def show_scene(demonstrations: Demonstrations, episode: int, step: int) -> None:
