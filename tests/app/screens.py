@@ -14,7 +14,7 @@ from sarl_core.explaining.templates import style_sheet
 ROUTER = Path(__file__).parents[2] / "pages" / "_router.py"
 
 
-def open_page(name: str, **query: str) -> AppTest:
+def open_page(name: str, **query: str | list[str]) -> AppTest:
     """Run a page as a visitor with this URL would see it first."""
     app = AppTest.from_file(ROUTER, default_timeout=120)
     for key, value in query.items():

@@ -69,14 +69,14 @@ def in_force(app: AppTest) -> bool:
 def test_the_compact_rules_are_a_click_away_and_counted_here(compact: RuleSet) -> None:
     app = open_page("thresholds", data="cartpole")
     assert not in_force(app)
-    assert "display: none" not in html(app)
+    assert "--mark-ring: none" not in html(app)
     app.button(key="compact").click().run()
     assert not app.exception
     assert metrics(app) == numbers(counted_here(compact))
     assert metrics(app)["Coverage"] == "100 %"
     assert app.query_params["set"] == "compact"
     assert in_force(app)
-    assert "display: none" in html(app)
+    assert "--mark-ring: none" in html(app)
     assert "no cell is marked" in texts(app)
     table = app.dataframe[0].value
     assert len(table) == len(compact)
@@ -120,7 +120,7 @@ def test_whatever_moves_the_thresholds_goes_back_to_them(
     assert metrics(app) == numbers(mine_rules(CARTPOLE, **settings))  # type: ignore[arg-type]
     assert not in_force(app)
     assert "set" not in app.query_params
-    assert "display: none" not in html(app)
+    assert "--mark-ring: none" not in html(app)
 
 
 def test_a_jump_goes_back_to_the_thresholds(compact: RuleSet) -> None:

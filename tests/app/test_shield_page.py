@@ -178,12 +178,16 @@ def test_what_cannot_be_run_is_said_before_it_is_asked_for(
 @pytest.mark.parametrize(
     ("query", "fragment", "left"),
     [
-        ({"env": "MountainCar-v0", "shields": "no shield"}, "no shipped expert", ["novice"]),
+        (
+            {"env": "MountainCar-v0", "shields": "no shield", "agents": ["novice", "expert"]},
+            "no shipped expert",
+            ["novice"],
+        ),
         ({"env": "Pendulum-v1", "agents": "novice"}, "rules", ["novice"]),
     ],
 )
 def test_what_fails_leaves_the_other_rows(
-    query: dict[str, str], fragment: str, left: list[str]
+    query: dict[str, Any], fragment: str, left: list[str]
 ) -> None:
     app = run(open_page("shield", **{"data": "cartpole", "episodes": "2", **query}))
     (sentence,) = errors(app)

@@ -74,7 +74,7 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
         slider.press("ArrowLeft")
     expect(screen.get_by_text("Compact rules in force")).to_have_count(0)
     settle(screen)
-    assert "set" not in parameters(screen)
+    screen.wait_for_url(lambda url: "set=" not in url)
     assert screen.evaluate(ring) != "none"
     assert metric(screen, "Rules") not in (filtered, str(len(rules)))
     # A click on a map does the same.
