@@ -10,6 +10,7 @@ import numpy as np
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.giveaways import find_giveaways
+from sarl_core.demonstrations.words import begin_as_numbers, columns_of_words, words_of
 
 _MOST_WARNINGS = 5  # of one kind; the rest is counted
 
@@ -28,6 +29,7 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
     return (
         *demonstrations.notes,
         *_feature_warnings(demonstrations),
+        *_shortened(_amounts(demonstrations), "columns of words may hold amounts"),
         *_shortened(find_giveaways(demonstrations), "features tell what they should not"),
         *_action_warnings(demonstrations),
     )
@@ -54,6 +56,21 @@ def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
     return [
         *_shortened(constant, "features never change"),
         *_shortened(doubled, "features repeat another one"),
+    ]
+
+
+def _amounts(demonstrations: Demonstrations) -> list[str]:
+    """Columns of words that a person may have meant as numbers."""
+    indicators = demonstrations.indicators or ()
+    columns = {
+        column: words_of([one for place in places if (one := indicators[place]) is not None])
+        for column, places in columns_of_words(indicators).items()
+    }
+    return [
+        f"the words of {column!r} begin as numbers do, as {words[0]!r}; if they are amounts, write "
+        "plain numbers, without units and signs"
+        for column, words in columns.items()
+        if begin_as_numbers(words)
     ]
 
 

@@ -105,7 +105,7 @@ def indicators_of(column: str, words: Sequence[str]) -> tuple[Indicator, ...]:
     Raises:
         InputError: If there are too many words.
     """
-    if len(words) > MOST_WORDS and all(map(_BEGINS_AS_NUMBER.match, words)):
+    if len(words) > MOST_WORDS and begin_as_numbers(words):
         raise InputError(
             f"{quoted(column)} holds {len(words):,} different texts that begin as numbers do, "
             f"{_listed(words[:3])}; write plain numbers, without units, signs or commas between "
@@ -121,6 +121,11 @@ def indicators_of(column: str, words: Sequence[str]) -> tuple[Indicator, ...]:
         value, otherwise = words[::-1] if tuple(words) == TRUTH else words
         return (Indicator(column, value, otherwise),)
     return tuple(Indicator(column, word) for word in words)
+
+
+def begin_as_numbers(words: Sequence[str]) -> bool:
+    """Whether words may be amounts that something stands around: "10 %", "1,200", "3 m/s"."""
+    return all(map(_BEGINS_AS_NUMBER.match, words))
 
 
 def indicated(coded: Coded, indicators: Sequence[Indicator]) -> NDArray[np.float32]:

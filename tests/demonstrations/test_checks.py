@@ -87,3 +87,12 @@ def test_notes_from_reading_come_first() -> None:
     warnings = find_warnings(demonstrations)
     assert "no episode column" in warnings[0]
     assert "'y' has the same value" in warnings[1]
+
+
+def test_words_that_begin_as_numbers_are_warned_of() -> None:
+    rows = [f"{row / 8},{10 * (row % 3)} %,crane {row % 3},{row % 2}" for row in range(12)]
+    content = csv_bytes(*rows, header="wind,throttle,crane,action")
+    warnings = find_warnings(read_demonstrations(content, "demo.csv"))
+    amounts = [warning for warning in warnings if "begin as numbers do" in warning]
+    assert len(amounts) == 1
+    assert amounts[0].startswith("the words of 'throttle' begin as numbers do, as '0 %'; if they")
