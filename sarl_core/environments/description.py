@@ -200,12 +200,18 @@ def make_environment(environment: EnvironmentOrId, *, render_mode: str | None = 
                 "(--env-args)"
             ) from error
         because = text.splitlines()[0] if text else type(error).__name__
-        lacking = isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled))
-        if lacking and ":" not in env_id:  # else it may be the named module that does not exist
+        if isinstance(error, (ImportError, gymnasium.error.DependencyNotInstalled)):
+            # Gymnasium's advice to the author of a module is none for who names it.
+            because = because.partition(". Environment registration via")[0].rstrip(".")
+            if ":" in env_id:  # it may be the named module that does not exist
+                raise InputError(
+                    f"the environment {env_id!r} cannot be made ({because}); install that module, "
+                    "or call from the folder it lies in"
+                ) from error
             how = "pip install 'sarl-explorer[driving]'" if module else "install it"
             raise InputError(
                 f"the environment {env_id!r} needs a package that is not installed "
-                f"({because.rstrip('.')}); {how}, or choose another environment"
+                f"({because}); {how}, or choose another environment"
             ) from error
         raise InputError(
             f"the environment {env_id!r} cannot be made"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -8,7 +9,11 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.description import (
+    OWN_MODULES,
+    describe_environment,
+    make_environment,
+)
 from sarl_core.errors import InputError
 from sarl_core.rollouts.episodes import rollout
 
@@ -191,3 +196,21 @@ def test_a_package_that_is_missing_is_named(error: Exception) -> None:
         make_environment("test/Lacking-v0")
     gymnasium.registry.pop("test/Lacking-v0")
     assert "engine" in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "advice"),
+    [
+        ("Driving-v0", "pip install 'sarl-explorer[driving]', or choose another environment"),
+        ("highway_env:highway-fast-v0", "install that module, or call from the folder it lies in"),
+    ],
+)
+def test_a_simulator_that_is_missing_is_said_in_one_sentence(
+    env_id: str, advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "highway_env", None)
+    monkeypatch.delitem(sys.modules, OWN_MODULES["Driving-v0"], raising=False)
+    with pytest.raises(InputError, match="highway_env") as error:
+        make_environment(env_id)
+    assert str(error.value).endswith(advice)
+    assert ". " not in str(error.value)
