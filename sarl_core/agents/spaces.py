@@ -37,6 +37,11 @@ class SpaceAdapter:
     is_discrete: bool
     is_vector: bool
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether actions are amounts in whole numbers, of which `native` cuts the rest off."""
+        return not self.is_discrete and np.issubdtype(self.action_space.dtype, np.integer)
+
     def misfit(self, observation: Any) -> str:
         """How many numbers an observation has, where it is of another space.
 

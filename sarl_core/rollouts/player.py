@@ -224,6 +224,9 @@ class _Lanes:
             if adapter.action_shape == () and adapter.is_discrete
             else [adapter.native(action) for action in executed]
         )
+        if adapter.is_whole:  # what is written down is what the environment was given
+            whole: Any = np.array(actions).astype(choice.executed.dtype)
+            choice = choice._replace(executed=adapter.columns(whole))
         following = np.empty_like(states)
         rewards, ends = np.empty(len(states)), np.zeros(len(states), dtype=np.bool_)
         infos: list[dict[str, Any]] = []

@@ -1,3 +1,4 @@
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -171,3 +172,31 @@ def test_what_came_before_a_value_that_is_none_is_kept(
     )
     few = record(blind, "expert", steps=500 + step)
     assert few.observations.tobytes() == recorded.observations.tobytes()
+
+
+class Crates(gymnasium.Env[Any, Any]):
+    """Takes whole crates, and remembers how many."""
+
+    observation_space = gymnasium.spaces.Box(0, 100, (1,), np.float32)
+    action_space = gymnasium.spaces.Box(0, 9, (2,), np.int64)
+
+    def __init__(self, taken: list[list[int]]) -> None:
+        self.taken = taken
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        super().reset(seed=seed)
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        assert action.dtype == np.int64
+        self.taken.append(action.tolist())
+        return np.ones(1, np.float32), 0.0, False, False, {}
+
+
+def test_amounts_in_whole_numbers_are_recorded_as_the_environment_took_them() -> None:
+    taken: list[list[int]] = []
+    gymnasium.register("Crates-v0", partial(Crates, taken), max_episode_steps=20)
+    demos = record("Crates-v0", "novice", steps=20)
+    gymnasium.registry.pop("Crates-v0")
+    assert demos.actions.tolist() == taken
+    assert len(np.unique(demos.actions)) > 5
