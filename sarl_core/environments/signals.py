@@ -295,7 +295,8 @@ def _number(value: Any, kind: str, what: str, where: _Where, index: int) -> floa
     try:
         if isinstance(value, str):
             raise TypeError
-        number = float(value)
+        # An array of one number is that number, as environments of several agents give it.
+        number = float(value.item() if isinstance(value, np.ndarray) else value)
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{what} is {quoted(value)} {where(index)}; a {kind} is "

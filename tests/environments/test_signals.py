@@ -30,6 +30,7 @@ class Ramp(gymnasium.Env[Any, Any]):
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         self.steps += 1
         info: dict[str, Any] = {"hot": self.steps == 3, "heat": 0.5, "word": "high"}
+        info |= {"boxed": np.array([[0.5]]), "two": np.ones(2)}
         if self.steps > 5:
             info["late"] = True
         return self._observation(), 1.0, self.steps == 4 + self.seed, False, info
@@ -65,6 +66,7 @@ def test_a_failure_is_true_at_some_step_and_ends_nothing(failure: str) -> None:
     ("cost", "sums"),
     [
         ("heat", [2.0, 2.5, 3.0]),
+        ("boxed", [2.0, 2.5, 3.0]),
         ("hot", [1.0, 1.0, 1.0]),
         ("feature 0 >= 2", [3.0, 4.0, 5.0]),
         ("feature 0 / 2", [5.0, 7.5, 10.5]),
@@ -114,9 +116,14 @@ def test_what_cannot_be_said_of_a_step_stays_open() -> None:
 @pytest.mark.parametrize(
     ("failure", "cost", "says"),
     [
-        ("hott", "", "no step of the episode with seed 0 has 'hott' in its info, which holds heat"),
+        (
+            "hott",
+            "",
+            "no step of the episode with seed 0 has 'hott' in its info, which holds boxed",
+        ),
         ("late", "", "no step of the episode with seed 0 has 'late'"),
         ("word", "", r"info\['word'\] is 'high' at step 0 of the episode with seed 0"),
+        ("", "two", r"info\['two'\] is .* at step 0 .* a cost is a number"),
         (f"{__name__}:broken", "", "at step 0 of the episode with seed 0 .*no lamp"),
         (f"{__name__}:nothing", "", "has no nothing"),
         (f"{__name__}:TOY", "", "cannot be called"),
