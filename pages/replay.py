@@ -23,7 +23,7 @@ current_order = replay_bar(settings())
 jump = arrived()
 played = latest()
 if played is None:
-    if not REPLAY.at_work:
+    if current_order is not None and not REPLAY.at_work:
         st.info(
             "Choose an agent and the rules, then press Run. What rules do shows best with the "
             "novice, which acts at random, and the unfiltered rules; those at the paper's filtered "

@@ -45,8 +45,7 @@ def read_table(study: Study, path: Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        content = io.BytesIO(limited_bytes(path))
-        frame = pd.read_csv(content, float_precision="round_trip")  # else pandas 2 is near it only
+        frame = pd.read_csv(io.BytesIO(limited_bytes(path)))
         missing = [column for column in study.columns if column not in frame.columns]
         if missing:
             raise ValueError(f"it has no column {missing[0]!r}")

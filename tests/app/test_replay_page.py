@@ -158,6 +158,12 @@ def test_what_cannot_be_run_is_said_in_a_sentence(query: dict[str, str], fragmen
     assert "\n" not in sentence
 
 
+def test_where_nothing_can_be_run_nobody_is_told_to_press_run() -> None:
+    app = open_page("replay", data="cartpole", env="Nowhere-v9")
+    assert errors(app)
+    assert "press Run" not in texts(app)
+
+
 def test_an_error_leaves_the_replay_that_was_there() -> None:
     app = run(open_page("replay", data="cartpole"))
     before = metrics(app)

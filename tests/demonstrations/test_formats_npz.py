@@ -138,6 +138,11 @@ def test_floats_are_continuous() -> None:
         ({"actions": np.zeros((5, 0))}, "no steps"),
         ({"observations": np.zeros((5, 0))}, "no steps"),
         ({"observations": np.zeros(5, complex)}, "no numbers"),
+        ({"observations": np.zeros((5, 4, 2))}, "as images"),
+        (
+            {"observations": np.zeros((5, 4, 2)), "actions": np.zeros((5, 4))},
+            "episodes side by side, of shape 5x4x2",
+        ),
     ],
 )
 def test_bad_layouts(arrays: dict[str, Any], fragment: str) -> None:

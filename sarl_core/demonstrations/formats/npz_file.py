@@ -100,6 +100,12 @@ def recording_of_arrays(
     observations, actions = arrays["observations"], arrays["actions"]
     if observations.ndim == 1:
         observations = observations[:, None]
+    if observations.ndim == 3 and actions.shape[:2] == observations.shape[:2]:
+        raise InputError(
+            f"the observations under {keys['observations']!r} are episodes side by side, of shape "
+            f"{'x'.join(map(str, observations.shape))}; put all steps one below the other, (steps, "
+            "features), and give the number of each step's episode under 'episodes'"
+        )
     if observations.ndim != 2:
         shape = "x".join(map(str, observations.shape[1:]))
         raise InputError(
