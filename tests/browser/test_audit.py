@@ -23,7 +23,7 @@ def test_a_break_leads_to_its_rule_and_to_what_if(screen: Page) -> None:
     settle(screen)
     assert {"x0", "x1", "x2", "x3"} & set(parameters(screen))
     no_trace(screen)
-    screen.go_back()
+    screen.get_by_role("link", name="Audit", exact=True).click()
     expect(screen.get_by_role("heading", name="Audit", level=1)).to_be_visible()
     settle(screen)
     screen.locator("input[type=file]").first.set_input_files(LOG)
