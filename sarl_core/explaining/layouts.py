@@ -6,6 +6,15 @@ from typing import Any
 
 _ROOM = {"l": 8, "r": 8, "t": 8, "b": 8}
 
+LEGEND_ABOVE = {
+    "orientation": "h",
+    "x": 0,
+    "y": 1.02,
+    "xanchor": "left",
+    "yanchor": "bottom",
+    "itemwidth": 30,
+}
+
 
 def figure_layout(
     height: int, *, margin: dict[str, Any] | None = None, **more: Any

@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import LABEL_COLOURS, faded
-from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.layouts import LEGEND_ABOVE, figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import at_least_text
 from sarl_core.rollouts.episodes import Episodes
@@ -118,14 +118,7 @@ def returns_figure(
     figure.update_layout(
         **figure_layout(height, margin={"r": 24}),
         showlegend=True,
-        legend={
-            "orientation": "h",
-            "x": 0,
-            "y": 1.02,
-            "xanchor": "left",
-            "yanchor": "bottom",
-            "itemwidth": 30,
-        },
+        legend=LEGEND_ABOVE,
     )
     figure.update_xaxes(
         title={"text": "episode", "standoff": 2},

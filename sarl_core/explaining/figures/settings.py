@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.figures.comparison import arm_style
 from sarl_core.explaining.figures.share_axis import share_ticks
-from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.layouts import LEGEND_ABOVE, figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.mining.language import share_text
 
@@ -69,14 +69,7 @@ def settings_figure(
         **figure_layout(
             90 + _ROW_HEIGHT * len(names),
             margin={"r": 24},
-            legend={
-                "orientation": "h",
-                "x": 0,
-                "y": 1.02,
-                "xanchor": "left",
-                "yanchor": "bottom",
-                "itemwidth": 30,
-            },
+            legend=LEGEND_ABOVE,
         )
     )
     axis = (
