@@ -10,7 +10,13 @@ import streamlit as st
 from sarl_core.explaining.templates import style_sheet
 from sarl_dashboard.components.sidebar import sidebar
 from sarl_dashboard.session import settle
-from sarl_dashboard.state.url import absurd_parameters, say_left_out, show_left_out, without
+from sarl_dashboard.state.url import (
+    absurd_parameters,
+    begin_run,
+    say_left_out,
+    show_left_out,
+    without,
+)
 
 st.set_page_config(
     page_title="SARL Explorer",
@@ -123,6 +129,7 @@ page = st.navigation([*PAGES, *aliases], expanded=True)
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
     st.switch_page(meant, query_params=st.query_params.to_dict())
+begin_run(page.title)
 if absurd := absurd_parameters():
     # Widgets take their values from the address before anything here could mend them.
     say_left_out(absurd, page.title)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 
 import streamlit as st
+from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_dashboard.text import escaped
 
@@ -38,6 +39,8 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
         The default, or a valid text.
     """
     value = st.query_params.get(name)
+    if value is not None and _is_late(name, value):
+        value = None  # the browser had not heard of the choice when it asked for this run
     if value is None or not valid(value):  # a change of page takes the parameters away
         value = str(st.session_state.get(f"_{name}", default))
     if not valid(value):
@@ -55,11 +58,38 @@ def set_url_choice(name: str, value: str, default: str = "") -> None:
         default: Value that needs no place in the URL.
     """
     st.session_state[f"_{name}"] = value
+    before = st.query_params.get(name)
+    left = st.session_state.setdefault("_values_left", {})
+    if left.get(name) == value:
+        del left[name]
+    if before not in (None, value):
+        left[name] = before
     if value != default:
-        if st.query_params.get(name) != value:
+        if before != value:
             st.query_params[name] = value
-    elif name in st.query_params:
+    elif before is not None:
         del st.query_params[name]
+
+
+def _is_late(name: str, value: str) -> bool:
+    """Whether a value of the URL is the one that a choice on this page has just replaced.
+
+    A browser that is asked for two runs in a row writes the old value into the second request. It
+    comes back by being chosen, by a link from another page, or by the browser's "back".
+    """
+    return bool(st.session_state.get("_values_left", {}).get(name) == value)
+
+
+def begin_run(page: str) -> None:
+    """Let a URL that brings another page, or that "back" brings, say every value anew.
+
+    Args:
+        page: Title of the page that runs.
+    """
+    context = get_script_run_ctx()
+    if st.session_state.get("_page") != page or (context and context.is_history_navigation):
+        st.session_state["_page"] = page
+        st.session_state.pop("_values_left", None)
 
 
 def absurd_parameters() -> tuple[str, ...]:

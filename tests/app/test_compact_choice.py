@@ -234,3 +234,27 @@ def test_compact_rules_are_replayed_where_there_are_some(compact: RuleSet) -> No
     assert f"{len(compact):,} rules (compact)" in texts(app)
     assert metrics(app)["Covered"] == "100 %"
     assert "compact" not in open_page("replay", data="pendulum").selectbox(key="rules").options
+
+
+def test_a_browser_that_has_not_heard_of_a_choice_does_not_undo_it(compact: RuleSet) -> None:
+    app = open_page("thresholds", data="cartpole", set="compact")
+    assert "Compact rules" in texts(app)
+    app.select_slider(key="confidence").set_value(0.8).run()
+    assert "Compact rules" not in texts(app)
+    # Asked for before the answer to the first move arrived, so with the address from before it.
+    app.query_params["set"] = "compact"
+    app.select_slider(key="confidence").set_value(0.9).run()
+    assert "Compact rules" not in texts(app)
+    assert "set" not in app.query_params
+    # Chosen once more, they are in force, and a late address does not take them away either.
+    app.button(key="compact").click().run()
+    assert app.query_params["set"] == "compact"
+    del app.query_params["set"]
+    app.run()
+    assert "Compact rules" in texts(app)
+    # A link from another page means what it says.
+    app.select_slider(key="confidence").set_value(0.8).run()
+    app.switch_page("rules.py").run()
+    app.query_params["set"] = "compact"
+    app.switch_page("thresholds.py").run()
+    assert "Compact rules" in texts(app)
