@@ -125,6 +125,8 @@ def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):
     commands = (tmp_path / "reference" / "commands.html").read_text(encoding="utf-8")
     assert "--lower-bound" in commands
     assert 'id="train-expert"' in commands
+    assert "one of refuse, drop; default: refuse" in commands
+    assert "--stop-with-input" not in commands  # for the dashboard alone
     reference = (tmp_path / "reference" / "python.html").read_text(encoding="utf-8")
     assert "supp_min" in reference
 

@@ -25,7 +25,10 @@ def commands_page() -> str:
 def _section(name: str, command: Any) -> str:
     what = command.help.replace("python -m sarl_core", "sarl")
     head = "| takes | | |\n| --- | --- | --- |"
-    return f"## {name}\n\n{what}\n\n{head}\n" + "\n".join(map(_row, command.params))
+    rows = (
+        _row(parameter) for parameter in command.params if not getattr(parameter, "hidden", False)
+    )
+    return f"## {name}\n\n{what}\n\n{head}\n" + "\n".join(rows)
 
 
 def _row(parameter: Any) -> str:
@@ -33,8 +36,13 @@ def _row(parameter: Any) -> str:
     if parameter.metavar:
         names = f"{names} {parameter.metavar}" if names.startswith("-") else parameter.metavar
     default = parameter.show_default if isinstance(parameter.show_default, str) else None
-    if default is None and parameter.show_default and isinstance(parameter.default, (int, float)):
+    if default is None and parameter.show_default and parameter.default is not None:
         default = None if isinstance(parameter.default, bool) else str(parameter.default)
-    notes = "needed" if parameter.required else f"default: {default}" if default else ""
-    cells = (f"`{names}`", parameter.help or "", notes)
+    values = parameter.type_descriptor
+    notes = [
+        "needed" if parameter.required else "",
+        "one of " + ", ".join(values.choices) if values.is_choice else "",
+        f"default: {default}" if default else "",
+    ]
+    cells = (f"`{names}`", parameter.help or "", "; ".join(filter(None, notes)))
     return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |"

@@ -1,6 +1,7 @@
 """Makes the pictures of the guide from the product itself: `python -m docs.scripts.pictures`.
 
-The GIF comes from the command line; the screenshots from a dashboard started for them.
+The GIFs and the crane's pictures come from the command line; the screenshots from a dashboard
+started for them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import urllib.request
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -32,9 +33,15 @@ SCREENS = {
 }
 
 
-def sarl(*arguments: str) -> None:
-    """Run a command of the product."""
-    subprocess.run([sys.executable, "-m", "sarl_core", *arguments], cwd=ROOT, check=True)
+def sarl(*arguments: str, folder: Path = ROOT) -> None:
+    """Run a command of the product in a folder."""
+    python(folder, "-m", "sarl_core", *arguments)
+
+
+def python(folder: Path, *arguments: str) -> None:
+    """Run Python in a folder, with the product where it looks for modules."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, *arguments], cwd=folder, env=environment, check=True)
 
 
 def render(env_id: str, rules: str, out: Path, *options: str, seed: int = 100_000) -> None:
@@ -88,6 +95,25 @@ def walker() -> None:
     )
 
 
+def crane() -> None:
+    """The pictures of the first walk: the threshold plane, and the head of the audit."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        python(folder, str(ROOT / "examples" / "crane.py"))
+        thresholds = ("--support", "0.005", "--confidence", "0.95")
+        sarl("landscape", "crane.csv", "--out", "plane.png", folder=folder)
+        sarl("mine", "crane.csv", *thresholds, "--out", "crane_rules.json", folder=folder)
+        sarl("audit", "crane_rules.json", "crane_night_shift.csv", "--out", ".", folder=folder)
+        with Image.open(folder / "plane.png") as plane:
+            plane.convert("RGB").quantize(64).save(PICTURES / "crane_thresholds.png", optimize=True)
+        with sync_playwright() as playwright:
+            browser = _chromium(playwright)
+            page = browser.new_page(viewport={"width": 1000, "height": 760})
+            page.goto((folder / "audit.html").as_uri())
+            page.screenshot(path=PICTURES / "crane_audit.png")
+            browser.close()
+
+
 def screenshots() -> None:
     """Every screen of `SCREENS`."""
     with socket.socket() as free:
@@ -101,9 +127,7 @@ def screenshots() -> None:
     )
     try:
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(
-                executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
-            )
+            browser = _chromium(playwright)
             _wait(f"http://127.0.0.1:{port}/_stcore/health", browser.new_page())
             for name, (path, scheme, words) in SCREENS.items():
                 context = browser.new_context(
@@ -121,6 +145,12 @@ def screenshots() -> None:
         server.wait(30)
 
 
+def _chromium(playwright: Playwright) -> Browser:
+    return playwright.chromium.launch(
+        executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
+    )
+
+
 def _wait(address: str, page: Page) -> None:
     for _ in range(300):
         try:
@@ -135,4 +165,5 @@ if __name__ == "__main__":
     replay()
     driving()
     walker()
+    crane()
     screenshots()
