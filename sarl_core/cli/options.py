@@ -179,8 +179,8 @@ _ColumnsFile = Annotated[
         "--columns",
         metavar="COLUMNS.json",
         show_default=False,
-        help="Which column of the file is what, as `check FILE --suggest-columns` writes "
-        "it for you to edit.",
+        help="Which column of the file is what, as `check FILE --suggest-columns COLUMNS.json` "
+        "writes it for you to edit.",
     ),
 ]
 _ColumnRoles = Annotated[

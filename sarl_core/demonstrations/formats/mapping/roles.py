@@ -221,10 +221,11 @@ def load_roles(path: Path) -> dict[str, ColumnRole]:
     Raises:
         InputError: If it is no such file, or leaves open what a column is.
     """
-    advice = "write one with `check FILE --suggest-columns` and edit it"
+    advice = "write one with `check FILE --suggest-columns COLUMNS.json` and edit it"
+    document = read_object(path, advice)
     roles: dict[str, ColumnRole] = {}
     try:
-        for name, value in conformed(read_object(path, advice), _File).columns.items():
+        for name, value in conformed(document, _File).columns.items():
             try:
                 if isinstance(value, str) and value != UNCLEAR:
                     roles[name] = role_from_text(value)
