@@ -14,7 +14,7 @@ _EXAMPLE = "'{\"g\": 3.7}'"
 
 @dataclass(frozen=True)
 class Environment:
-    """An environment as a caller means it; where an id alone is meant, a text does.
+    """An environment with its arguments and wrappers; where an id alone is meant, a text does.
 
     It names code to import, so it comes from a command line, from Python, or from the list of
     whoever runs a server, and never from a file or a link. It is small and goes to other

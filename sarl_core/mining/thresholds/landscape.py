@@ -56,7 +56,7 @@ class Rectangles(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Landscape:
-    """Sums over the rule set, for every pair of thresholds of a grid.
+    """Rule count, length, coverage and fidelity for every pair of thresholds of a grid.
 
     All layers have the shape (supports, confidences).
 
