@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -89,6 +90,74 @@ def test_episodes_in_groups_are_read_in_their_natural_order(more: int) -> None:
     assert any("'camera'" in note for note in read.notes)
 
 
+WORDS = [("brake", "accelerate", "coast\u00e4")[index % 3] for index in range(N)]
+
+
+@pytest.mark.parametrize("kind", [h5py.string_dtype(), h5py.string_dtype(length=12), "S12"])
+@pytest.mark.parametrize("shape", [(N,), (N, 1)])
+def test_actions_that_are_texts_are_labels_by_those_names(kind: Any, shape: tuple[int]) -> None:
+    def fill(file: Any) -> None:
+        d4rl(file)
+        del file["actions"]
+        words = np.array([word.encode() for word in WORDS], dtype="S12").astype(kind)
+        file.create_dataset("actions", data=words.reshape(shape), chunks=True, compression="gzip")
+
+    read = read_demonstrations(hdf5(fill), "demo.hdf5")
+    (dimension,) = read.action_dimensions
+    assert dimension.labels == ("accelerate", "brake", "coast\u00e4")
+    assert [dimension.labels[action] for action in read.actions] == WORDS
+    assert read.n_episodes == 4
+
+
+def test_texts_are_read_in_parts_where_little_is_to_be_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fill(file: Any) -> None:
+        file["observations"] = STATES
+        file["actions"] = WORDS
+
+    content = hdf5(fill)
+    monkeypatch.setattr("sarl_core.demonstrations.formats.hdf5.content.read_limit", lambda: 1)
+    read = read_demonstrations(content, "demo.hdf5")
+    assert read.actions.tolist() == [(1, 0, 2)[index % 3] for index in range(N)]
+
+
+def test_one_long_text_in_many_places_is_held_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(READ_LIMIT, "0.0625")
+    content = hdf5(long_text_everywhere)
+    tracemalloc.start()
+    try:
+        read = read_demonstrations(content, "demo.hdf5")
+        assert tracemalloc.get_traced_memory()[1] < N * len(content) / 2
+    finally:
+        tracemalloc.stop()
+    assert [len(label) for label in read.action_dimensions[0].labels] == [2**22]
+
+
+@pytest.mark.parametrize("home", ["", "rollouts/"])
+@pytest.mark.parametrize(("states", "actions"), [("states", "controls"), ("Obs", "Act")])
+def test_episodes_under_other_names_are_read_in_the_order_of_their_numbers(
+    home: str, states: str, actions: str
+) -> None:
+    def fill(file: Any) -> None:
+        for index in range(12):
+            file[f"{home}traj_{index}/{states}"] = np.full((3, 2), index)
+            file[f"{home}traj_{index}/{actions}"] = ["left", "right", "left"]
+
+    read = read_demonstrations(hdf5(fill), "demo.hdf5")
+    assert read.observations[::3, 0].tolist() == [*range(12)]
+    assert read.episode_lengths.tolist() == [3] * 12
+    assert read.action_dimensions[0].labels == ("left", "right")
+
+
+def test_a_group_that_holds_all_episodes_is_cut_at_their_ends() -> None:
+    def fill(file: Any) -> None:
+        d4rl(file.create_group("dataset"))
+
+    read = read_demonstrations(hdf5(fill), "walker.hdf5")
+    assert read.episode_lengths.tolist() == [10, 10, 10, 10]
+
+
 def other_episode(file: Any) -> None:
     episodes(file)
     del file["data/demo_10/obs/grip"]
@@ -140,8 +209,50 @@ def huge_chunk(file: Any) -> None:
 
 def texts(file: Any) -> None:
     d4rl(file)
+    del file["rewards"]
+    file["rewards"] = ["high"] * N
+
+
+def other_texts(file: Any) -> None:
+    d4rl(file)
     del file["actions"]
-    file["actions"] = ["left"] * N
+    file["actions"] = np.array([b"\xe4"] * N)
+
+
+def no_text(file: Any) -> None:
+    d4rl(file)
+    del file["actions"]
+    file["actions"] = [*["left"] * (N - 1), " "]
+
+
+def long_text_everywhere(file: Any) -> None:
+    """Every text of a column starts in the same place: N times what the file holds."""
+    d4rl(file)
+    del file["actions"]
+    made = file.create_dataset("actions", (N,), h5py.string_dtype(), chunks=(1,))
+    made[0] = "x" * 2**22
+    chunk = made.id.read_direct_chunk((0,))[1]
+    for row in range(N):
+        made.id.write_direct_chunk((row,), chunk)
+
+
+def long_texts_side_by_side(file: Any) -> None:
+    d4rl(file)
+    del file["actions"]
+    made = file.create_dataset("actions", (N, 200), h5py.string_dtype())
+    made[0, 0] = "x" * 2**20
+
+
+def words_and_numbers(file: Any) -> None:
+    episodes(file)
+    del file["data/demo_2/actions"]
+    file["data/demo_2/actions"] = [["left", "up"]] * 3
+
+
+def two_homes(file: Any) -> None:
+    for home in ("valid", "train"):
+        file[f"{home}/demo_0/obs"] = STATES
+        file[f"{home}/demo_0/actions"] = ACTIONS
 
 
 def other_filter(file: Any) -> None:
@@ -165,7 +276,8 @@ def bomb(file: Any) -> None:
 
 
 def nothing(file: Any) -> None:
-    file["x"] = STATES
+    for index in (10, 9):
+        file[f"runs/traj_{index}/sensor"] = STATES
 
 
 HOSTILE: dict[str, tuple[Callable[[Any], None], str]] = {
@@ -175,10 +287,19 @@ HOSTILE: dict[str, tuple[Callable[[Any], None], str]] = {
     "a virtual data set": (virtual, "'actions' lies in another file"),
     "a huge shape": (huge, "it unpacks to"),
     "a huge chunk": (huge_chunk, "it unpacks to"),
-    "texts": (texts, "'actions' holds texts or Python objects"),
+    "texts": (texts, "'rewards' holds texts or Python objects"),
+    "texts in Latin-1": (other_texts, "'actions' holds texts that are not UTF-8"),
+    "an empty text": (no_text, "the action in row 40 is an empty text"),
+    "words and numbers": (words_and_numbers, "'demo_2' holds other things than 'demo_0'"),
+    "long texts side by side": (long_texts_side_by_side, "it unpacks to"),
+    "two groups of episodes": (two_homes, "in each of its groups 'train', 'valid'"),
     "a filter that is not there": (other_filter, r"a filter that is not read \(number 32015\)"),
     "a bomb": (bomb, "unpacks to more than it says"),
-    "nothing": (nothing, "neither arrays 'observations' and 'actions' nor episodes"),
+    "nothing": (
+        nothing,
+        "it holds 'runs', 'runs' holds 'traj_9', 'traj_10', 'runs/traj_9' holds 'sensor', and "
+        r"nowhere in it are observations \(which may be called .*'obs'.* beside .*'controls'",
+    ),
     "an episode of another task": (other_episode, "'demo_10' holds other things than 'demo_0'"),
     "a short array": (short_episode, "'demo_2' has 2 rewards for 3 actions"),
 }
@@ -200,5 +321,5 @@ def test_what_means_harm_is_one_sentence(
 def test_a_file_that_is_cut_off_is_one_sentence() -> None:
     content = hdf5(packed)
     for end in range(8, len(content) - 1, 97):
-        with pytest.raises(InputError, match=r"damaged|neither arrays"):
+        with pytest.raises(InputError, match=r"damaged|nowhere in it"):
             read_demonstrations(content[:end], "demo.hdf5")

@@ -34,7 +34,7 @@ from sarl_core.limits import require_memory, table_memory
 
 ARRAY_KEYS = {
     "observations": ("observations", "obs", "observation", "states", "state"),
-    "actions": ("actions", "acts", "action", "act"),
+    "actions": ("actions", "acts", "action", "act", "controls", "control"),
     "episodes": ("episodes", "episode", "episode_ids", "episode_id"),
     "steps": ("steps", "step", "timesteps"),
     "rewards": ("rewards", "rews", "reward", "rew"),
@@ -195,7 +195,7 @@ def write_npz(demonstrations: Demonstrations, out: BinaryIO) -> None:
 
 def _labels(actions: NDArray[Any]) -> tuple[NDArray[Any], tuple[tuple[str, ...], ...]]:
     """Actions that are words, or true and false, as numbers, and what those stand for."""
-    if actions.dtype.kind not in "bU":
+    if actions.dtype.kind not in "bUO":
         return actions, ()
     columns = [coded(column) for column in actions.reshape(len(actions), -1).T]
     codes = np.stack([column.codes for column in columns if column is not None], axis=1)

@@ -38,7 +38,7 @@ class Hdf5Content:
 
     def __init__(self, file: Any, size: int) -> None:
         self.root = file
-        self._taken = size
+        self._size = self._taken = size
 
     def names_in(self, group: Any) -> tuple[str, ...]:
         """What stands in a group, under which names.
@@ -92,20 +92,23 @@ class Hdf5Content:
 
         return isinstance(entry, h5py.Group)
 
-    def array_of(self, dataset: Any, name: str, *, room: int = 1) -> NDArray[Any]:
-        """The numbers of a data set.
+    def array_of(
+        self, dataset: Any, name: str, *, room: int = 1, texts: bool = False
+    ) -> NDArray[Any]:
+        """The numbers of a data set, or its texts.
 
         Args:
             dataset: A ``h5py.Dataset``.
             name: What it is called in messages.
             room: How often it will be held at once.
+            texts: Whether it may hold those, of one length or of any.
 
         Returns:
-            The array.
+            The array; of texts as objects, as one long text would make all of them wide.
 
         Raises:
-            InputError: If it is none, holds anything but numbers, lies elsewhere, is packed by a
-                filter that is not read, or is too large.
+            InputError: If it is none, holds anything else, lies elsewhere, is packed by a filter
+                that is not read, or is too large.
         """
         import h5py
 
@@ -113,7 +116,8 @@ class Hdf5Content:
             if not isinstance(dataset, h5py.Dataset):
                 raise InputError(f"{quoted(name)} is no array of numbers; save it as one")
             kind = dataset.dtype
-            if kind.kind not in "biuf":
+            of_texts = texts and h5py.check_string_dtype(kind) is not None
+            if kind.kind not in "biuf" and not of_texts:
                 raise InputError(
                     f"{quoted(name)} holds {_said(kind)}, which are no numbers; save plain numbers"
                 )
@@ -125,7 +129,29 @@ class Hdf5Content:
             self._taken += room * math.prod(dataset.shape or ()) * kind.itemsize
             require_memory(self._taken)
             _require_readable(dataset, name, self._taken)
-            return np.asarray(dataset[()])
+            return self._texts_of(dataset, name) if of_texts else np.asarray(dataset[()])
+
+    def _texts_of(self, dataset: Any, name: str) -> NDArray[Any]:
+        """Texts, of which many places can name one long one: read in parts, each kept once."""
+        values = np.empty(dataset.shape, dtype=object)
+        if not values.size:
+            return values.astype(np.str_)
+        longest = self._size if dataset.dtype.hasobject else dataset.dtype.itemsize
+        longest *= math.prod(values.shape[1:])
+        require_memory(self._taken + longest)
+        rows = max(1, read_limit() // 4 // longest)
+        known: dict[bytes, str] = {}
+        for start in range(0, len(values) if values.ndim else 1, rows):
+            place = slice(start, start + rows) if values.ndim else ()
+            part = np.asarray(dataset[place])
+            for text in part.reshape(-1):
+                if text not in known:
+                    self._taken += 2 * len(text)
+                    require_memory(self._taken)
+                    known[text] = _decoded(text, name)
+            flat = [known[text] for text in part.reshape(-1)]
+            values[place] = np.array(flat, dtype=object).reshape(part.shape)
+        return values
 
 
 @contextmanager
@@ -163,7 +189,7 @@ def _require_readable(dataset: Any, name: str, taken: int) -> None:
         )
     if dataset.chunks is None:
         return
-    chunk = math.prod(dataset.chunks) * dataset.dtype.itemsize
+    chunk = math.prod(dataset.chunks) * dataset.id.get_type().get_size()
     require_memory(taken + chunk)
     packers = [code for code in codes if code in (_DEFLATE, _LZF)]
     if len(packers) > 1:
@@ -179,6 +205,13 @@ def _require_readable(dataset: Any, name: str, taken: int) -> None:
             require_memory(taken + part.size * _MOST_PACKED[_LZF])
         elif _longer_than(dataset.id.read_direct_chunk(part.chunk_offset)[1], chunk):
             raise InputError("it is damaged: a part of it unpacks to more than it says")
+
+
+def _decoded(text: bytes, name: str) -> str:
+    try:
+        return text.decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{quoted(name)} holds texts that are not UTF-8; save them so") from error
 
 
 def _longer_than(packed: bytes, size: int) -> bool:
