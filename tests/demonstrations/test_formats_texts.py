@@ -8,7 +8,7 @@ import gzip
 import io
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -274,6 +274,56 @@ def test_what_is_wrong_is_one_sentence(name: str, monkeypatch: pytest.MonkeyPatc
         read_demonstrations(content(), file_name)
     assert str(error.value).startswith(f"{file_name}: ")
     assert "\n" not in str(error.value)
+
+
+SHEET = [("wind", "mode", "action"), (1.5, "manual", "lift"), (2.5, "auto", "hold")]
+ODD_SHEET = [("wind", "mode", "decided"), *SHEET[1:]]
+FACTS = [("Report", "March"), ("Operator", "Meier"), ("Version", 3)]
+TITLE = [("Recordings of March",), ("see the next sheet",)]
+COUNTS = [("decided", "count"), ("lift", 1), ("hold", 1)]
+
+
+def workbook_of(sheets: Mapping[str, Sequence[Sequence[object]]]) -> bytes:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    out = io.BytesIO()
+    book.save(out)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("sheets", "note"),
+    [
+        ({"Info": FACTS, "Data": SHEET}, "the sheet 'Data' was read, and 'Info' beside it was not"),
+        (
+            {"Info": TITLE, "Data": SHEET, "Sums": COUNTS},
+            "the sheet 'Data' was read, and 'Info', 'Sums' beside it were not",
+        ),
+        ({"Info": TITLE, "Data": ODD_SHEET}, "'Info' beside it was not"),
+        ({"Info": FACTS[:2], "Data": ODD_SHEET}, "'Info' beside it was not"),
+        ({"Info": FACTS, "Data": ODD_SHEET}, "'Info' beside it was not"),
+        ({"Data": SHEET, "Empty": []}, ""),
+    ],
+)
+def test_the_sheet_with_the_table_is_read_wherever_it_stands(
+    sheets: dict[str, Sequence[Sequence[object]]], note: str
+) -> None:
+    columns = {"decided": "action"} if ODD_SHEET in sheets.values() else None
+    read = read_demonstrations(workbook_of(sheets), "demo.xlsx", columns=columns)
+    assert read.observations[:, 0].tolist() == [1.5, 2.5]
+    assert read.action_dimensions[0].labels == ("hold", "lift")
+    assert any("beside it" in one for one in read.notes) == bool(note)
+    assert not note or any(note in one for one in read.notes)
+
+
+def test_sheets_of_which_any_may_be_meant_are_named() -> None:
+    content = workbook_of({"Info": FACTS, "March": SHEET, "April": SHEET})
+    with pytest.raises(InputError, match=r"in 2 sheets, 'March', 'April', any of which"):
+        read_demonstrations(content, "demo.xlsx")
 
 
 def test_cells_of_excel_are_what_they_show() -> None:

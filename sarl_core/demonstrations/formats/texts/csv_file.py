@@ -54,6 +54,7 @@ class CsvTable:
         first_line: Line of the first data row, from 1.
         units: Of columns, where a row below the header gives them.
         title: What stands above the header and is no comment, "" for nothing.
+        notes: Sentences on where it was taken from.
     """
 
     names: tuple[str, ...]
@@ -64,11 +65,12 @@ class CsvTable:
     first_line: int
     units: Mapping[str, str] = field(default_factory=dict)
     title: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def metadata(self) -> Metadata:
         """CSV carries units at most."""
-        notes: list[str] = []
+        notes = [*self.notes]
         if self.title:
             notes.append(f"the lines above the header were not read, {quoted(self.title)} first")
         if self.units:

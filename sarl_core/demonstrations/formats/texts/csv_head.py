@@ -105,7 +105,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
     delimiter = delimiter or _delimiter(line.text)
     first = _fields(line.text, delimiter)
     names = _fields(comment, delimiter)
-    if names and len(names) == len(first) and any(map(_is_number, first)):
+    if names and len(names) == len(first) and any(map(is_number, first)):
         return CsvHead(_with_all_names(names), True, delimiter, {}, line.start, line.number, sign)
     second, third = next(lines, None), next(lines, None)
     below = _fields(second.text, delimiter) if second is not None else []
@@ -152,7 +152,7 @@ def _title_lines(texts: Sequence[str], delimiter: Delimiter | None) -> int:
     wide = len(rows[-1])
     header = next((place for place, row in enumerate(rows) if 2 * len(row) > wide), 0)
     names = (
-        header + 1 < len(rows) and len(rows[header]) > 2 and not any(map(_is_number, rows[header]))
+        header + 1 < len(rows) and len(rows[header]) > 2 and not any(map(is_number, rows[header]))
     )
     return header if names else 0
 
@@ -171,7 +171,8 @@ def _fields(line: str, delimiter: str) -> list[str]:
         )
 
 
-def _is_number(field: str) -> bool:
+def is_number(field: str) -> bool:
+    """Whether a field holds a number, with a decimal point or comma."""
     return _NUMBER.fullmatch(field.strip()) is not None
 
 
@@ -197,9 +198,9 @@ def _with_all_names(names: Sequence[str]) -> tuple[str, ...]:
 
 def _gives_units(fields: Sequence[str], below: Sequence[str], columns: int) -> bool:
     """Whether a row is one of units: no number, and text where numbers follow."""
-    if len(fields) != columns or len(below) != columns or any(map(_is_number, fields)):
+    if len(fields) != columns or len(below) != columns or any(map(is_number, fields)):
         return False
-    numbers = [field for field, under in zip(fields, below, strict=True) if _is_number(under)]
+    numbers = [field for field, under in zip(fields, below, strict=True) if is_number(under)]
     telling = [field for field in numbers if field.strip().lower() not in _NOTHING]
     return bool(telling) and all(len(field.strip()) <= _LONGEST_UNIT for field in numbers)
 
