@@ -19,7 +19,7 @@ _STEADY = 1e-3  # by how much the steps of a clock may differ, as a share
 _SEVERAL = 3  # episodes that run alike; two may do so by chance
 _MOST_BROKEN = 0.1  # of the values of an action that is taken for labels by whoever reads it
 _LARGEST_CODE = 2**31  # a label that is larger is a slip
-_EXACT = 2**53  # up to here every whole number is a float64
+EXACT = 2**53  # up to here every whole number is a float64
 # The sum of as many numbers as fit in memory is a float32 yet: scikit-learn sums up all values to
 # see whether some are missing, and takes them to be where the sum is no number.
 LARGEST = 1e30
@@ -385,7 +385,7 @@ def whole_numbers(
 ) -> NDArray[np.int64]:
     """Whole numbers from 0, as of episodes and steps; arguments as of `column_of_numbers`."""
     values = column_of_numbers(given, n, column, rows)
-    wrong = (values < 0) | (values > _EXACT)
+    wrong = (values < 0) | (values > EXACT)
     if values.dtype.kind == "f":
         wrong |= ~without_fraction(values)
     if wrong.any():
@@ -394,6 +394,19 @@ def whole_numbers(
             f"{column} is {values[row]} in row {_number(row, rows)}; use whole numbers from 0"
         )
     return frozen(values, np.int64)
+
+
+def counted_as_they_come(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Numbers from 0 for what numbers are too long for, or what is none, as ids and texts.
+
+    Args:
+        values: Shape (N,).
+
+    Returns:
+        Which of the different values each is, in the order in which they come, (N,).
+    """
+    _, first, places = np.unique(values, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[places.reshape(-1)]
 
 
 def require_order(

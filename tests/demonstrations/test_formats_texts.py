@@ -15,6 +15,7 @@ import numpy as np
 import openpyxl
 import pyarrow as pa
 import pyarrow.feather
+import pyarrow.parquet
 import pytest
 
 from sarl_core.demonstrations.formats import read_demonstrations, table_columns
@@ -274,6 +275,51 @@ def test_what_is_wrong_is_one_sentence(name: str, monkeypatch: pytest.MonkeyPatc
         read_demonstrations(content(), file_name)
     assert str(error.value).startswith(f"{file_name}: ")
     assert "\n" not in str(error.value)
+
+
+def with_ids(base: int) -> list[dict[str, Any]]:
+    return [{**row, "episode": base + row["episode"]} for row in ROWS]
+
+
+def csv_of(rows: list[dict[str, Any]]) -> bytes:
+    return "\n".join(
+        ",".join(map(str, row)) for row in ([*rows[0]], *(row.values() for row in rows))
+    ).encode()
+
+
+def parquet_of(rows: list[dict[str, Any]]) -> bytes:
+    ids = pa.array([row["episode"] for row in rows], pa.uint64())
+    table = pa.Table.from_pylist([{**row, "episode": 0} for row in rows])
+    out = io.BytesIO()
+    pyarrow.parquet.write_table(table.set_column(0, "episode", ids), out)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("base", [2**53 - 1, 1234567890123456789, 2**63 - 1, 2**64 - 3])
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("demo.csv", csv_of), ("demo.jsonl", lines), ("demo.parquet", parquet_of)],
+)
+def test_ids_longer_than_a_float_are_those_of_different_episodes(
+    name: str, content: Callable[[list[Any]], bytes], base: int
+) -> None:
+    read = read_demonstrations(content(with_ids(base)), name)
+    assert read.episodes.tolist() == [i // 10 for i in range(N)]
+    assert any(f"are numbered from 0, {base}" in note.replace("'", "") for note in read.notes)
+
+
+def test_ids_longer_than_any_number_are_texts() -> None:
+    ids = with_ids(10**24)
+    read = read_demonstrations(csv_of(ids), "demo.csv")
+    assert read.episodes.tolist() == [i // 10 for i in range(N)]
+    with pytest.raises(InputError, match="too large; write ids as texts"):
+        read_demonstrations(lines(ids), "demo.jsonl")
+
+
+def test_ids_that_a_spreadsheet_has_shortened_are_refused() -> None:
+    content = csv_of([{**row, "episode": "1.23457E+18"} for row in ROWS])
+    with pytest.raises(InputError, match="use whole numbers from 0"):
+        read_demonstrations(content, "demo.csv")
 
 
 SHEET = [("wind", "mode", "action"), (1.5, "manual", "lift"), (2.5, "auto", "hold")]

@@ -16,10 +16,12 @@ from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.missing import Missing, complete_rows
 from sarl_core.demonstrations.requirements import (
+    EXACT,
     FEW_VALUES,
     as_numbers,
     coarse_columns,
     column_of_numbers,
+    counted_as_they_come,
     flags,
     is_whole,
     require_codes,
@@ -253,6 +255,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
 def _checked(recording: Recording) -> Recording:
     """Number the episodes and check what else there is, under the file's own names."""
     n = len(recording.actions)
+    recording = _with_short_numbers(recording)
     columns: dict[str, Any] = {}
     for attribute, role, check in (
         ("episodes", "episode", whole_numbers),
@@ -271,6 +274,20 @@ def _checked(recording: Recording) -> Recording:
         recording.rows,
     )
     return recording
+
+
+def _with_short_numbers(recording: Recording) -> Recording:
+    """Number the episodes from 0 where their own are as long as ids are."""
+    episodes = recording.episodes
+    if episodes is None or episodes.dtype.kind not in "iu" or episodes.ndim != 1:
+        return recording
+    if not episodes.size or -EXACT <= int(episodes.min()) <= int(episodes.max()) <= EXACT:
+        return recording
+    called = _called(recording, "episode")
+    note = f"the episodes of {called} are numbered from 0, {episodes[0]} first"
+    return replace(
+        recording, episodes=counted_as_they_come(episodes), notes=(*recording.notes, note)
+    )
 
 
 def _complete(recording: Recording, missing: Missing) -> Recording:
@@ -472,7 +489,7 @@ def _labels(
     if columns.dtype.kind == "f":
         require_finite(columns, recording.action_columns, recording.rows)
         # Beyond 2**53 a float64 cannot say which whole number is meant.
-        wrong = ~without_fraction(columns) | (np.abs(columns) > 2**53)
+        wrong = ~without_fraction(columns) | (np.abs(columns) > EXACT)
         if wrong.any():
             row, i = (int(index[0]) for index in np.nonzero(wrong))
             number = row if recording.rows is None else int(recording.rows[row])

@@ -36,7 +36,12 @@ from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.times import as_clock, of_words, with_seconds
 from sarl_core.demonstrations.formats.units import without_units
-from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
+from sarl_core.demonstrations.requirements import (
+    coarse_columns,
+    counted_as_they_come,
+    crowded,
+    flags,
+)
 from sarl_core.demonstrations.words import Coded, indicated, indicators_of
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
@@ -193,9 +198,7 @@ def without_times(
     if episode is None or not left[episode].words:
         return guess, left, ()
     codes, words = left[episode].values, left[episode].words
-    _, first, places = np.unique(codes, return_index=True, return_inverse=True)
-    ranks = np.argsort(np.argsort(first))[places.reshape(-1)]  # in the order of the file
-    left[episode] = TableColumn(ranks, left[episode].missing)
+    left[episode] = TableColumn(counted_as_they_come(codes), left[episode].missing)
     note = f"the episodes of column {episode!r} are numbered from 0, {words[codes[0]]!r} first"
     return guess, left, (note,)
 

@@ -38,6 +38,7 @@ _NO_NUMBERS = re.compile(rb"[xX(](?:(?<=0[xX])|(?<=[nN][aA][nN]\())")
 _NOTHING = ("", "NA", "N/A", "n/a", "#N/A", "<NA>", "NaN", "nan", "NAN", "null", "NULL", "Null")
 # A number, and a field that holds one, nothing, or a truth value; as Arrow's own matcher has it.
 _NUMBER_TEXT = r"([+-]?(\d+(POINT\d*)?|POINT\d+)(e[+-]?\d+)?|[+-]?(nan|inf|infinity))"
+_ID = re.compile(r"[+-]?\d+")
 _NUMBER_FIELD = rf"^\s*({_NUMBER_TEXT}|true|false|na|#?n/a|<na>|null|)\s*$"
 
 
@@ -118,6 +119,8 @@ class CsvTable:
         for name in texts - {columns.time}:
             self._require_words(name, table.column(name))
         spelled = self._spelled([one for one in columns.actions if pa.types.is_boolean(kinds[one])])
+        if columns.episode is not None and pa.types.is_floating(kinds[columns.episode]):
+            spelled |= self._ids(columns.episode)
         # Each column is given back as soon as its numbers stand in one piece.
         left = dict(zip(columns.used, table.columns, strict=True))
         del table
@@ -176,6 +179,13 @@ class CsvTable:
             for name, column in read.items()
             if len(set(map(str.lower, column.words)) & {*TRUTH}) == len(column.words)
         }
+
+    def _ids(self, name: str) -> dict[str, TableColumn]:
+        """A column of whole numbers too long for any type of numbers, as texts."""
+        import pyarrow as pa
+
+        column = column_from_arrow(name, self._parse([name], {name: pa.large_string()}).column(0))
+        return {name: column} if column.words and all(map(_ID.fullmatch, column.words)) else {}
 
     def _require_numbers(self, suspects: Sequence[str]) -> None:
         """Say in which row a file is wrong, block by block and with nothing taken for a number."""

@@ -189,11 +189,15 @@ def _array(name: str, values: list[Any]) -> Any:
     import pyarrow as pa
 
     try:
+        if any(type(value) is int and value >= 2**63 for value in values):
+            return pa.array(values, pa.uint64())  # as ids that are random may be
         return pa.array(values)
     except (pa.ArrowException, ValueError, OverflowError, TypeError) as error:
         kinds = sorted({_kind(value) for value in values} - {""})
-        what = " and ".join(kinds) if len(kinds) > 1 else "numbers that are too large"
-        raise InputError(f"column {quoted(name)} holds {what}; write one kind") from error
+        what, advice = " and ".join(kinds), "write one kind"
+        if len(kinds) == 1:
+            what, advice = "numbers that are too large", "write ids as texts"
+        raise InputError(f"column {quoted(name)} holds {what}; {advice}") from error
 
 
 def _kind(value: Any) -> str:
