@@ -87,6 +87,7 @@ class SignalTally:
         failures: 1 for an episode that has failed, 0 for one that has not, NaN where that cannot
             be said, (E,).
         costs: Of each so far, (E,); NaN where it is not known.
+        notes: Sentences on costs that the environment told and that could not be read.
     """
 
     def __init__(self, environment: EnvironmentOrId, count: int, name: Callable[[int], str]):
@@ -107,6 +108,7 @@ class SignalTally:
         self.failures, self.costs = np.zeros(count), np.full(count, np.nan)
         self._unpriced = np.zeros(count, dtype=np.bool_)
         self._missing: dict[tuple[int, str], dict[str, None]] = {}
+        self.notes: tuple[str, ...] = ()
 
     @property
     def signals(self) -> NDArray[np.float64] | None:
@@ -149,6 +151,8 @@ class SignalTally:
         priced = ~np.isnan(costs)
         if not self._cost.key:
             self._unpriced[episodes] |= ~priced
+        elif not self._cost.named:
+            self._note_unread(self._cost.key, episodes, ~priced, outcomes.infos)
         if priced.any():
             so_far = np.nan_to_num(self.costs[episodes]) + np.nan_to_num(costs)
             self.costs[episodes] = np.where(priced, so_far, self.costs[episodes])
@@ -189,6 +193,27 @@ class SignalTally:
         """
         self.failures[episode], self.costs[episode] = 0.0, np.nan
         self._unpriced[episode] = False
+
+    def _note_unread(
+        self,
+        key: str,
+        episodes: NDArray[np.int64],
+        unpriced: NDArray[np.bool_],
+        infos: Sequence[Mapping[str, Any]],
+    ) -> None:
+        """Take note of steps that have a cost which is no number: it is not known what they cost.
+
+        Which step that was is not said, so that many episodes have one sentence.
+        """
+        for index in np.flatnonzero(unpriced).tolist():
+            if key in infos[index]:
+                self._unpriced[episodes[index]] = True
+                what = _kind_of(infos[index][key])
+                note = (
+                    f"the cost that the environment tells (info[{key!r}]) is {what} and could not "
+                    "be read, so it is not known what such an episode costs"
+                )
+                self.notes = tuple(dict.fromkeys((*self.notes, note)))
 
     def _look_for(
         self,
@@ -307,6 +332,15 @@ def _number(value: Any, kind: str, what: str, where: _Where, index: int) -> floa
     if np.isinf(number):
         raise _infinite(what, where(index))
     return number
+
+
+def _kind_of(value: Any) -> str:
+    """What stands in the place of a finite number."""
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        return "a text"
+    return "an array" if isinstance(value, (np.ndarray, list, tuple)) else "no finite number"
 
 
 def _infinite(what: str, where: str) -> InputError:

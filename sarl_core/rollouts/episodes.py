@@ -423,8 +423,15 @@ def join(pieces: Sequence[Episodes]) -> Episodes:
     invalid = np.concatenate(passed) if len(passed) == len(pieces) else None
     signals = [piece.signalled for piece in pieces if piece.signalled is not None]
     signalled = np.concatenate(signals) if len(signals) == len(pieces) else None
+    notes = tuple(dict.fromkeys(note for piece in pieces for note in piece.notes))
     return replace(
-        pieces[0], steps=steps, flips=flips, invalid=invalid, signalled=signalled, **columns
+        pieces[0],
+        steps=steps,
+        flips=flips,
+        invalid=invalid,
+        signalled=signalled,
+        notes=notes,
+        **columns,
     )
 
 

@@ -358,7 +358,7 @@ class _Lanes:
             self.cut[:count],
             self.free[:count] / self.lengths[:count],
             self.tally.costs[:count],
-            self.notes,
+            (*self.notes, *self.tally.notes),
             self.invalid[:count] if passes else None,
             signals[:count] if signals is not None else None,
         )

@@ -16,6 +16,10 @@ TOY = f"{__name__}:Ramp-v0"
 CONDITION = "feature 0 > 2.5 and feature 0 < 3.5"
 
 
+SILENT = object()
+COSTS: dict[int, Any] = {}  # of the second step, by the seed
+
+
 class Ramp(gymnasium.Env[Any, Any]):
     """Its first feature counts the steps; an episode has as many as its seed, and 4 more."""
 
@@ -33,6 +37,8 @@ class Ramp(gymnasium.Env[Any, Any]):
         info |= {"boxed": np.array([[0.5]]), "two": np.ones(2)}
         if self.steps > 5:
             info["late"] = True
+        if (cost := COSTS.get(self.seed, SILENT)) is not SILENT:
+            info["cost"] = cost if self.steps == 2 else 0.25
         return self._observation(), 1.0, self.steps == 4 + self.seed, False, info
 
     def _observation(self) -> Any:
@@ -135,6 +141,35 @@ def test_what_cannot_be_said_of_a_step_stays_open() -> None:
 def test_what_tells_nothing_is_one_sentence(failure: str, cost: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         rollout(Environment(TOY, failure=failure, cost=cost), "novice", episodes=3)
+
+
+@pytest.mark.parametrize(
+    ("cost", "what"),
+    [
+        ("high", "a text"),
+        (None, "None"),
+        (np.ones(2), "an array"),
+        ([1.0, [2.0]], "an array"),
+        (np.inf, "no finite number"),
+        (np.nan, "no finite number"),
+        ({}, "no finite number"),
+    ],
+)
+def test_a_cost_that_cannot_be_read_is_noted_once_and_counts_nothing(
+    cost: Any, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"{__name__}.COSTS", {0: 1.0, 1: cost, 2: cost})
+    episodes = rollout(TOY, "novice", episodes=3, batch=1)
+    assert episodes.cost[0] == 1.75
+    assert np.isnan(episodes.cost[1:]).all()
+    (note,) = [note for note in episodes.remarks if "cost" in note]
+    assert note.startswith(f"the cost that the environment tells (info['cost']) is {what} and")
+    assert episodes.to_dict()["notes"] == [note]
+    assert join([episodes.part(0, 1), episodes.part(1, 3)]).remarks == (note,)
+    monkeypatch.setattr(f"{__name__}.COSTS", {0: 1.0, 1: 1.0})
+    first = rollout(TOY, "novice", episodes=2)
+    assert not first.remarks
+    assert join([first, episodes]).remarks == (note,)
 
 
 def test_a_key_that_comes_late_is_enough() -> None:
