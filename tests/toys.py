@@ -46,6 +46,7 @@ TOYS = {
         spaces.Box(-1, 1, (3,), np.float64),
         spaces.Box(-0.1, 0.1, (2,), np.float64),
     ),
+    "toy/Whole-v0": (spaces.Box(-1, 1, (3,)), spaces.Box(-1, 2, (2,), np.int32)),
     "toy/Open-v0": (
         spaces.Box(-1, 1, (3,)),
         spaces.Box(

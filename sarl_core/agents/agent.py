@@ -118,6 +118,8 @@ class UniformAgent:
         low: Bounds of continuous dimensions, shape (m,); where a side is unbounded, the
             distribution is Gymnasium's: exponential from the other bound, or normal.
         high: Likewise.
+        whole: Whether continuous actions are amounts in whole numbers, of which each from the
+            lower to the upper bound is drawn alike.
     """
 
     name: str
@@ -125,6 +127,7 @@ class UniformAgent:
     label_first: NDArray[np.int64]
     low: NDArray[np.float32]
     high: NDArray[np.float32]
+    whole: bool = False
 
     @property
     def n_uniforms(self) -> int:
@@ -150,9 +153,12 @@ class UniformAgent:
         below, above = np.isfinite(self.low), np.isfinite(self.high)
         low = np.where(below, self.low, 0.0).astype(np.float64)
         high = np.where(above, self.high, 0.0).astype(np.float64)
+        amounts = uniforms * (high - low)
+        if self.whole:
+            amounts = np.floor(uniforms * (high - low + 1.0))
         actions = np.select(
             [below & above, below, above],
-            [low + uniforms * (high - low), low - np.log(inner), high + np.log(inner)],
+            [low + amounts, low - np.log(inner), high + np.log(inner)],
             ndtri(inner),
         ).astype(np.float32)
         return cast(NDArray[np.float32], np.clip(actions, self.low, self.high))
@@ -251,10 +257,12 @@ def _novice(env_id: EnvironmentOrId, first: NDArray[np.int64]) -> UniformAgent:
     env = make_environment(env_id)
     space = env.action_space
     counts = np.array(label_counts(space), dtype=np.int64)
+    whole = not len(counts) and np.issubdtype(space.dtype, np.integer)
     low = np.zeros(0) if len(counts) else space.low.reshape(-1)
     high = np.zeros(0) if len(counts) else space.high.reshape(-1)
     env.close()
-    return UniformAgent("novice", counts, first, low.astype(np.float32), high.astype(np.float32))
+    bounds = low.astype(np.float32), high.astype(np.float32)
+    return UniformAgent("novice", counts, first, *bounds, whole=whole)
 
 
 def _untrained(env_id: EnvironmentOrId, seed: int) -> MlpPolicy:

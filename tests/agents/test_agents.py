@@ -44,6 +44,18 @@ def test_the_novice_is_uniform_over_an_interval() -> None:
     assert actions[:, 0] == pytest.approx(np.linspace(-2, 2, 101), abs=1e-6)
 
 
+def test_the_novice_draws_whole_amounts_alike_the_highest_among_them() -> None:
+    agent = make_agent("novice", "toy/Whole-v0")
+    uniforms = np.random.default_rng(0).random((40_000, 2))
+    actions = agent.act(states("toy/Whole-v0", 40_000), uniforms)
+    values, counts = np.unique(actions, return_counts=True)
+    assert values.tolist() == [-1, 0, 1, 2]
+    assert np.abs(counts / 80_000 - 1 / 4).max() < 0.01
+    episodes = rollout("toy/Whole-v0", "novice", episodes=20)
+    assert episodes.steps is not None
+    assert np.unique(episodes.steps.executed).tolist() == [-1, 0, 1, 2]
+
+
 def test_the_novice_respects_one_sided_bounds() -> None:
     agent = make_agent("novice", "toy/Open-v0")
     uniforms = np.random.default_rng(0).random((1_000, 3))
