@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from codecs import getincrementaldecoder
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Integral, Number
 from os import PathLike
 
 _LONGEST = 480  # characters of a message; nobody reads more
 _QUOTED = 40  # of what a message repeats from a file
 _NO_TEXT = "bytes that are no text"
+_EXTRAS = {
+    "streamlit": "dashboard",
+    "stable_baselines3": "learning",
+    "torch": "learning",
+    "imageio": "video",
+    "imageio_ffmpeg": "video",
+}
+"""What a package that is not there belongs to."""
 
 
 class SarlError(Exception):
@@ -34,6 +43,25 @@ class InputError(SarlError):
 
 class WorkError(SarlError):
     """The input was fine and the work failed all the same. The command line exits with 1."""
+
+
+@contextmanager
+def needing_extras() -> Iterator[None]:
+    """Say of a package that is not there to which extra it belongs.
+
+    Raises:
+        WorkError: In place of the `ModuleNotFoundError`.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        extra = _EXTRAS.get(error.name or "")
+        if extra is None:
+            raise
+        raise WorkError(
+            f"this needs {error.name}, which is not installed; run pip install "
+            f"'sarl-explorer[{extra}]'"
+        ) from error
 
 
 def quoted(value: object, longest: int = _QUOTED) -> str:

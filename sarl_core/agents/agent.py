@@ -19,7 +19,7 @@ from sarl_core.agents.spaces import Actions, label_counts
 from sarl_core.environments.description import catalogued, describe_environment, make_environment
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up, only_counts
-from sarl_core.errors import InputError, require
+from sarl_core.errors import InputError, needing_extras, require
 from sarl_core.shipped import DATA
 
 if TYPE_CHECKING:
@@ -164,6 +164,7 @@ class UniformAgent:
         return cast(NDArray[np.float32], np.clip(actions, self.low, self.high))
 
 
+@needing_extras()
 def untried_agent(
     spec: str | Path | Agent,
     env_id: EnvironmentOrId,
@@ -186,6 +187,7 @@ def untried_agent(
 
     Raises:
         InputError: If there is no such agent, or it does not fit the environment.
+        WorkError: If a package that it needs is not installed.
     """
     as_environment(env_id)  # refuses what is no environment
     if isinstance(spec, Agent):

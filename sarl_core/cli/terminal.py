@@ -17,7 +17,7 @@ import typer
 
 from sarl_core.cli.streams import interruptible, lasting_streams
 from sarl_core.documents import plain
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, needing_extras
 from sarl_core.files import temporary_folder
 
 if TYPE_CHECKING:
@@ -25,15 +25,6 @@ if TYPE_CHECKING:
 
 _WIDTH_IN_A_FILE = 160  # where no terminal says how wide it is, a table shall not be cut
 _INTERRUPTED = 130  # what a shell expects of a program that Ctrl-C ended
-
-_EXTRAS = {
-    "streamlit": "dashboard",
-    "stable_baselines3": "learning",
-    "torch": "learning",
-    "imageio": "video",
-    "imageio_ffmpeg": "video",
-}
-"""What a package that is not there belongs to."""
 
 Advance = Callable[[int, int], None]
 
@@ -72,7 +63,7 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
 def _run(app: typer.Typer, arguments: Sequence[str]) -> int:
     debug = "--debug" in arguments
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), needing_extras():
             if not debug:
                 warnings.simplefilter("ignore")  # libraries warn who calls them, not the user
             code = app(
@@ -115,9 +106,6 @@ def _sentence_and_code(error: BaseException) -> tuple[str, int]:
         return str(error), 2 if isinstance(error, InputError) else 1
     if isinstance(error, (KeyboardInterrupt, typer.Abort)):
         return "stopped; nothing was written", _INTERRUPTED
-    if isinstance(error, ModuleNotFoundError) and error.name in _EXTRAS:
-        extra = f"sarl-explorer[{_EXTRAS[error.name]}]"
-        return f"this needs {error.name}, which is not installed; run pip install '{extra}'", 1
     return f"{type(error).__name__}: {error} (run it again with --debug to see where)", 1
 
 

@@ -52,6 +52,7 @@ def make_agent(
 
     Raises:
         InputError: If there is no such agent, or it does not fit the environment.
+        WorkError: If a package that it needs is not installed.
     """
     agent = untried_agent(spec, env_id, stochastic=stochastic, seed=seed, normalise=normalise)
     if agent is spec or not isinstance(agent, PolicyAgent):

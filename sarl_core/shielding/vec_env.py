@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from sarl_core.environments.observation_layers import (
     Layer,
@@ -17,10 +15,14 @@ from sarl_core.environments.observation_layers import (
     normalised,
     read_layers,
 )
-from sarl_core.errors import require
+from sarl_core.errors import needing_extras, require
 from sarl_core.shielding.readers import state_vector
 from sarl_core.shielding.shield import BatchDecision, Shield
 from sarl_core.shielding.wrappers import StepRecord, check_penalty, fitted, is_flat
+
+with needing_extras():
+    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecNormalize
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 
 class ShieldedVecEnv(VecEnvWrapper):
