@@ -7,6 +7,7 @@ actions in the Arcade Learning Environment), and by the keys of its spaces.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -14,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sarl_core.environments.feature_order import numbered
+
+_PART = re.compile(r"(?:^| of )part \d+(?: of |$)")
 
 
 class OwnNames(NamedTuple):
@@ -145,13 +148,9 @@ def space_names(space: Any, table: Sequence[str] = (), name: str = "") -> tuple[
 
     before = f"{name}: " if name else ""
     if isinstance(space, (spaces.Dict, spaces.Tuple)):
-        parts = (
-            space.spaces.items()
-            if isinstance(space, spaces.Dict)
-            else ((f"part {index}", part) for index, part in enumerate(space.spaces))
-        )
+        parts = space.spaces.items() if isinstance(space, spaces.Dict) else enumerate(space.spaces)
         return tuple(
-            entry for key, part in parts for entry in space_names(part, table, f"{before}{key}")
+            entry for key, part in parts for entry in space_names(part, table, part_name(name, key))
         )
     if isinstance(space, spaces.Discrete):
         return _indicators(name or "state", int(space.start), int(space.n))
@@ -160,7 +159,7 @@ def space_names(space: Any, table: Sequence[str] = (), name: str = "") -> tuple[
         return tuple(
             entry
             for index, count in enumerate(space.nvec.reshape(-1).tolist())
-            for entry in _indicators(f"{name or 'state'} {index}", first[index], count)
+            for entry in _indicators(entry_name(name or "state", index), first[index], count)
         )
     shape = tuple(space.shape or ())
     if table and shape[-1:] == (len(table),):
@@ -177,11 +176,41 @@ def space_names(space: Any, table: Sequence[str] = (), name: str = "") -> tuple[
             f"{before}{table[index[0]]} {_place(index[1:])}" for index in np.ndindex(*shape)
         )
     if len(shape) > 1:
-        return tuple(f"{name or 'entry'} {_place(index)}" for index in np.ndindex(*shape))
+        return tuple(entry_name(name or "entry", _place(index)) for index in np.ndindex(*shape))
     count = int(spaces.utils.flatdim(space))
     if count == 1 and name:
         return (name,)
-    return tuple(f"{name} {index}" for index in range(count)) if name else numbered(count)
+    return tuple(entry_name(name, index) for index in range(count)) if name else numbered(count)
+
+
+def part_name(name: str, key: str | int) -> str:
+    """What a part of a space is called.
+
+    Args:
+        name: Of the space; "" for the whole.
+        key: Of the part in a Dict space, or its place in a Tuple space.
+
+    Returns:
+        As "arm: speed", "part 0 of arm" or "speed of part 0".
+    """
+    if isinstance(key, int):
+        return f"part {key} of {name}" if name else f"part {key}"
+    if not name:
+        return key
+    return f"{key} of {name}" if _PART.search(name) else f"{name}: {key}"
+
+
+def entry_name(name: str, place: str | int) -> str:
+    """What one number of a part is called.
+
+    Args:
+        name: Of the part.
+        place: Of the number in it.
+
+    Returns:
+        As "lamps 1"; of what has no name of its own as "entry 1 of part 0".
+    """
+    return f"entry {place} of {name}" if _PART.search(name) else f"{name} {place}"
 
 
 def _indicators(name: str, first: int, count: int) -> tuple[str, ...]:

@@ -115,6 +115,30 @@ def test_names_stand_where_flatten_puts_the_values() -> None:
             spaces.Tuple([spaces.Discrete(2), spaces.Box(0, 1)]),
             ("part 0 is 0", "part 0 is 1", "part 1"),
         ),
+        (
+            spaces.Tuple(
+                [
+                    spaces.Box(0, 1, (2,)),
+                    spaces.Tuple([spaces.Box(0, 1, (2,)), spaces.Discrete(2)]),
+                    spaces.Dict({"wind": spaces.Box(0, 1, (2,)), "rain": spaces.Box(0, 1)}),
+                ]
+            ),
+            (
+                "entry 0 of part 0",
+                "entry 1 of part 0",
+                "entry 0 of part 0 of part 1",
+                "entry 1 of part 0 of part 1",
+                "part 1 of part 1 is 0",
+                "part 1 of part 1 is 1",
+                "rain of part 2",
+                "entry 0 of wind of part 2",
+                "entry 1 of wind of part 2",
+            ),
+        ),
+        (
+            spaces.Dict({"arm": spaces.Tuple([spaces.Box(0, 1), spaces.MultiDiscrete([2])])}),
+            ("part 0 of arm", "entry 0 of part 1 of arm is 0", "entry 0 of part 1 of arm is 1"),
+        ),
         (spaces.Box(-1, 1, (3,)), ("feature 0", "feature 1", "feature 2")),
         (spaces.MultiBinary(2), ("feature 0", "feature 1")),
     ],

@@ -35,6 +35,7 @@ from sarl_core.demonstrations.formats.sets.file_set import FileSet, natural_orde
 from sarl_core.documents import MisfitError, conformed, parse_json
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import numbered
+from sarl_core.environments.naming import entry_name
 from sarl_core.errors import InputError, quoted
 
 METADATA = "metadata.json"
@@ -180,7 +181,7 @@ def _described(
     actions = known.actions
     if acted[0].path:
         actions = tuple(
-            part.name if part.width == 1 else f"{part.name} {index}"
+            part.name if part.width == 1 else entry_name(part.name, index)
             for part in acted
             for index in range(part.width)
         )

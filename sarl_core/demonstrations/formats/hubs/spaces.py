@@ -7,6 +7,7 @@ import warnings
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 from typing import Annotated, Any
 
 import msgspec
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.documents import LARGEST_WHOLE, Count, MisfitError, conformed, parse_json
-from sarl_core.environments.naming import picture_in, space_names
+from sarl_core.environments.naming import part_name, picture_in, space_names
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import MAX_FEATURES
 
@@ -107,7 +108,7 @@ class SpacePart:
     @property
     def name(self) -> str:
         """The keys that lead to it, "" where it is alone."""
-        return ": ".join(key if isinstance(key, str) else f"part {key}" for key in self.path)
+        return reduce(part_name, self.path, "")
 
     @property
     def counts(self) -> tuple[int, ...]:
