@@ -10,9 +10,11 @@ import numpy as np
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.giveaways import find_giveaways
+from sarl_core.demonstrations.requirements import FEW_VALUES
 from sarl_core.demonstrations.words import begin_as_numbers, columns_of_words, words_of
 
 _MOST_WARNINGS = 5  # of one kind; the rest is counted
+_OF_IDS = 0.5  # of the steps; actions are done again and again
 
 
 def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
@@ -23,8 +25,8 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
 
     Returns:
         One sentence each: notes from reading, constant or doubled features, features that give
-        the action or the time, labels that never occur or are written in two ways, a single
-        action.
+        the action or the time, labels that never occur, are written in two ways or are nearly as
+        many as the steps, a single action.
     """
     return (
         *demonstrations.notes,
@@ -89,6 +91,14 @@ def _action_warnings(demonstrations: Demonstrations) -> list[str]:
                 f"labels of action {dimension.name!r} differ from another one only in capitals",
             )
             counts = np.bincount(dimension.labels_of(column), minlength=len(dimension.labels))
+            different = int(np.count_nonzero(counts))
+            if different > FEW_VALUES and different >= _OF_IDS * len(column):
+                warnings.append(
+                    f"action {dimension.name!r} has {different:,} different labels in "
+                    f"{len(column):,} steps, as an identifier or a free text has, from which "
+                    "hardly any rule can be learned; take another column as the action, or write "
+                    "few labels"
+                )
             warnings += _shortened(
                 [
                     f"label {label!r} of action {dimension.name!r} never occurs"

@@ -50,6 +50,22 @@ def test_label_that_never_occurs() -> None:
     assert warnings == ("label 'stay' of action 'push' never occurs",)
 
 
+@pytest.mark.parametrize(("labels", "steps"), [(300, 300), (150, 300), (149, 300), (30, 30)])
+def test_an_action_that_may_be_an_identifier(labels: int, steps: int) -> None:
+    words = np.array([f"cmd {index % labels:03}" for index in range(steps)])
+    rows = np.random.default_rng(0).random((steps, 2))
+    warnings = find_warnings(Demonstrations(rows, words, np.zeros(steps, int)))
+    assert warnings == (
+        (
+            f"action 'action' has {labels} different labels in 300 steps, as an identifier or a "
+            "free text has, from which hardly any rule can be learned; take another column as the "
+            "action, or write few labels",
+        )
+        if labels in (150, 300)
+        else ()
+    )
+
+
 def test_labels_that_differ_only_in_capitals() -> None:
     names = (("STOP", "hoist", "stop"),)
     warnings = find_warnings(example(GOOD, [0, 2, 1], label_names=names, action_names=("crane",)))
