@@ -177,3 +177,19 @@ def test_a_first_row_with_few_fields_is_no_title():
     with pytest.raises(InputError, match="no header"):
         read("1,,,,,", *["1,2,3,4,5,6"] * 3)
     assert not any("above" in note for note in read(NAMES, *ROWS).notes)
+
+
+@pytest.mark.parametrize(
+    ("header", "row"), [(",", ","), (",,", ",,"), ("", ","), (",", ""), (",", ",7")]
+)
+def test_a_delimiter_at_the_end_makes_no_column(header: str, row: str) -> None:
+    ended = read(f"{NAMES}{header}", *(f"{one}{row}" for one in ROWS))
+    plain = read(NAMES, *ROWS)
+    assert ended.observations.tolist() == plain.observations.tolist()
+    assert ended.actions.tolist() == plain.actions.tolist()
+    assert all(use.why == "it has no name" for use in ended.columns[len(plain.columns) :])
+
+
+def test_an_unnamed_first_column_numbers_the_rows() -> None:
+    numbered = read(f",{NAMES}", *(f"{index},{one}" for index, one in enumerate(ROWS)))
+    assert numbered.columns[0].why == "it numbers the rows"

@@ -50,6 +50,8 @@ ROLES: Mapping[str, tuple[str, ...]] = {
 }
 # Words for a role that may as well name a feature; what the column holds decides.
 DOUBTFUL_ROLES = re.compile(rf"({_RUNS}|frame|tick){_COUNTED}|t")
+# What a delimiter at the end of each line makes; in the first place it is the next.
+UNNAMED = re.compile(r"unnamed:_[1-9]\d*")
 # Numbers that a data frame wrote along.
 ROW_NUMBERS = re.compile(
     r"|#|index|idx|unnamed:_\d+|__index_level_\d+__|(row|line)_?(id|index|idx|no|nr|num|number)"

@@ -109,6 +109,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
         return CsvHead(_with_all_names(names), True, delimiter, {}, line.start, line.number, sign)
     second, third = next(lines, None), next(lines, None)
     below = _fields(second.text, delimiter) if second is not None else []
+    first = _as_wide(first, below)
     if not _is_header(first, below):
         names = [f"column {number}" for number in range(1, len(first) + 1)]
         return CsvHead(tuple(names), False, delimiter, {}, line.start, line.number, sign)
@@ -186,6 +187,13 @@ def _is_header(fields: Sequence[str], below: Sequence[str]) -> bool:
     # A data frame without names numbers its columns.
     counted = len(fields) > 1 and stripped == [str(index) for index in range(len(fields))]
     return counted and any(_FRACTION.fullmatch(field.strip()) for field in below)
+
+
+def _as_wide(names: list[str], below: Sequence[str]) -> list[str]:
+    """The header as wide as the rows, where only one of both ends in a delimiter."""
+    if len(below) == len(names) + 1 and not below[-1].strip():
+        return [*names, ""]
+    return names[:-1] if len(below) == len(names) - 1 and not names[-1].strip() else names
 
 
 def _with_all_names(names: Sequence[str]) -> tuple[str, ...]:
