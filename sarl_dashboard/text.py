@@ -14,6 +14,10 @@ escaped = markdown_text
 _OPTIONS = re.compile(r"with --column .* \(on the page Demonstrations: in the form\)")
 _IN_BRACKETS = re.compile(r" \((--missing drop, in Python [^)]*|--column [^)]*=[a-z]+)\)")
 
+# Commands and options as our own sentences name them; what a file calls something may hold signs
+# that mean more.
+_TYPED = re.compile(r"(?<![^\s(])`([a-z][\w .=-]*)`(?![^\s.,;)])")
+
 
 def on_page(text: str) -> str:
     """A message without the options of the command line that the page has a form for."""
@@ -24,7 +28,15 @@ def in_full(text: str) -> str:
     """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
     text = on_page(text)
     first = text.split(" ", 1)[0]
-    return escaped(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
+    return _with_code(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
+
+
+def _with_code(text: str) -> str:
+    """A sentence in Markdown, in which what is to be typed stands between backticks."""
+    parts = _TYPED.split(text)
+    return "".join(
+        f"`{part}`" if place % 2 else escaped(part) for place, part in enumerate(parts) if part
+    )
 
 
 def refuse(problem: Exception | str) -> None:

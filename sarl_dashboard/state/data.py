@@ -18,6 +18,7 @@ from sarl_dashboard.cache import cached, visit
 from sarl_dashboard.state import given_names, hold_out
 from sarl_dashboard.state.hold_out import Parts
 from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.text import refuse
 
 SHIPPED_SETS = {
     "lunar_lander": ("Lunar Lander", "LunarLander-v3"),
@@ -90,7 +91,7 @@ def raw_demonstrations() -> Demonstrations | None:
     try:
         return shipped_demonstrations(name)
     except SarlError as error:
-        st.error(str(error), icon=":material/error:")
+        refuse(error)
         st.stop()
 
 

@@ -13,6 +13,7 @@ from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import RuleSet, rules_from_json, rules_to_json
 from sarl_core.mining.validation.holding_out import hold_out
+from sarl_dashboard.text import in_full
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
@@ -175,6 +176,14 @@ def test_new_names_leave_a_half_filled_rule_about_the_same_feature() -> None:
     assert app.selectbox(key=draft(app, "feature_0")).value == 2
 
 
+def test_what_is_to_be_typed_is_code_and_what_files_hold_is_not() -> None:
+    assert in_full("run `pip install onnx`, or leave it") == "Run `pip install onnx`, or leave it."
+    said = in_full("the column 'a`b`' is $x$; give what `evaluate --json` printed (`learn`)")
+    assert r"'a\`b\`' is \$x\$" in said
+    assert said.endswith(r"give what `evaluate --json` printed (`learn`).")
+    assert in_full("write `<b>`") == r"Write \`&lt;b&gt;\`."
+
+
 def test_a_rule_file_is_edited_and_one_that_is_none_loses_nothing(tmp_path: Path) -> None:
     given = apply(
         FILTERED,
@@ -193,6 +202,7 @@ def test_a_rule_file_is_edited_and_one_that_is_none_loses_nothing(tmp_path: Path
     app.run()
     (sentence,) = errors(app)
     assert "torn.json is not JSON" in sentence
+    assert "give a rule file that `mine` wrote" in app.error[0].value  # as code
     assert "manual" not in table(app)["Kind"].tolist()
     click(app, "undo")
     assert table(app)["Kind"].tolist()[0] == "manual"
