@@ -396,19 +396,6 @@ def whole_numbers(
     return frozen(values, np.int64)
 
 
-def counted_as_they_come(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Numbers from 0 for what numbers are too long for, or what is none, as ids and texts.
-
-    Args:
-        values: Shape (N,).
-
-    Returns:
-        Which of the different values each is, in the order in which they come, (N,).
-    """
-    _, first, places = np.unique(values, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[places.reshape(-1)]
-
-
 def require_order(
     episodes: NDArray[np.int64],
     steps: NDArray[np.int64] | None,

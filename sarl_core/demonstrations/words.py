@@ -91,6 +91,19 @@ def coded(values: Any) -> Coded | None:
     return in_order(codes, texts)
 
 
+def counted_as_they_come(values: NDArray[Any]) -> NDArray[np.int64]:
+    """Numbers from 0 for what numbers are too long for, or what is none, as ids and texts.
+
+    Args:
+        values: Shape (N,).
+
+    Returns:
+        Which of the different values each is, in the order in which they come, (N,).
+    """
+    _, first, places = np.unique(values, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[places.reshape(-1)]
+
+
 def indicators_of(column: str, words: Sequence[str]) -> tuple[Indicator, ...]:
     """The features that say which word a column holds.
 

@@ -510,10 +510,8 @@ def _singles(names: Sequence[str], said: Mapping[str, str]) -> dict[str, str]:
 def _why_unused(name: str, names: Sequence[str]) -> str | None:
     """Why a column whose name says so is nothing that is read."""
     word = plain(name)
-    if vocabulary.UNNAMED.fullmatch(word):
-        return "it has no name"
     if vocabulary.ROW_NUMBERS.fullmatch(word):
-        return "it numbers the rows"
+        return "it has no name" if vocabulary.UNNAMED.fullmatch(word) else "it numbers the rows"
     if vocabulary.TIMES.fullmatch(word):
         return IS_TIME
     if vocabulary.BOOKKEEPING.fullmatch(word):

@@ -21,7 +21,6 @@ from sarl_core.demonstrations.requirements import (
     as_numbers,
     coarse_columns,
     column_of_numbers,
-    counted_as_they_come,
     flags,
     is_whole,
     require_codes,
@@ -34,7 +33,7 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers_note,
     without_fraction,
 )
-from sarl_core.demonstrations.words import by_name
+from sarl_core.demonstrations.words import by_name, counted_as_they_come
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up, numbered, only_counts
 from sarl_core.errors import InputError, quoted
