@@ -245,8 +245,9 @@ def _document(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path
 def _print_study(study: LearningStudy, summaries: tuple[ArmSummary, ...], out: Path) -> None:
     from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows
     from sarl_core.learning.summary import summarise_compared
+    from sarl_core.mining.language import counted
 
     terminal.print_table(HEADINGS, table_rows(summaries, summarise_compared(study)))
     terminal.print_lines(
-        [*finding(study, summaries), f"Wrote {len(study.finished)} runs to {out}."]
+        [*finding(study, summaries), f"Wrote {counted(len(study.finished), 'run')} to {out}."]
     )
