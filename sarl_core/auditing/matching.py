@@ -7,7 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
+from sarl_core.demonstrations.dataset import (
+    ActionDimension,
+    Demonstrations,
+    observed_features,
+)
+from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import (
     NamedFeatures,
@@ -28,7 +33,7 @@ class MatchedLog(NamedTuple):
     """N steps as rules take them.
 
     Attributes:
-        observations: In the rules' order, (N, d) float32.
+        observations: In the rules' order, with what they derive, (N, d + k) float32.
         labels: Of what was done, (N, m).
         actions: What was done, as the rules' own actions, (N,) or (N, m).
         notes: What is to be said of how the two were matched, as clauses.
@@ -57,9 +62,10 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
     """
     log = recoded(log, rule_set.source.features, called=called)
     places, notes = _feature_places(rule_set, log, called)
-    observations = log.observations
+    observations = log.raw_observations
     if places != list(range(observations.shape[1])):
         observations = np.ascontiguousarray(observations[:, places])
+    observations = extend(observations, rule_set.source.features)
     _check_units(rule_set, log, places, called)
     names = tuple(dimension.name for dimension in log.action_dimensions)
     order = tuple(range(len(names)))
@@ -109,8 +115,8 @@ def _feature_places(
     rule_set: RuleSet, log: Demonstrations, called: str
 ) -> tuple[list[int], tuple[str, ...]]:
     """For each feature of the rules its place in the log."""
-    theirs = tuple(feature.name for feature in rule_set.source.features)
-    ours = tuple(feature.name for feature in log.features)
+    theirs = tuple(feature.name for feature in observed_features(rule_set.source.features))
+    ours = tuple(feature.name for feature in log.observed)
     wanted, have = plain_names(theirs), plain_names(ours)
     missing = [name for name, plain in zip(theirs, wanted, strict=True) if plain not in have]
     further = [name for name, plain in zip(ours, have, strict=True) if plain not in wanted]
@@ -131,7 +137,7 @@ def _feature_places(
 
 
 def _check_units(rule_set: RuleSet, log: Demonstrations, places: list[int], called: str) -> None:
-    for feature, place in zip(rule_set.source.features, places, strict=True):
+    for feature, place in zip(observed_features(rule_set.source.features), places, strict=True):
         unit = log.features[place].unit.strip()
         if unit and feature.unit.strip() and unit != feature.unit.strip():
             raise InputError(

@@ -21,6 +21,7 @@ from sarl_core.cli.diff import diff
 from sarl_core.cli.episodes import evaluate, render
 from sarl_core.cli.export import export
 from sarl_core.cli.learning import learn, train_expert
+from sarl_core.cli.options import with_bare_combine
 from sarl_core.cli.report import report
 from sarl_core.cli.reproduce import reproduce
 from sarl_core.cli.rules import landscape, mine
@@ -66,7 +67,7 @@ def main(arguments: Sequence[str]) -> int:
     Returns:
         The exit code.
     """
-    return terminal.run(app, arguments)
+    return terminal.run(app, with_bare_combine(arguments))
 
 
 @app.callback(invoke_without_command=True)

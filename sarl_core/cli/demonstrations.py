@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import path_of, read_agent, read_demonstrations
+from sarl_core.cli.inputs import path_of, read_agent, read_demonstrations, with_wanted
 from sarl_core.cli.options import (
     AgentName,
     Columns,
+    Derived,
     Env,
     EnvOfFile,
     Files,
@@ -22,6 +23,7 @@ from sarl_core.cli.options import (
     Stochastic,
     out_option,
     with_columns,
+    with_derived,
     with_environment,
     with_played_environment,
 )
@@ -74,9 +76,11 @@ def record(
 
 @with_environment
 @with_columns
+@with_derived
 def check(
     files: Files,
     columns: Columns,
+    derived: Derived,
     missing: MissingName = "refuse",
     env: EnvOfFile = None,
     suggest: Annotated[
@@ -100,7 +104,8 @@ def check(
     if suggest is not None:
         _suggest_columns(files, columns, suggest, as_json)
         return
-    _tell_demonstrations(read_demonstrations(files, env, columns, missing), path_of(files), as_json)
+    demonstrations = with_wanted(read_demonstrations(files, env, columns, missing), derived)
+    _tell_demonstrations(demonstrations, path_of(files), as_json)
 
 
 def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bool) -> None:

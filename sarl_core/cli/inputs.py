@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sarl_core.cli import terminal
+from sarl_core.cli.options import EVERY_PAIR, Derived
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 
@@ -91,6 +92,40 @@ def read_demonstrations(
     if isinstance(files, list) and len(files) == 1:
         files = files[0]  # which may be a pattern
     return load_demonstrations(files, env_id=env_id, columns=columns, missing=missing)
+
+
+def with_wanted(
+    demonstrations: Demonstrations, derived: Derived, *, divider: int = 2
+) -> Demonstrations:
+    """Put what a person wants derived behind the features of demonstrations.
+
+    Args:
+        demonstrations: As they were read.
+        derived: Of the options ``--combine`` and ``--feature``.
+        divider: Of the option ``--divider``.
+
+    Returns:
+        The same steps; the same object where nothing is wanted.
+
+    Raises:
+        InputError: If a formula is none, or a feature is unknown.
+    """
+    if derived.formulas:
+        from sarl_core.demonstrations.dataset import formula_feature
+
+        observed = demonstrations.observed
+        formulas = [formula_feature(text, observed) for text in derived.formulas]
+        demonstrations = demonstrations.deriving([*demonstrations.derived, *formulas])
+    if derived.pairs:
+        from sarl_core.mining.combining.candidates import pairs_by_name, pairs_of_like_kind
+        from sarl_core.mining.combining.choice import with_combinations
+
+        named = [text for text in derived.pairs if text != EVERY_PAIR]
+        pairs = pairs_by_name(demonstrations, named)
+        if EVERY_PAIR in derived.pairs:
+            pairs = tuple(dict.fromkeys((*pairs, *pairs_of_like_kind(demonstrations))))
+        demonstrations = with_combinations(demonstrations, pairs=pairs, divider=divider)
+    return demonstrations
 
 
 def read_shield(

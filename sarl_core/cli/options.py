@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import typer
 
@@ -205,6 +205,29 @@ MissingName = Annotated[
         "are; the others keep their numbers.",
     ),
 ]
+_Combine = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--combine",
+        metavar="[A,B]",
+        show_default=False,
+        help="Let rules ask about combinations of two features as well, as 'position plus 0.5 s of "
+        "velocity': alone of every two features that are amounts; or of those that are named, with "
+        'a comma between them ("vertical position, vertical velocity"). May be given several '
+        "times.",
+    ),
+]
+_Formulas = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--feature",
+        metavar="NAME [UNIT] = FORMULA",
+        show_default=False,
+        help='Let rules ask about a formula of yours as well: "time to collision [s] = gap / '
+        '(own_speed - lead_speed)". It may have numbers, names of features, + - * /, min, max, abs '
+        "and parentheses. May be given several times.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 
@@ -279,6 +302,63 @@ def with_environment(command: Callable[..., None], *, played: bool = False) -> C
 
 with_played_environment = partial(with_environment, played=True)
 """The same of a command that plays episodes: what a failure is in them, and what a step costs."""
+
+
+class Derived(NamedTuple):
+    """What a person wants to be derived from the features of demonstrations.
+
+    Attributes:
+        pairs: Lists of features that are combined with each other; `EVERY_PAIR` for all.
+        formulas: As "time to collision [s] = gap / closing_speed".
+    """
+
+    pairs: tuple[str, ...]
+    formulas: tuple[str, ...]
+
+
+EVERY_PAIR = "*"
+
+
+def with_bare_combine(arguments: Sequence[str]) -> list[str]:
+    """A command line in which ``--combine`` alone, as Typer cannot read it, has a value.
+
+    Args:
+        arguments: As they were typed.
+
+    Returns:
+        The same; names that are combined stand behind it with a comma between them.
+    """
+    typed = list(arguments)
+    for place, argument in enumerate(typed):
+        if argument == "--combine" and not any("," in one for one in typed[place + 1 : place + 2]):
+            typed[place] = f"--combine={EVERY_PAIR}"
+    return typed
+
+
+def with_derived(command: Callable[..., None]) -> Callable[..., None]:
+    """Let a command that mines take what is derived from features.
+
+    Args:
+        command: With a parameter `derived`, a `Derived`.
+
+    Returns:
+        The command as Typer reads it: with ``--combine`` and ``--feature`` in its place.
+    """
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    parameters = [
+        one.replace(kind=keyword)
+        for one in inspect.signature(command, eval_str=True).parameters.values()
+        if one.name != "derived"
+    ]
+    for name, annotation in (("combine", _Combine), ("feature", _Formulas)):
+        parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
+
+    @wraps(command)
+    def run(*, combine: list[str] | None, feature: list[str] | None, **others: Any) -> None:
+        command(derived=Derived(tuple(combine or ()), tuple(feature or ())), **others)
+
+    vars(run)["__signature__"] = inspect.Signature(parameters)
+    return run
 
 
 def with_columns(command: Callable[..., None]) -> Callable[..., None]:

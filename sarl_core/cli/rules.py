@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import path_of, read_demonstrations
+from sarl_core.cli.inputs import path_of, read_demonstrations, with_wanted
 from sarl_core.cli.options import (
     Columns,
+    Derived,
     Divider,
     EnvOfFile,
     Files,
@@ -18,6 +19,7 @@ from sarl_core.cli.options import (
     MissingName,
     out_option,
     with_columns,
+    with_derived,
     with_environment,
 )
 from sarl_core.errors import InputError
@@ -25,10 +27,12 @@ from sarl_core.errors import InputError
 
 @with_environment
 @with_columns
+@with_derived
 def mine(
     files: Files,
     out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
     columns: Columns,
+    derived: Derived,
     missing: MissingName = "refuse",
     support: Annotated[
         float | None,
@@ -139,6 +143,7 @@ def mine(
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
         demonstrations = read_demonstrations(files, env, columns, missing)
+        demonstrations = with_wanted(demonstrations, derived, divider=divider)
         oddities = describe_oddities(demonstrations)
         tried = split = None
         if hold_out is not None:
@@ -176,10 +181,12 @@ def mine(
 
 @with_environment
 @with_columns
+@with_derived
 def landscape(
     files: Files,
     out: Annotated[Path, out_option("A .json, .csv, .html or .png file.")],
     columns: Columns,
+    derived: Derived,
     missing: MissingName = "refuse",
     env: EnvOfFile = None,
     divider: Divider = 2,
@@ -218,6 +225,7 @@ def landscape(
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
         recorded = read_demonstrations(files, env, columns, missing)
+        recorded = with_wanted(recorded, derived, divider=divider)
         trees = grow_policy_trees(recorded, divider=divider)
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]

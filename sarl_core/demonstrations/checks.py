@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.derived import DerivedFeature, Extension
 from sarl_core.demonstrations.fields import DemonstrationFields, Indicator, labels_of
 from sarl_core.demonstrations.requirements import (
     LARGEST,
@@ -46,14 +47,14 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
     Raises:
         InputError: In one sentence, with the column and the first row (from 1).
     """
-    observations = _observations(raw.observations)
+    observations = _observations(_observed(raw))
     n, d = observations.shape
     feature_names = _names(raw.feature_names, d, "feature")
     units = ("",) * d if raw.feature_units is None else tuple(map(str, raw.feature_units))
     require_length(len(units), d, "feature units", "features")
     require_finite(observations, [f"observation {name!r}" for name in feature_names])
     columns = [f"feature {name!r}" for name in feature_names]
-    notes = (*raw.notes, *coarse_columns(raw.observations, observations, columns))
+    notes = (*raw.notes, *coarse_columns(_observed(raw), observations, columns))
     given, named = _words_as_labels(raw)
     actions = _actions(raw, given, named, n)
     m = 1 if actions.ndim == 1 else actions.shape[1]
@@ -61,8 +62,10 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
     episodes = whole_numbers(raw.episodes, n, "column 'episode'")
     steps = None if raw.steps is None else whole_numbers(raw.steps, n, "column 'step'")
     require_order(episodes, steps)
+    derived = tuple(raw.derived)
     fields: dict[str, Any] = {
-        "observations": observations,
+        "observations": _extended(observations, derived, feature_names),
+        "derived": derived,
         "actions": actions,
         "episodes": episodes,
         "steps": counted_steps(episodes) if steps is None else steps,
@@ -85,6 +88,55 @@ def normalise(raw: DemonstrationFields) -> dict[str, Any]:
     if actions.dtype.kind == "i":
         return fields | _labels(raw, named, actions.reshape(n, m), action_names)
     return fields | _bounds(raw, actions, action_names)
+
+
+def _observed(raw: DemonstrationFields) -> Any:
+    """The observations without derived features, which are worked out again."""
+    given = raw.observations
+    if not raw.derived or raw.feature_names is None:
+        return given
+    d = len(tuple(raw.feature_names))
+    if getattr(given, "ndim", 0) == 2 and given.shape[1] == d + len(raw.derived):
+        return given[:, :d]
+    return given
+
+
+def _extended(
+    observations: NDArray[np.float32],
+    derived: tuple[DerivedFeature, ...],
+    feature_names: tuple[str, ...],
+) -> NDArray[np.float32]:
+    """Observations with the values of derived features, of which each has one."""
+    if not derived:
+        return observations
+    d = len(feature_names)
+    if d + len(derived) > MAX_FEATURES:
+        raise InputError(
+            f"there are {d + len(derived):,} features with those that are derived, more than the "
+            f"{MAX_FEATURES:,} that rules a person reads could use; derive fewer"
+        )
+    for one in derived:
+        if any(not 0 <= place < d for place in one.definition.features):
+            raise InputError(
+                f"a derived feature is of feature {max(one.definition.features)}, and there are "
+                f"{d}, counted from 0; derive it from those"
+            )
+    named = [one.name for one in derived if one.name]
+    doubled = next((name for name in named if [*feature_names, *named].count(name) > 1), None)
+    if doubled is not None:
+        raise InputError(f"the feature name {quoted(doubled)} stands twice; give each its own name")
+    extended = Extension(d, [one.definition for one in derived]).many(observations)
+    for one, values in zip(derived, extended[:, d:].T, strict=True):
+        none = np.isnan(values)
+        count = int(none.sum())
+        if count:
+            raise InputError(
+                f"the formula of {quoted(one.name)} has no value in {count:,} "
+                f"step{'s'[: count > 1]}, first in row {int(np.argmax(none)) + 1} (0/0 is none); "
+                "write it so that it has one in every demonstrated state, as with max(speed, 0.1) "
+                "for speed"
+            )
+    return extended
 
 
 def _observations(given: Any) -> NDArray[np.float32]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, astuple, dataclass, field, replace
 from functools import cached_property
@@ -13,6 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations import checks
+from sarl_core.demonstrations.derived import (
+    Combination,
+    Definition,
+    DerivedFeature,
+    combination_name,
+    in_places,
+)
 from sarl_core.demonstrations.fields import (
     TRUTH,
     Actions,
@@ -21,7 +29,11 @@ from sarl_core.demonstrations.fields import (
     labels_of,
 )
 from sarl_core.demonstrations.splits import Splits
-from sarl_core.errors import InputError
+from sarl_core.environments.formulas import Formula
+from sarl_core.errors import InputError, quoted, require
+
+_NAMED = re.compile(r"(?P<name>[^\[\]<>]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+_LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -32,6 +44,7 @@ class Feature:
         name: In words, as "pole angle".
         unit: As "rad", or "" where there is none.
         indicator: What it says of a column of words, where it is 1 or 0 for that; else None.
+        derived: How it is worked out from the features that are observed; None for one of those.
         splits: The thresholds that trees or rules ask of it, with the demonstrated values around
             them, so that whoever writes one knows how many digits it takes; None where nothing is
             known of them. It is no part of what the feature is.
@@ -40,6 +53,7 @@ class Feature:
     name: str
     unit: str = ""
     indicator: Indicator | None = None
+    derived: Definition | None = None
     splits: Splits | None = field(default=None, compare=False, repr=False)
 
     def statement(self, holds: bool) -> str:
@@ -62,6 +76,95 @@ class Feature:
         if not is_:
             return f"{self.name} is {TRUTH[holds]}"
         return self.name if holds else f"{before} is not {after}"
+
+
+def with_derived(
+    features: tuple[Feature, ...], derived: Sequence[DerivedFeature]
+) -> tuple[Feature, ...]:
+    """Derived features behind those that are observed.
+
+    Args:
+        features: Observed, d of them.
+        derived: Over these, k of them.
+
+    Returns:
+        Shape (d + k,).
+    """
+    return features + tuple(
+        Feature(
+            combination_name(one.definition, features),
+            features[one.definition.features[0]].unit,
+            derived=one.definition,
+        )
+        if isinstance(one.definition, Combination)
+        else Feature(one.name, one.unit, derived=one.definition)
+        for one in derived
+    )
+
+
+def observed_features(features: Sequence[Feature]) -> tuple[Feature, ...]:
+    """Those that are no derived ones; they stand before all others."""
+    return tuple(one for one in features if one.derived is None)
+
+
+def derived_features(features: Sequence[Feature]) -> tuple[DerivedFeature, ...]:
+    """The others, as they are derived."""
+    return tuple(
+        DerivedFeature(one.derived)
+        if isinstance(one.derived, Combination)
+        else DerivedFeature(one.derived, one.name, one.unit)
+        for one in features
+        if one.derived is not None
+    )
+
+
+def derived_over(
+    derived: Sequence[DerivedFeature], places: Sequence[int], names: Sequence[str]
+) -> tuple[DerivedFeature, ...]:
+    """Derived features over others, in another order or under other names.
+
+    Args:
+        derived: Over d features.
+        places: For each of the d its index among the others.
+        names: Of the others.
+
+    Returns:
+        As many.
+    """
+    return tuple(
+        replace(one, definition=in_places(one.definition, places, names)) for one in derived
+    )
+
+
+def formula_feature(text: str, features: Sequence[Feature]) -> DerivedFeature:
+    """A derived feature that a person wrote.
+
+    Args:
+        text: As "time to collision [s] = gap / (own_speed - lead_speed)"; the unit may be left
+            out.
+        features: Observed, which it may name: as they are called, with spaces or underscores, in
+            quotation marks where a name has other signs.
+
+    Returns:
+        The feature.
+
+    Raises:
+        InputError: If it has no name, or what stands behind the sign of equality is no formula.
+    """
+    require(text, str, "a feature must be text", "write one, as 'rate [1/s] = speed / gap'")
+    name, equals, formula = text.partition("=")
+    match = _NAMED.fullmatch(name.strip())
+    if not equals or match is None:
+        raise InputError(
+            f"{quoted(text)} is no feature; write its name, its unit in brackets and its formula, "
+            "as 'time to collision [s] = gap / (own_speed - lead_speed)'"
+        )
+    if len(match["name"]) > _LONGEST_NAME:
+        raise InputError(
+            f"the name {quoted(match['name'])} has more than {_LONGEST_NAME} signs; shorten it"
+        )
+    parsed = Formula.parse(formula.strip(), [one.name for one in features])
+    return DerivedFeature(parsed, " ".join(match["name"].split()), (match["unit"] or "").strip())
 
 
 @dataclass(frozen=True)
@@ -124,6 +227,21 @@ class Summary:
     label_shares: tuple[tuple[float, ...], ...]
 
 
+def derived_document(derived: DerivedFeature) -> dict[str, Any]:
+    """A derived feature for JSON.
+
+    Args:
+        derived: Any.
+
+    Returns:
+        The `terms` of a combination; of a formula `name`, `unit` and `formula`.
+    """
+    definition = derived.definition
+    if isinstance(definition, Combination):
+        return {"terms": [list(term) for term in definition.terms]}
+    return {"name": derived.name, "unit": derived.unit, "formula": definition.text}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Demonstrations(DemonstrationFields):
     """N state-action pairs of an expert, in episodes.
@@ -132,7 +250,8 @@ class Demonstrations(DemonstrationFields):
     refused with one sentence that names the column and the first row (rows count from 1).
 
     Attributes:
-        observations: Shape (N, d), float32.
+        observations: Shape (N, d), float32; behind the d that were observed the k derived ones,
+            which are always worked out here, whatever was given in their place: (N, d + k).
         actions: Discrete: (N,) or (N, m) int64. Continuous: (N, m) float32. Words, true and false,
             and categories are given as they are and become labels: in the order of an ordered
             category, else sorted.
@@ -147,6 +266,7 @@ class Demonstrations(DemonstrationFields):
         feature_units: d units, "" where there is none.
         indicators: For each feature what it says of a column of words, or None; None where none
             does.
+        derived: What is worked out from the d features, k of them.
         action_names: m names, one an action dimension.
         label_names: For each action dimension the names of its labels, () if continuous.
         label_first: For each dimension the action that label 0 stands for (`Discrete.start`).
@@ -242,7 +362,12 @@ class Demonstrations(DemonstrationFields):
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
-        """Names and units of the observation vector's d entries."""
+        """Names and units of the d features that were observed, and of the k derived ones."""
+        return with_derived(self.observed, self.derived)
+
+    @cached_property
+    def observed(self) -> tuple[Feature, ...]:
+        """Names and units of the d features that were observed."""
         assert self.feature_names is not None
         assert self.feature_units is not None
         indicators = self.indicators or (None,) * len(self.feature_names)
@@ -250,6 +375,11 @@ class Demonstrations(DemonstrationFields):
             Feature(*known)
             for known in zip(self.feature_names, self.feature_units, indicators, strict=True)
         )
+
+    @property
+    def raw_observations(self) -> NDArray[np.float32]:
+        """The features that were observed alone, (N, d)."""
+        return self.observations[:, : len(self.observed)]
 
     @cached_property
     def action_dimensions(self) -> tuple[ActionDimension, ...]:
@@ -292,8 +422,9 @@ class Demonstrations(DemonstrationFields):
             "features": [
                 {"name": one.name, "unit": one.unit}
                 | ({} if one.indicator is None else {"indicator": asdict(one.indicator)})
-                for one in self.features
+                for one in self.observed
             ],
+            **({"derived": list(map(derived_document, self.derived))} if self.derived else {}),
             "action_names": list(self.action_names or ()),
             "label_names": [list(names) for names in self.label_names or ()],
             "label_first": list(self.label_first or ()),
@@ -371,6 +502,20 @@ class Demonstrations(DemonstrationFields):
             steps=chosen(self.steps),
             times=chosen(self.times),
         )
+
+    def deriving(self, derived: Sequence[DerivedFeature]) -> Demonstrations:
+        """The same steps with other derived features.
+
+        Args:
+            derived: Over the features that were observed, in place of those that there are.
+
+        Returns:
+            With the values of these.
+
+        Raises:
+            InputError: If one has no value in a step, or two share a name.
+        """
+        return replace(self, observations=self.raw_observations, derived=tuple(derived))
 
     def summary(self) -> Summary:
         """What these demonstrations contain, in numbers."""

@@ -8,6 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.derived import DerivedFeature
+
 Actions = NDArray[np.int64] | NDArray[np.float32]
 
 
@@ -91,6 +93,7 @@ class DemonstrationFields:
     feature_names: tuple[str, ...] | None = None
     feature_units: tuple[str, ...] | None = None
     indicators: tuple[Indicator | None, ...] | None = None
+    derived: tuple[DerivedFeature, ...] = ()
     action_names: tuple[str, ...] | None = None
     label_names: tuple[tuple[str, ...], ...] | None = None
     label_first: tuple[int, ...] | None = None

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, derived_over
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.environments.feature_order import NamedFeatures, line_up
 from sarl_core.errors import InputError, quoted
@@ -19,7 +19,7 @@ class Names(NamedTuple):
     """All names of demonstrations.
 
     Attributes:
-        features: d names.
+        features: d names, of what was observed; derived features follow them.
         units: d units, "" where there is none.
         actions: m names, one an action dimension.
         labels: For each action dimension the names of its labels, () if continuous.
@@ -42,8 +42,8 @@ def names_of(demonstrations: Demonstrations) -> Names:
     """
     dimensions = demonstrations.action_dimensions
     return Names(
-        tuple(feature.name for feature in demonstrations.features),
-        tuple(feature.unit for feature in demonstrations.features),
+        tuple(feature.name for feature in demonstrations.observed),
+        tuple(feature.unit for feature in demonstrations.observed),
         tuple(dimension.name for dimension in dimensions),
         tuple(dimension.labels for dimension in dimensions),
     )
@@ -113,6 +113,7 @@ def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
         demonstrations,
         feature_names=names.features,
         feature_units=names.units,
+        derived=derived_over(demonstrations.derived, range(len(names.features)), names.features),
         action_names=names.actions,
         label_names=names.labels if demonstrations.is_discrete else demonstrations.label_names,
     )
@@ -158,6 +159,9 @@ def in_order_of(demonstrations: Demonstrations, description: EnvironmentDescript
         demonstrations = replace(
             demonstrations,
             observations=demonstrations.observations[:, features.places],
+            derived=derived_over(
+                demonstrations.derived, features.inverse, features.put(own.features)
+            ),
             feature_names=features.put(own.features),
             feature_units=features.put(own.units),
             indicators=features.put(demonstrations.indicators or ()) or None,

@@ -1,4 +1,4 @@
-"""Words of one set of demonstrations said by the indicators that rules know."""
+"""Demonstrations seen as rules see them: with their indicators of words, and what they derive."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.dataset import (
+    Demonstrations,
+    Feature,
+    derived_features,
+    derived_over,
+    observed_features,
+)
+from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.demonstrations.fields import TRUTH
 from sarl_core.demonstrations.words import Coded, columns_of_words, indicated, spelled, words_of
 from sarl_core.environments.feature_order import plain_names, shortened
@@ -17,10 +24,10 @@ from sarl_core.errors import InputError, quoted
 def recoded(
     demonstrations: Demonstrations, features: Sequence[Feature], *, called: str
 ) -> Demonstrations:
-    """Demonstrations whose columns of words have the indicators of other features.
+    """Demonstrations with the indicators and the derived features of rules.
 
     Which words occur decides which indicators a column becomes; rules know those of the data that
-    they were mined from.
+    they were mined from. What rules derive is worked out from what was observed.
 
     Args:
         demonstrations: N steps.
@@ -28,19 +35,43 @@ def recoded(
         called: What the demonstrations are called in a message.
 
     Returns:
-        The same steps; the same object where the indicators are the same, or there are none.
+        The same steps; the same object where nothing is different. Where they lack a feature that
+        something is derived from, nothing is: they are refused where features are lined up.
 
     Raises:
         InputError: If a column holds a word that the rules do not know.
     """
+    return _deriving(_indicating(demonstrations, features, called), features)
+
+
+def _deriving(demonstrations: Demonstrations, features: Sequence[Feature]) -> Demonstrations:
+    """The same with other derived features than they have."""
+    names = [one.name for one in demonstrations.observed]
+    theirs = [one.name for one in observed_features(features)]
+    have, wanted = plain_names(names), plain_names(theirs)
+    derived: tuple[DerivedFeature, ...] = ()
+    if {*wanted} <= {*have}:
+        places = [have.index(name) for name in wanted]
+        derived = derived_over(derived_features(features), places, names)
+    elif len(names) == len(theirs):  # whether they are the same is told where they are lined up
+        derived = derived_over(derived_features(features), range(len(names)), names)
+    if [one.definition for one in derived] == [one.definition for one in demonstrations.derived]:
+        return demonstrations
+    return demonstrations.deriving(derived)
+
+
+def _indicating(
+    demonstrations: Demonstrations, features: Sequence[Feature], called: str
+) -> Demonstrations:
+    features = observed_features(features)
     wanted = _by_column(features)
-    own = _by_column(demonstrations.features)
-    indicators = [one.indicator for one in demonstrations.features]
+    own = _by_column(demonstrations.observed)
+    indicators = [one.indicator for one in demonstrations.observed]
     if not wanted or [one.indicator for one in features] == indicators:
         return demonstrations
     columns: list[np.ndarray[tuple[int], np.dtype[np.float32]]] = []
     said: list[Feature] = []
-    for at, feature in enumerate(demonstrations.features):
+    for at, feature in enumerate(demonstrations.observed):
         (column,) = plain_names((feature.indicator.column if feature.indicator else feature.name,))
         places = own.get(column, [at])
         if column not in wanted or at != places[0]:
@@ -60,6 +91,7 @@ def recoded(
     return replace(
         demonstrations,
         observations=np.stack(columns, axis=1),
+        derived=(),
         feature_names=tuple(one.name for one in said),
         feature_units=tuple(one.unit for one in said),
         indicators=tuple(one.indicator for one in said),

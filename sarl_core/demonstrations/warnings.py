@@ -9,6 +9,7 @@ import numpy as np
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formula_units import unit_warnings
 from sarl_core.demonstrations.giveaways import find_giveaways
 from sarl_core.demonstrations.requirements import FEW_VALUES
 from sarl_core.demonstrations.words import begin_as_numbers, columns_of_words, words_of
@@ -24,13 +25,14 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
         demonstrations: To look at.
 
     Returns:
-        One sentence each: notes from reading, constant or doubled features, features that give
-        the action or the time, labels that never occur, are written in two ways or are nearly as
-        many as the steps, a single action.
+        One sentence each: notes from reading, constant or doubled features, formulas that mix
+        units, features that give the action or the time, labels that never occur, are written in
+        two ways or are nearly as many as the steps, a single action.
     """
     return (
         *demonstrations.notes,
         *_feature_warnings(demonstrations),
+        *_shortened(unit_warnings(demonstrations.features), "formulas mix units"),
         *_shortened(_amounts(demonstrations), "columns of words may hold amounts"),
         *_shortened(find_giveaways(demonstrations), "features tell what they should not"),
         *_action_warnings(demonstrations),

@@ -51,6 +51,11 @@ class FeatureOrder(NamedTuple):
     places: tuple[int, ...]
     note: str = ""
 
+    @property
+    def inverse(self) -> tuple[int, ...]:
+        """For each feature of the first, its place in the second."""
+        return tuple(sorted(range(len(self.places)), key=self.places.__getitem__))
+
     def put(self, entries: tuple[_T, ...]) -> tuple[_T, ...]:
         """What the first has, one entry a feature, in the second's order; nothing stays nothing."""
         return tuple(entries[place] for place in self.places) if entries else entries

@@ -3,12 +3,15 @@
 A person writes ``gap / (own speed - lead speed)`` or ``abs(pole angle) > 0.2 or gap <= 3``.
 There are numbers, names of features, ``+ - * /``, ``min``, ``max``, ``abs`` and parentheses, and in
 conditions ``< <= > >=``, ``and``, ``or``, ``not``. A name is written as it is, spaces included; in
-quotation marks where it has other signs or one of these words: ``'vehicle 2: x' < 0.1``.
+quotation marks where it has other signs or one of these words: ``'vehicle 2: x' < 0.1``. Capitals
+do not matter, nor whether its words are parted by spaces or underscores: ``own_speed``.
 """
 
 from __future__ import annotations
 
 import difflib
+import math
+import operator
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,10 +20,11 @@ from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.environments.feature_order import shortened
+from sarl_core.decimals import decimal_text
+from sarl_core.environments.feature_order import plain_names, shortened
 from sarl_core.errors import InputError, quoted, require
 
-MAX_LENGTH = 1_000  # signs
+MAX_LENGTH = 500  # signs
 MAX_DEPTH = 50  # parentheses in each other
 MAX_OPERATIONS = 200
 
@@ -29,6 +33,8 @@ _TOKEN = re.compile(
     r"""\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<word>[^\W\d]\w*)"""
     r"""|'(?P<single>[^']*)'|"(?P<double>[^"]*)"|(?P<sign><=|>=|[-+*/<>(),]))"""
 )
+_BARE = re.compile(r"\w+")
+_DIGITS = "0123456789"
 _GRAMMAR = (
     "write numbers, names of features, + - * /, min, max, abs, parentheses, and in conditions "
     "< <= > >=, and, or, not"
@@ -167,6 +173,25 @@ class Formula(_Parsed):
     """A number over an observation, as a derived feature or a cost."""
 
     is_truth = False
+
+    def value(self, state: Sequence[float]) -> float:
+        """As `values`, of one state of d float32 numbers: no array is made of it."""
+        return _number(self.root, state)
+
+    def over(self, places: Sequence[int], names: Sequence[str]) -> Formula:
+        """The same of features in another order, or under other names.
+
+        Args:
+            places: For each of the d features its index among the others.
+            names: Of the others.
+
+        Returns:
+            A formula whose text names those.
+
+        Raises:
+            InputError: If the text would be too long, or a name cannot stand in one.
+        """
+        return Formula.parse(written(self.root, [names[place] for place in places]), names)
 
 
 @dataclass(frozen=True)
@@ -377,6 +402,9 @@ class _Parser:
     def _feature(self, token: _Token) -> FeatureValue:
         if token.text in self.names:
             return FeatureValue(self.names.index(token.text))
+        plain = plain_names((token.text, *self.names))
+        if plain[1:].count(plain[0]) == 1:
+            return FeatureValue(plain[1:].index(plain[0]))
         near = difflib.get_close_matches(token.text, self.names, n=1)
         raise self._error(
             "is no feature",
@@ -386,6 +414,61 @@ class _Parser:
             else f"the features are {shortened(self.names)} (a name with other signs than letters, "
             "digits and spaces stands in quotation marks)",
         )
+
+
+def written(root: Node, names: Sequence[str]) -> str:
+    """A formula as text that is read as the same one.
+
+    Args:
+        root: What is worked out.
+        names: Of the features.
+
+    Returns:
+        With no more parentheses than it takes.
+    """
+    if isinstance(root, Constant):
+        return decimal_text(root.value)
+    if isinstance(root, FeatureValue):
+        return _written_name(names[root.index], names)
+    if root.name in _FUNCTIONS:
+        return f"{root.name}({', '.join(written(one, names) for one in root.operands)})"
+    rank = _rank(root)
+    # What follows an operation of the same rank was in parentheses: from left to right.
+    texts = [
+        text if _rank(one) + (place > 0) <= rank else f"({text})"
+        for place, one in enumerate(root.operands)
+        for text in [written(one, names)]
+    ]
+    if len(texts) == 1:
+        return f"{root.name}{' ' if root.name in _WORDS else ''}{texts[0]}"
+    return f" {root.name} ".join(texts)
+
+
+def _rank(node: Node) -> int:
+    """How loosely a node binds."""
+    if not isinstance(node, Operation) or node.name in _FUNCTIONS:
+        return 0
+    if len(node.operands) == 1:
+        return 1 if node.name == "-" else 5
+    ranks = {"*": 2, "/": 2, "+": 3, "-": 3, "and": 6, "or": 7}
+    return ranks.get(node.name, 4)
+
+
+def _written_name(name: str, names: Sequence[str]) -> str:
+    """A name as it is where that is read as one, else in quotation marks."""
+    words = name.split()
+    bare = (
+        all(map(_BARE.fullmatch, words)) and " ".join(words) == name and words[0][0] not in _DIGITS
+    )
+    if bare and not {*words} & {*_WORDS, *_FUNCTIONS}:
+        return name
+    for mark in "'\"":
+        if mark not in name:
+            return f"{mark}{name}{mark}"
+    raise InputError(
+        f"the feature {quoted(name)} has both quotation marks in its name, and no formula can "
+        f"name it; rename it ({shortened(names)})"
+    )
 
 
 def _is_truth(node: Node) -> bool:
@@ -403,6 +486,28 @@ def _value(node: Node, states: NDArray[np.float64]) -> Any:
     for other in others:
         first = _OF_TWO[node.name](first, other)
     return first
+
+
+def _number(node: Node, state: Sequence[float]) -> float:
+    """The same of one state, in plain Python."""
+    if isinstance(node, FeatureValue):
+        return state[node.index]
+    if isinstance(node, Constant):
+        return node.value
+    first, *others = (_number(operand, state) for operand in node.operands)
+    if not others:
+        return abs(first) if node.name == "abs" else -first
+    for other in others:
+        first = _NUMBER_OF_TWO[node.name](first, other)
+    return first
+
+
+def _quotient(a: float, b: float) -> float:
+    if b:
+        return a / b
+    if not a or math.isnan(a):
+        return math.nan
+    return math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
 def _compared(how: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -427,9 +532,18 @@ _OF_TWO: dict[str, Callable[[Any, Any], Any]] = {
     "-": np.subtract,
     "*": np.multiply,
     "/": np.divide,
-    "min": np.minimum,
-    "max": np.maximum,
+    # Which of two zeros comes out is not left to the machine.
+    "min": lambda a, b: np.where(np.isnan(a) | (a < b), a, b),
+    "max": lambda a, b: np.where(np.isnan(a) | (a > b), a, b),
     # What is true whatever the part without a value would be, is true; likewise what is false.
     "and": lambda a, b: np.where((a == 0.0) | (b == 0.0), 0.0, a * b),
     "or": lambda a, b: np.where((a == 1.0) | (b == 1.0), 1.0, a + b),
+}
+_NUMBER_OF_TWO: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _quotient,
+    "min": lambda a, b: a if math.isnan(a) or a < b else b,
+    "max": lambda a, b: a if math.isnan(a) or a > b else b,
 }

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import extend
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, Numbered, RuleNode, tree_of
+from sarl_core.mining.rules import take_back_unanswered
 from sarl_core.mining.tree import walk
 
 
@@ -34,11 +36,12 @@ def applications(rule_set: RuleSet, observations: NDArray[np.float32]) -> Applic
 
     Args:
         rule_set: R rules.
-        observations: Shape (B, d), float32.
+        observations: Shape (B, d) or, with what is derived, (B, d + k), float32.
 
     Returns:
         At most one entry a state and action dimension, and those of placed rules.
     """
+    observations = extend(observations, rule_set.source.features)
     parts: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
     for dimension in range(len(rule_set.actions)):
         numbered = [entry for entry in enumerate(rule_set.rules) if entry[1].dimension == dimension]
@@ -47,6 +50,7 @@ def applications(rule_set: RuleSet, observations: NDArray[np.float32]) -> Applic
         alone = [entry for entry in numbered if entry[1].placed] if nodes is not None else numbered
         if nodes is not None:
             rule = _rule_of_each(nodes, observations)
+            take_back_unanswered(rule, observations, rule_set.rules)
             rows = np.flatnonzero(rule != NO_RULE)
             parts.append((rule[rows], rows))
         parts += [_states_of(entry, observations) for entry in alone]

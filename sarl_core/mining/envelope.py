@@ -17,6 +17,8 @@ from sarl_core.mining.tree import splits_of
 
 LOW_QUANTILE, HIGH_QUANTILE = 0.01, 0.99
 
+_LARGEST = float(np.finfo(np.float32).max)
+
 Floats = NDArray[np.float64]
 
 
@@ -102,6 +104,8 @@ def _boxes(
     for feature in range(d):
         values = observations[applied.row, feature]
         ordered = values[np.lexsort((values, applied.rule))].astype(np.float64)
+        # A formula may be infinite, which no file can say: the largest number stands for it.
+        ordered = np.clip(ordered, -_LARGEST, _LARGEST)
         corners[0, :, feature] = ordered[start]
         corners[1, :, feature] = _quantile(ordered, start, count, LOW_QUANTILE)
         corners[2, :, feature] = _quantile(ordered, start, count, HIGH_QUANTILE)

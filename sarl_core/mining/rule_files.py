@@ -7,6 +7,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
@@ -16,7 +17,8 @@ import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict, astuple
 
-from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.dataset import Feature, with_derived
+from sarl_core.demonstrations.derived import Combination, Definition, DerivedFeature
 from sarl_core.demonstrations.fields import Indicator
 from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
@@ -30,6 +32,7 @@ from sarl_core.documents import (
     conformed,
     parse_json,
 )
+from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, quoted
 from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
@@ -39,9 +42,9 @@ from sarl_core.mining.tree import Source
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
-"""Version 2 tells in how many episodes held-out pairs lie, what features say of words, and which
-actions labels stand for that do not count. A file without all that is written as version 1, which
-is what it was before there was another."""
+"""Version 2 tells in how many episodes held-out pairs lie, what features say of words, how they are
+derived from others, and which actions labels stand for that do not count. A file without all that
+is written as version 1, which is what it was before there was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
@@ -165,7 +168,7 @@ def _needs_version_2(rule_set: RuleContents) -> bool:
     """Whether there is something that version 1 did not know."""
     return (
         any(rule.held_out is not None for rule in rule_set.rules)
-        or any(feature.indicator is not None for feature in rule_set.source.features)
+        or any(one.indicator or one.derived for one in rule_set.source.features)
         or any(action.codes for action in rule_set.actions)
     )
 
@@ -177,6 +180,10 @@ def _number(value: float) -> float:
 
 def _feature(feature: Feature, thresholds: set[float]) -> dict[str, Any]:
     entry: dict[str, Any] = {"name": feature.name, "unit": feature.unit}
+    if isinstance(feature.derived, Combination):
+        entry["derived"] = {"terms": [list(term) for term in feature.derived.terms]}
+    elif feature.derived is not None:
+        entry["derived"] = {"formula": feature.derived.text}
     if feature.indicator is not None:
         entry["indicator"] = {
             key: text for key, text in dataclasses.asdict(feature.indicator).items() if text
@@ -253,14 +260,48 @@ class _Indicator(_Part):
     otherwise: str = ""
 
 
+class _Derived(_Part):
+    terms: tuple[tuple[int, Number], tuple[int, Number]] | None = None
+    formula: str | None = None
+
+    def read(self, observed: Sequence[Feature]) -> Definition:
+        if (self.terms is None) == (self.formula is None):
+            raise MisfitError("there must be either 'terms' or a 'formula'", "derived")
+        try:
+            if self.formula is not None:
+                return Formula.parse(self.formula, [feature.name for feature in observed])
+            assert self.terms is not None
+            combination = Combination(self.terms)
+        except InputError as error:
+            raise MisfitError(str(error), "derived") from error
+        for place in combination.features:
+            if not 0 <= place < len(observed):
+                what = f"there is no feature {quoted(place)} among the {len(observed)} before it"
+                raise MisfitError(what, "derived")
+        return combination
+
+
 class _Feature(_Part):
     name: str
     unit: str = ""
     indicator: _Indicator | None = None
+    derived: _Derived | None = None
     splits: list[Any] | None = None
     binary: bool = False
 
-    def read(self) -> Feature:
+    def read(self, observed: Sequence[Feature]) -> Feature:
+        if self.derived is None:
+            return self._plain()
+        if self.indicator is not None:
+            raise MisfitError("a derived feature says nothing of a column of words", "indicator")
+        plain, definition = self._plain(), self.derived.read(observed)
+        if isinstance(definition, Combination):
+            # It is called what it is, whatever the file calls it.
+            (called,) = with_derived(tuple(observed), [DerivedFeature(definition)])[len(observed) :]
+            plain = replace(plain, name=called.name, unit=called.unit)
+        return replace(plain, derived=definition)
+
+    def _plain(self) -> Feature:
         said = self.indicator
         indicator = None if said is None else Indicator(*astuple(said))
         if self.splits is None:
@@ -280,7 +321,7 @@ class _Feature(_Part):
         if not apart.all() or not (np.diff(thresholds) > 0).all():
             raise MisfitError("'splits' are not in ascending order, each between its two values")
         splits_of = Splits(thresholds, below, above, self.binary)
-        return Feature(self.name, self.unit, indicator, splits_of)
+        return Feature(self.name, self.unit, indicator, splits=splits_of)
 
 
 class _Discrete(_Part, tag_field="kind", tag="discrete"):
@@ -437,6 +478,27 @@ def _each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T
     return tuple(made)
 
 
+def _features(entries: Sequence[_Feature], version: int) -> tuple[Feature, ...]:
+    """The features: those that are observed, and behind them what is derived from them."""
+    observed: list[Feature] = []
+    behind = False
+
+    def read(entry: _Feature) -> Feature:
+        nonlocal behind
+        if entry.derived is not None and version == 1:
+            what = "version 1 of the format knows no 'derived'; it came with version 2"
+            raise MisfitError(what)
+        if entry.derived is None and behind:
+            raise MisfitError("it is observed and stands behind a derived one")
+        feature = entry.read(observed)
+        behind = entry.derived is not None
+        if not behind:
+            observed.append(feature)
+        return feature
+
+    return _each(entries, "features", read)
+
+
 class _Document(_Part, Generic[_Held]):
     format: str
     version: int
@@ -450,7 +512,7 @@ class _Document(_Part, Generic[_Held]):
     cut: Literal["thresholds", "leaves"] = "thresholds"
 
     def read(self) -> RuleContents:
-        features = _each(self.features, "features", _Feature.read)
+        features = _features(self.features, self.version)
         actions = _each(self.actions, "actions", lambda action: action.read())
         if not features or not actions:
             raise MisfitError("there are no features or no actions")

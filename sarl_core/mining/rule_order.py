@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import (
+    Demonstrations,
+    derived_features,
+    derived_over,
+    observed_features,
+    with_derived,
+)
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import FeatureOrder, NamedFeatures, line_up
 from sarl_core.errors import InputError
@@ -35,7 +41,7 @@ def fitted_rules(
 
     Args:
         rule_set: The rules.
-        features: Of what they meet, d names.
+        features: Of what they meet, d names; no derived ones, which follow from those.
         actions: Names of its m action dimensions.
         rules: What the rules are called in a message.
 
@@ -46,7 +52,7 @@ def fitted_rules(
         InputError: If there are more or fewer, or their names are of other things.
     """
     env_id = rule_set.source.env_id
-    names = tuple(feature.name for feature in rule_set.source.features)
+    names = tuple(feature.name for feature in observed_features(rule_set.source.features))
     orders = [line_up(NamedFeatures(rules, names, env_id), features)]
     if len(actions) > 1 or len(rule_set.actions) > 1:  # a single one needs no name
         orders.append(
@@ -83,7 +89,7 @@ def rules_for(
         rule_set,
         NamedFeatures(
             called,
-            tuple(feature.name for feature in demonstrations.features),
+            tuple(feature.name for feature in demonstrations.observed),
             demonstrations.env_id,
         ),
         tuple(dimension.name for dimension in demonstrations.action_dimensions),
@@ -124,6 +130,14 @@ def _check_actions(actions: tuple[LabelledDimension, ...], demonstrations: Demon
 
 def _reordered(rule_set: RuleSet, features: FeatureOrder, actions: FeatureOrder | None) -> RuleSet:
     """The rules with every number of a feature and of an action dimension exchanged."""
+    known = rule_set.source.features
+    observed = features.put(observed_features(known))
+    derived = derived_over(
+        derived_features(known), features.inverse, tuple(one.name for one in observed)
+    )
+    # What is derived stays behind all others, in its order.
+    further = tuple(range(len(observed), len(known)))
+    features = features._replace(places=features.places + further)
     feature_to = {mine: theirs for theirs, mine in enumerate(features.places)}
     dimensions = tuple(range(len(rule_set.actions))) if actions is None else actions.places
     dimension_to = {mine: theirs for theirs, mine in enumerate(dimensions)}
@@ -132,7 +146,9 @@ def _reordered(rule_set: RuleSet, features: FeatureOrder, actions: FeatureOrder 
         rule_set,
         rules=rules,
         actions=rule_set.actions if actions is None else actions.put(rule_set.actions),
-        source=replace(rule_set.source, features=features.put(rule_set.source.features)),
+        source=replace(rule_set.source, features=with_derived(observed, derived)).with_splits(
+            [one.splits for one in features.put(known)]
+        ),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral, Real
@@ -119,16 +120,37 @@ class Rule:
         """Whether its conditions hold.
 
         Args:
-            observations: Shape (B, d), float32.
+            observations: Shape (B, d + k), float32: what is observed, and what is derived from it.
 
         Returns:
             Shape (B,).
         """
         holds = np.ones(len(observations), dtype=np.bool_)
         for feature, op, threshold in self.conditions:
-            below = observations[:, feature] <= np.float64(threshold)
-            holds &= below if op == "<=" else ~below
+            values = observations[:, feature]
+            # What has no value is on neither side.
+            holds &= (
+                values <= np.float64(threshold) if op == "<=" else values > np.float64(threshold)
+            )
         return holds
+
+
+def take_back_unanswered(
+    in_force: NDArray[np.int64], states: NDArray[np.float32], rules: Sequence[Rule]
+) -> None:
+    """Where a rule was found by walking a tree, but asks about a formula that has no value there.
+
+    A walk goes on to the right of such a query; below it, every rule has the query among its own.
+
+    Args:
+        in_force: Index of a rule or -1, (B,); becomes -1 there.
+        states: Shape (B, d + k), float32.
+        rules: What the indices are of.
+    """
+    for row in np.flatnonzero(np.isnan(states).any(axis=1) & (in_force >= 0)).tolist():
+        conditions = rules[int(in_force[row])].conditions
+        if any(np.isnan(states[row, feature]) for feature, _, _ in conditions):
+            in_force[row] = -1
 
 
 def node_of(rule: Rule) -> int:

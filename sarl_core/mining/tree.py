@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sarl_core.arrays import make_read_only
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
@@ -39,7 +40,7 @@ class Source:
 
     Attributes:
         env_id: Environment, "" where unknown.
-        features: Names and units of the observation vector's d entries.
+        features: Names and units of the observation vector's d entries, and of what is derived.
         digest: Fingerprint of the demonstrations.
         steps: Number N of state-action pairs.
         episodes: Number of episodes.
@@ -425,6 +426,9 @@ def fitted(
     Returns:
         Its queries, without labels.
     """
+    # A formula may be infinite, which scikit-learn refuses; thresholds lie below the limit.
+    if observations.max() > LARGEST or observations.min() < -LARGEST:
+        observations = np.clip(observations, -LARGEST, LARGEST)
     exponents = _exponents(observations)
     states = np.ldexp(observations, exponents) if exponents.any() else observations
     learner.fit(states, targets, sample_weight=weights)

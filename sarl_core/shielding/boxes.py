@@ -6,12 +6,15 @@ does out there is an extrapolation; here it is told from the rest.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.mining.rules import Rule
+
+_LARGEST = float(np.finfo(np.float32).max)
 
 Sides = tuple[tuple[float, ...], tuple[float, ...]]
 """Least and largest values of the d features."""
@@ -31,16 +34,17 @@ class Boxes:
             rules: R rules.
             n_features: Length d of a state.
         """
-        boxes = [rule.box for rule in rules if rule.box is not None]
         self.sides: list[Sides | None] = [
-            None if rule.box is None else (rule.box.least, rule.box.most) for rule in rules
+            None if box is None else (tuple(map(_side, box.least)), tuple(map(_side, box.most)))
+            for box in (rule.box for rule in rules)
         ]
         self._known = np.array([rule.box is not None for rule in rules], dtype=np.bool_)
-        shape = (len(boxes), n_features)
+        shape = (-1, n_features)
         # One row a rule that has a box, so that a set without boxes takes no room.
         self._row = np.cumsum(self._known) - 1
-        self._least = np.array([box.least for box in boxes], dtype=np.float64).reshape(shape)
-        self._most = np.array([box.most for box in boxes], dtype=np.float64).reshape(shape)
+        sides = [one for one in self.sides if one is not None]
+        self._least = np.array([least for least, _ in sides], dtype=np.float64).reshape(shape)
+        self._most = np.array([most for _, most in sides], dtype=np.float64).reshape(shape)
 
     @property
     def count(self) -> int:
@@ -71,6 +75,11 @@ class Boxes:
             )
         outside[known] = beyond
         return outside
+
+
+def _side(value: float) -> float:
+    """A side of a box; the largest float32 number stands for what is infinite, of a formula."""
+    return math.copysign(math.inf, value) if abs(value) >= _LARGEST else value
 
 
 def leaves_out(sides: Sides, state: list[float]) -> bool:

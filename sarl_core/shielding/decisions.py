@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.derived import Extension
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, tree_of
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, take_back_unanswered
 from sarl_core.shielding.matching import Matcher
 
 
@@ -26,7 +27,7 @@ class Ground:
 
     Attributes:
         rule_set: With n rules of m action dimensions.
-        states: Shape (B, d), float32.
+        states: With what the rules derive, (B, d + k), float32.
         mined: Index of the rule that is not placed and applies, switched on or not, or -1, (B, m).
         in_trees: For each dimension whether its mined rules are of one tree; where they are not,
             they may overlap and are tried one by one.
@@ -55,7 +56,7 @@ def ground_of(rule_set: RuleSet, states: NDArray[np.float32]) -> Ground:
 
     Args:
         rule_set: With n rules of m action dimensions.
-        states: Shape (B, d), float32.
+        states: Shape (B, d) or, with what is derived, (B, d + k), float32.
 
     Returns:
         Where they lie.
@@ -64,11 +65,14 @@ def ground_of(rule_set: RuleSet, states: NDArray[np.float32]) -> Ground:
         InputError: If the states have another number of features than the rules ask about.
     """
     states = np.ascontiguousarray(states, dtype=np.float32)
-    if states.ndim != 2 or states.shape[1] != len(rule_set.source.features):
+    extension = Extension.of(rule_set.source.features)
+    widths = (extension.width, len(rule_set.source.features))
+    if states.ndim != 2 or states.shape[1] not in widths:
         raise InputError(
-            f"the rules ask about {len(rule_set.source.features)} features and the states have "
+            f"the rules ask about {extension.width} features and the states have "
             f"{states.shape[-1] if states.ndim else 0}; use states of the rules' environment"
         )
+    states = extension.many(states)
     mined = np.full((len(states), len(rule_set.actions)), NO_RULE, dtype=np.int64)
     in_trees = []
     for dimension in range(len(rule_set.actions)):
@@ -81,6 +85,7 @@ def ground_of(rule_set: RuleSet, states: NDArray[np.float32]) -> Ground:
         in_trees.append(nodes is not None)
         if nodes is not None:
             mined[:, dimension] = Matcher([], nodes).match_batch(states)[0]
+            take_back_unanswered(mined[:, dimension], states, rule_set.rules)
     return Ground(rule_set, states, mined, tuple(in_trees))
 
 

@@ -94,7 +94,7 @@ class Matcher:
                 distance = -gap if gap < 0 else gap
                 if distance < margin:
                     margin = distance
-                if (gap <= 0) != (op == "<="):
+                if not (gap <= 0 if op == "<=" else gap > 0):  # NaN is on neither side
                     break
             else:
                 return index, margin
@@ -143,7 +143,7 @@ class Matcher:
             for feature, op, threshold in rule.conditions:
                 gap = states[holding, feature] - np.float64(threshold)
                 margins[holding] = np.fmin(margins[holding], np.abs(gap))
-                holding = holding[(gap <= 0) == (op == "<=")]
+                holding = holding[gap <= 0 if op == "<=" else gap > 0]
             rules[holding] = index
             left = left[rules[left] == NO_RULE]
         return left

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
+from sarl_core.demonstrations.dataset import observed_features
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,14 +97,16 @@ class StateReader:
         Args:
             rule_set: Asks about them.
         """
-        self._names = [feature.name for feature in rule_set.source.features]
+        features = rule_set.source.features
+        self._names = [feature.name for feature in observed_features(features)]
+        self._whole = len(features)
         self._env_id = rule_set.source.env_id or "another environment"
 
     def one(self, observation: Any) -> NDArray[np.float32]:
         """Read one observation.
 
         Args:
-            observation: d numbers.
+            observation: d numbers; what derived features are given behind them is left out.
 
         Returns:
             Shape (d,), finite.
@@ -113,6 +116,8 @@ class StateReader:
         """
         numbers = numbers_in(observation, "observation")
         wide = len(self._names)
+        if numbers.shape == (self._whole,):
+            numbers = numbers[:wide]
         if numbers.shape != (wide,):
             shape = f"has the shape {numbers.shape}" if numbers.ndim != 1 else f"has {len(numbers)}"
             raise UnreadableError(
@@ -139,6 +144,8 @@ class StateReader:
         """
         rows = _rows(observations, "observations")
         wide = len(self._names)
+        if isinstance(rows, np.ndarray) and rows.ndim == 2 and rows.shape[1] == self._whole:
+            rows = rows[:, :wide]
         if isinstance(rows, np.ndarray) and rows.ndim == 2 and rows.shape[1] == wide:
             states = np.ascontiguousarray(_as_floats(rows, _FLOAT32))
             finite = np.isfinite(states)

@@ -6,15 +6,17 @@ It is post-posed and learned from data: it guarantees nothing beyond doing what 
 from __future__ import annotations
 
 from copy import copy
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sarl_core.demonstrations.derived import Combination, Extension
 from sarl_core.errors import InputError, require
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
+from sarl_core.mining.rules import take_back_unanswered
 from sarl_core.shielding.boxes import Boxes, leaves_out
 from sarl_core.shielding.matching import Matcher
 from sarl_core.shielding.projection import Projection, replacements
@@ -156,8 +158,13 @@ class Shield:
         self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
         self._states = StateReader(rule_set)
-        self._n_features = len(rule_set.source.features)
-        self._match_label = self._matchers[0].match
+        self._extension = Extension.of(rule_set.source.features)
+        self._extends = bool(self._extension.definitions)
+        self._formulas = not all(
+            isinstance(one, Combination) for one in self._extension.definitions
+        )
+        self._n_features = self._extension.width
+        self._first_match = self._matchers[0].match
         self._take_form(ActionForm.of_rules(rule_set))
 
     def __repr__(self) -> str:
@@ -166,6 +173,15 @@ class Shield:
             f"Shield({self.rule_set!r}, projection={self.projection!r}, "
             f"outside={self.outside!r}, on_invalid={self.on_invalid!r})"
         )
+
+    def _match_one(self, dimension: int, state: list[float]) -> tuple[int | None, float]:
+        """The rule that applies to one state, some of whose formulas may have no value."""
+        rule, margin = self._matchers[dimension].match(state)
+        if rule is not None and any(
+            isnan(state[feature]) for feature, _, _ in self.rule_set.rules[rule].conditions
+        ):
+            return None, margin
+        return rule, margin
 
     def _take_form(self, form: ActionForm) -> None:
         """Execute actions of this form from now on."""
@@ -209,7 +225,8 @@ class Shield:
         """Check one action and replace it if it breaks a rule.
 
         Args:
-            observation: Shape (d,); compared as float32.
+            observation: Shape (d,); compared as float32. What the rules derive from it is worked
+                out here.
             action: An integer, or m numbers in any container. What will be executed is judged:
                 the action in the environment's dtype (float32 where no environment is known).
                 Labels are whole numbers of any kind; a continuous action out of its bounds
@@ -228,6 +245,8 @@ class Shield:
             state = observation.tolist()
             # A sum of float32 numbers does not overflow in float64.
             if len(state) == self._n_features and isfinite(sum(state)):
+                if self._extends:
+                    state = self._extension.one(state)
                 kind = type(action)
                 if self._single:
                     if (
@@ -252,7 +271,7 @@ class Shield:
         """As `decide`, for whatever may come."""
         invalid, state, values, handed = None, None, None, action
         try:
-            state = self._states.one(observation).tolist()
+            state = self._extension.one(self._states.one(observation).tolist())
         except UnreadableError as error:
             invalid = str(error)
         try:
@@ -285,7 +304,7 @@ class Shield:
 
     def _decide_label(self, state: list[float], action: Any, handed: Any, value: int) -> Decision:
         """Decide one discrete action, a valid one."""
-        rule, margin = self._match_label(state)
+        rule, margin = self._match_one(0, state) if self._formulas else self._first_match(state)
         if rule is None:
             return Decision(handed, action, (None,), False, margin)
         if value == self._wanted[rule]:
@@ -315,7 +334,9 @@ class Shield:
         nearest = float("inf")
         numbers = values.tolist()
         for dimension, matcher in enumerate(self._matchers):
-            rule, margin = matcher.match(state)
+            rule, margin = (
+                self._match_one(dimension, state) if self._formulas else matcher.match(state)
+            )
             nearest = min(nearest, margin)
             rules.append(rule)
             if rule is None:
@@ -365,6 +386,7 @@ class Shield:
         invalid = np.full(len(states), None, dtype=np.object_)
         shape = shape if self._form.shape is None else self._form.shape
         if not faults and not unread:
+            states = self._extension.many(states)
             executed, rules, intervened, margin, outside = self._decide_rows(states, values)
             executed = executed.reshape(len(states), *shape)
             return BatchDecision(executed, proposed, rules, intervened, margin, outside, invalid)
@@ -381,7 +403,8 @@ class Shield:
         margin = np.full(len(states), np.nan)
         executed = values.copy()
         intervened, outside = np.zeros((2, len(states)), dtype=np.bool_)
-        decided = self._decide_rows(np.ascontiguousarray(states[valid]), values[valid])
+        readable = self._extension.many(np.ascontiguousarray(states[valid]))
+        decided = self._decide_rows(readable, values[valid])
         columns = (executed, rules, intervened, margin, outside)
         for column, part in zip(columns, decided, strict=True):
             column[valid] = part
@@ -407,7 +430,7 @@ class Shield:
         """Decide valid rows.
 
         Args:
-            states: Shape (B, d), contiguous.
+            states: Shape (B, d + k), contiguous.
             flat: Shape (B, m), in the environment's dtype.
 
         Returns:
@@ -442,6 +465,8 @@ class Shield:
         margin = np.full(len(states), np.inf)
         for dimension, matcher in enumerate(self._matchers):
             rules[:, dimension], near = matcher.match_batch(states)
+            if self._formulas:
+                take_back_unanswered(rules[:, dimension], states, self.rule_set.rules)
             margin = np.minimum(margin, near)
         return rules, margin
 
@@ -464,7 +489,7 @@ class Shield:
         if bad:
             states = states.copy()
             states[bad] = 0.0
-        rules, _ = self._match(states)
+        rules, _ = self._match(self._extension.many(states))
         rules[bad] = NO_RULE
         return rules
 
@@ -498,7 +523,7 @@ class Shield:
         """What the rules leave an agent to choose from.
 
         Args:
-            observations: Shape (B, d).
+            observations: Shape (B, d), or with what is derived (B, d + k).
             rules: In force there, -1 for none, (B, m).
 
         Returns:
@@ -508,6 +533,7 @@ class Shield:
         """
         free = rules < 0
         if self._abstains:
+            observations = self._extension.many(observations)
             for dimension, column in enumerate(rules.T):
                 ruled = np.flatnonzero(column >= 0)
                 free[ruled, dimension] = self._boxes.leave_out(column[ruled], observations[ruled])

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, SupportsFloat
 import gymnasium
 import numpy as np
 
+from sarl_core.demonstrations.dataset import observed_features
 from sarl_core.environments.description import catalogued
 from sarl_core.environments.feature_order import NamedFeatures, shortened
 from sarl_core.environments.naming import key_names
@@ -199,9 +200,8 @@ def fitted(
     check_fit(observation_space, action_space, shield)
     rule_set = shield.rule_set
     discrete = not rule_set.actions[0].is_interval
-    names = catalogued(
-        observed.env_id, len(rule_set.source.features), len(rule_set.actions), discrete=discrete
-    )
+    width = len(observed_features(rule_set.source.features))
+    names = catalogued(observed.env_id, width, len(rule_set.actions), discrete=discrete)
     features = observed.names.features or key_names(observation_space)
     ordered = fitted_rules(
         rule_set,
@@ -215,8 +215,8 @@ def fitted(
     if ordered.rule_set is not rule_set:
         shield = shield.with_rules(ordered.rule_set)
     inner = observed.owner.partition(" behind ")[0]  # no wrapper renames what is done
-    d, m = len(rule_set.source.features), len(rule_set.actions)
-    labels = observed.names.labels or catalogued(inner, d, m, discrete=discrete).labels
+    m = len(rule_set.actions)
+    labels = observed.names.labels or catalogued(inner, width, m, discrete=discrete).labels
     notes = (*ordered.notes, *_label_notes(ordered.rule_set, labels))
     return FittedShield(shield.for_space(action_space), notes)
 
@@ -262,10 +262,13 @@ def check_fit(
     spaces = gymnasium.spaces
     source, actions = shield.rule_set.source, shield.rule_set.actions
     rules_of = f"the rules (of {source.env_id or 'an unnamed environment'})"
-    features = spaces.utils.flatdim(observation_space)
-    if features != len(source.features):
+    features, asked = (
+        spaces.utils.flatdim(observation_space),
+        len(observed_features(source.features)),
+    )
+    if features != asked:
         raise InputError(
-            f"{rules_of} ask about {len(source.features)} features and the environment's "
+            f"{rules_of} ask about {asked} features and the environment's "
             f"observations have {features}; use rules of this environment"
         )
     labels = _labels_of(action_space)

@@ -12,9 +12,11 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.demonstrations.fields import Indicator
 from sarl_core.documents import MisfitError, Number, conformed, parse_json
 from sarl_core.environments.feature_order import FeatureOrder
+from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, quoted
 
 KEY = "sarl"
@@ -30,6 +32,7 @@ class Metadata:
         agent: Who demonstrated.
         seed: Seed it was recorded with.
         features: Names and units, d of them.
+        derived: What is worked out from them.
         action_names: m names.
         label_names: For each action dimension the names of its labels, () if continuous.
         label_first: The action that label 0 stands for.
@@ -45,6 +48,7 @@ class Metadata:
     agent: str = ""
     seed: int | None = None
     features: tuple[Feature, ...] = ()
+    derived: tuple[DerivedFeature, ...] = ()
     action_names: tuple[str, ...] = ()
     label_names: tuple[tuple[str, ...], ...] = ()
     label_first: tuple[int, ...] = ()
@@ -88,6 +92,22 @@ class _Named(Struct):
     indicator: Indicator | None = None
 
 
+class _Derived(Struct):
+    terms: tuple[tuple[int, Number], tuple[int, Number]] | None = None
+    name: str = ""
+    unit: str = ""
+    formula: str | None = None
+
+    def read(self, features: tuple[Feature, ...]) -> DerivedFeature:
+        if (self.terms is None) == (self.formula is None):
+            raise MisfitError("has neither terms nor a formula, or both", "derived")
+        if self.terms is not None:
+            return DerivedFeature(Combination(self.terms))
+        names = [feature.name for feature in features]
+        formula = Formula.parse(self.formula or "", names)
+        return DerivedFeature(formula, self.name or formula.text, self.unit)
+
+
 class _Said(Struct):
     """The form of `Metadata` in a file, which may say more."""
 
@@ -95,6 +115,7 @@ class _Said(Struct):
     agent: str = ""
     seed: int | None = None
     features: tuple[_Named, ...] = ()
+    derived: tuple[_Derived, ...] = ()
     action_names: tuple[str, ...] = ()
     label_names: tuple[tuple[str, ...], ...] = ()
     label_first: tuple[int, ...] = ()
@@ -146,7 +167,11 @@ def decode_metadata(text: str | bytes) -> Metadata:
     if any(abs(code) > 2**31 for codes in said.label_codes for code in codes):
         raise _malformed("has a number too large for a label under 'label_codes'")
     features = tuple(Feature(one.name, one.unit or "", one.indicator) for one in said.features)
-    return Metadata(**{**asdict(said), "features": features})
+    try:
+        derived = tuple(one.read(features) for one in said.derived)
+    except (MisfitError, InputError) as error:
+        raise _malformed(f"derives what cannot be: {error}") from error
+    return Metadata(**{**asdict(said), "features": features, "derived": derived})
 
 
 def _malformed(what: str) -> InputError:

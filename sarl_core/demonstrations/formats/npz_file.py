@@ -188,6 +188,8 @@ def write_npz(demonstrations: Demonstrations, out: BinaryIO) -> None:
         )
         if (values := getattr(demonstrations, name)) is not None
     }
+    # What is derived from them is worked out again where they are read.
+    arrays["observations"] = demonstrations.raw_observations
     np.savez_compressed(
         out, allow_pickle=False, **arrays, **{KEY: np.array(encode_metadata(demonstrations))}
     )

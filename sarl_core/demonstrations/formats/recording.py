@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.checks import counted_steps
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, derived_over
 from sarl_core.demonstrations.fields import ColumnUse, Indicator
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
@@ -228,7 +228,15 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
             feature_names=described.feature_names,
             feature_units=recording.feature_units and features.put(recording.feature_units),
             indicators=features.put(recording.indicators),
-            metadata=replace(metadata, features=features.put(metadata.features)),
+            metadata=replace(
+                metadata,
+                features=features.put(metadata.features),
+                derived=derived_over(
+                    metadata.derived,
+                    features.inverse,
+                    features.put(tuple(one.name for one in metadata.features)),
+                ),
+            ),
         )
     if len(described.action_names) > 1:  # a single one needs no name
         wanted = wanted._replace(names=described.action_names)
@@ -456,6 +464,7 @@ def _features(recording: Recording, described: EnvironmentDescription | None) ->
             "feature_names": tuple(feature.name for feature in metadata.features),
             "feature_units": tuple(feature.unit for feature in metadata.features),
             "indicators": tuple(feature.indicator for feature in metadata.features),
+            "derived": metadata.derived,
         }
     indicators = recording.indicators or None
     if described is not None and (names is None or only_counts(names)):

@@ -18,7 +18,9 @@ def columns_of(demonstrations: Demonstrations) -> dict[str, NDArray[Any]]:
         "episode": demonstrations.episodes,
         "step": demonstrations.steps,
     }
-    for feature, values in zip(demonstrations.features, demonstrations.observations.T, strict=True):
+    # What is derived from them is worked out again where they are read.
+    observed = zip(demonstrations.observed, demonstrations.raw_observations.T, strict=True)
+    for feature, values in observed:
         columns[f"obs_{feature.name}"] = np.ascontiguousarray(values)
     if demonstrations.actions.ndim == 1:
         columns["action"] = demonstrations.actions
@@ -47,7 +49,7 @@ def columns_in_words(demonstrations: Demonstrations) -> dict[str, Any]:
         an environment knows the names of its actions they stay numbers.
     """
     columns: dict[str, Any] = columns_of(demonstrations)
-    features, observations = demonstrations.features, demonstrations.observations
+    features, observations = demonstrations.observed, demonstrations.observations
     of_words = columns_of_words([one.indicator for one in features])
     in_words: dict[str, Any] = {}
     for name, values in columns.items():

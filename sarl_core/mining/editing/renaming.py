@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import (
+    Demonstrations,
+    derived_features,
+    derived_over,
+    observed_features,
+    with_derived,
+)
 from sarl_core.demonstrations.names import Names
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rule_set import RuleSet
@@ -23,14 +29,17 @@ def renamed_rules(rule_set: RuleSet, names: Names) -> RuleSet:
         are as many, its labels likewise; intervals keep their bounds for names.
     """
     source, actions = rule_set.source, rule_set.actions
-    if len(names.features) == len(source.features):
-        features = tuple(
+    observed = observed_features(source.features)
+    if len(names.features) == len(observed):
+        observed = tuple(
             replace(feature, name=name, unit=unit)
-            for feature, name, unit in zip(
-                source.features, names.features, names.units, strict=True
-            )
+            for feature, name, unit in zip(observed, names.features, names.units, strict=True)
         )
-        source = replace(source, features=features)
+        places = range(len(observed))
+        derived = derived_over(derived_features(source.features), places, names.features)
+        source = replace(source, features=with_derived(observed, derived)).with_splits(
+            [feature.splits for feature in source.features]
+        )
     if len(names.actions) == len(actions):
         actions = tuple(
             replace(

@@ -1,0 +1,1 @@
+"""Which combinations of two features rules had better ask about."""

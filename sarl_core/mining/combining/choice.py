@@ -1,0 +1,116 @@
+"""Choosing combinations: those that a quick tree over all of them asks about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import Combination, DerivedFeature, Extension
+from sarl_core.errors import InputError, require
+from sarl_core.mining.combining.candidates import Pair, candidates, pairs_of_like_kind
+from sarl_core.mining.labels import label_dimensions
+from sarl_core.mining.tree import fitted
+
+MOST_COMBINATIONS = 30
+_SAMPLED = 3_000  # steps that the quick tree is grown from, at most
+_CELLS = 1_500_000  # of steps and candidates, together; fewer steps of more candidates
+_FEWEST = 1_000
+_LEAVES = 64  # of the quick tree, the best first
+_AT_ONCE = 512  # candidates; of more, the best of each such part are looked at together
+
+
+def with_combinations(
+    demonstrations: Demonstrations,
+    *,
+    pairs: Sequence[Pair] | None = None,
+    divider: int = 2,
+    most: int = MOST_COMBINATIONS,
+) -> Demonstrations:
+    """Demonstrations with those combinations of two features that tell most about the actions.
+
+    Candidates are ``x_i + r * x_j`` for every pair and a few ratios. A tree of few leaves over all
+    of them, on a sample of the steps, says which are worth asking about; a tree over the features
+    and these is then grown from all steps, as from any demonstrations.
+
+    Args:
+        demonstrations: N steps; what they derive already stays.
+        pairs: Indices of features that were observed; all of like kind where not given.
+        divider: Number of intervals of continuous action dimensions.
+        most: Combinations to keep, at most.
+
+    Returns:
+        The same steps with the combinations behind their features; the same every time.
+
+    Raises:
+        InputError: If there is nothing to combine, or a pair is none.
+    """
+    must = "what features are combined of must be Demonstrations"
+    require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+    d = len(demonstrations.observed)
+    for pair in pairs or ():
+        if len(pair) != 2 or any(not 0 <= place < d for place in pair) or pair[0] == pair[1]:
+            raise InputError(
+                f"{pair} are no two of the {d} features; give two different indices from 0"
+            )
+    known = {one.definition for one in demonstrations.derived}
+    chosen = pairs_of_like_kind(demonstrations) if pairs is None else tuple(pairs)
+    possible = [one for one in candidates(demonstrations, chosen) if one not in known]
+    if not possible:
+        raise InputError(
+            "there are no two features that could be combined: each would have to be a number "
+            "that changes; mine without combinations"
+        )
+    # Evenly spaced, so that the same steps are taken every time, from all episodes.
+    count = min(len(demonstrations), max(_FEWEST, min(_SAMPLED, _CELLS // len(possible))))
+    rows = np.linspace(0, len(demonstrations) - 1, count).astype(np.int64)
+    base = demonstrations.observations[rows]
+    raw = np.ascontiguousarray(base[:, :d])
+    worth = np.zeros(len(possible))
+    share = max(1, -(-most // len(demonstrations.action_dimensions)))
+    for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
+        labels = dimension.labels_of(demonstrations.action_columns[rows, index])
+        gains = _gains(base, raw, possible, labels)
+        best = np.argsort(-gains, kind="stable")[:share]
+        worth[best] = np.maximum(worth[best], gains[best])
+    order = np.argsort(-worth, kind="stable")[:most]
+    used = sorted(order[worth[order] > 0.0].tolist())
+    combined = [DerivedFeature(possible[place]) for place in used]
+    return demonstrations.deriving([*demonstrations.derived, *combined])
+
+
+def _gains(
+    base: NDArray[np.float32],
+    raw: NDArray[np.float32],
+    possible: Sequence[Combination],
+    labels: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """How much each candidate helps a quick tree, (k,); 0 where it is not asked about."""
+    left = np.arange(len(possible))
+    while True:
+        parts = np.array_split(left, -(-len(left) // _AT_ONCE))
+        gains = np.zeros(len(possible))
+        for part in parts:
+            gains[part] = _quick(base, raw, [possible[place] for place in part.tolist()], labels)
+        if len(parts) == 1:
+            return gains
+        left = np.flatnonzero(gains)
+        if not len(left):
+            return gains
+
+
+def _quick(
+    base: NDArray[np.float32],
+    raw: NDArray[np.float32],
+    possible: Sequence[Combination],
+    labels: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    """The same of a few, by the drop of impurity at the queries of one tree."""
+    from sklearn.tree import DecisionTreeClassifier
+
+    learner = DecisionTreeClassifier(criterion="gini", max_leaf_nodes=_LEAVES, random_state=0)
+    values = Extension(raw.shape[1], possible).many(raw)[:, raw.shape[1] :]
+    fitted(learner, np.concatenate([base, values], axis=1), labels)
+    return np.asarray(learner.feature_importances_[base.shape[1] :])
