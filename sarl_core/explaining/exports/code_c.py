@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from sarl_core.explaining.exports.arithmetic import assignments, derived_lines, used_operations
 from sarl_core.explaining.exports.program import (
     CodeLine,
     DimensionProgram,
@@ -50,7 +51,7 @@ _HEAD = """\
 #include <math.h>
 #include <stdint.h>
 
-/* Thresholds are doubles, compared with the state as it is. Where a compiler computes with
+{fused}/* Thresholds are doubles, compared with the state as it is. Where a compiler computes with
  * other numbers, or takes for granted that all are finite, decisions may differ. */
 #if defined(__FAST_MATH__) || \\
     (defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 1)
@@ -58,6 +59,26 @@ _HEAD = """\
 #endif
 """
 
+
+_FUSED = """\
+/* Some of what is asked is derived from the state, in doubles and step by step. Compile with
+ * -ffp-contract=off: fused operations give other numbers. */
+"""
+
+_HELPERS = {
+    "min": """\
+static double shield_min(double a, double b)
+{
+    return a != a || a < b ? a : b;
+}
+""",
+    "max": """\
+static double shield_max(double a, double b)
+{
+    return a != a || a > b ? a : b;
+}
+""",
+}
 
 _INVALID: dict[OnInvalid, str] = {
     "raise": "nothing is written to executed, and\n *   nothing should be done (on_invalid: raise)",
@@ -86,7 +107,7 @@ def rules_to_c(
     functions = [
         part
         for index, order in enumerate(program.orders)
-        for part in _finders(index, order, rule_set)
+        for part in _finders(index, order, program)
     ]
     return "\n".join(
         [
@@ -94,6 +115,7 @@ def rules_to_c(
             _names(program),
             _table(program),
             *functions,
+            *_derive(program),
             _valid(program),
             _decide(program),
         ]
@@ -134,7 +156,8 @@ def _head(program: Program) -> str:
         projection = ""
     return _HEAD.format(
         signature=f" *   {signature};",
-        features=counted(len(rule_set.source.features), "number"),
+        features=counted(program.width, "number"),
+        fused=_FUSED if program.derives else "",
         actions=counted(len(program.orders), "number"),
         none="or of the action is not finite"
         if program.continuous
@@ -148,17 +171,25 @@ def _head(program: Program) -> str:
 
 def _names(program: Program) -> str:
     features = [f" *   {comment(line)}" for line in state_lines(program.rule_set.source.features)]
+    derived = [f" *   {comment(line)}" for line in derived_lines(program.rule_set.source.features)]
     actions = [f" *   {comment(line)}" for line in action_lines(program.rule_set.actions)]
+    size = len(program.rule_set.source.features)
     prototype = _SIGNATURE.format(kind=_kind(program))
     return "\n".join(
         [
             "/* The state:",
             *features,
+            *([" * Derived from it:", *derived] if derived else []),
             " * The actions:",
             *actions,
             " */",
             "enum {",
-            f"    SHIELD_FEATURES = {len(program.rule_set.source.features)},",
+            f"    SHIELD_FEATURES = {program.width},",
+            *(
+                [f"    SHIELD_VALUES = {size}, /* with those that are derived */"]
+                if derived
+                else []
+            ),
             f"    SHIELD_ACTIONS = {len(program.orders)},",
             f"    SHIELD_RULES = {len(program.rule_set)},",
             "    SHIELD_INVALID = -1",
@@ -227,7 +258,32 @@ def _row(outcome: Replacement, program: Program) -> str:
     return f"{{{', '.join([*literals, *flags])}}}"
 
 
-def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
+def _derive(program: Program) -> list[str]:
+    """The function that works out what is derived from the state; none where nothing is."""
+    if not program.derives:
+        return []
+    features = program.rule_set.source.features
+    operations = used_operations(features)
+    functions = {"min": "shield_min", "max": "shield_max", "abs": "fabs"}
+    lines = [text for name, text in _HELPERS.items() if name in operations]
+    lines += [
+        "/* What is derived from the state: in doubles, and then rounded to a float. */",
+        "static void shield_derive(const float *state, float *x)",
+        "{",
+        "    for (int i = 0; i < SHIELD_FEATURES; i++)",
+        "        x[i] = state[i];",
+    ]
+    for place, feature in enumerate(features):
+        if feature.derived is None:
+            continue
+        steps = assignments(feature.derived, "(double)x[{}]".format, _number, functions)
+        lines.append(f"    {{ /* {comment(feature.name)} */")
+        lines += [f"        double t{step} = {text};" for step, text in enumerate(steps)]
+        lines += [f"        x[{place}] = (float)t{len(steps) - 1};", "    }"]
+    return ["\n".join([*lines, "}", ""])]
+
+
+def _finders(index: int, order: DimensionProgram, program: Program) -> list[str]:
     """The functions that find the rule of one action dimension, called ones first."""
     always = any(not rule.conditions for _, rule in order.scanned)
     parts = [[]] if always else parts_of(order.nodes)
@@ -243,10 +299,8 @@ def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str
         if number == 0:
             if always or not order.asks:
                 lines.append("    (void)x;")
-            lines += [
-                line for place, rule in order.scanned for line in _scan(place, rule, rule_set)
-            ]
-        lines += [_line(step, index, rule_set) for step in parts[number]]
+            lines += [line for place, rule in order.scanned for line in _scan(place, rule, program)]
+        lines += [line for step in parts[number] for line in _lines(step, index, program)]
         finders.append("\n".join([*lines, "}", ""]))
     return finders
 
@@ -255,12 +309,17 @@ def _finder(index: int, number: int) -> str:
     return f"shield_rule_of_{index}" + (f"_{number}" if number else "")
 
 
-def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
+def _scan(place: int, rule: Rule, program: Program) -> list[str]:
+    rule_set = program.rule_set
     text = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
     if not rule.conditions:
         return [f"    {text}"]
     queries = [
-        _query(feature, threshold, negated=op == ">") for feature, op, threshold in rule.conditions
+        # Of two numbers one is at most the other, or above it; what is no number is neither.
+        _query(feature, threshold, op)
+        if feature in program.formulas or op == "<="
+        else f"!({_query(feature, threshold)})"
+        for feature, op, threshold in rule.conditions
     ]
     return [
         f"    /* {comment(conditions_text(rule, rule_set))} */",
@@ -269,28 +328,34 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     ]
 
 
-def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str:
-    space = "    " * (step.level + 1)
+def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
+    space, rule_set = "    " * (step.level + 1), program.rule_set
     match step.kind:
         case "if":
             name = comment(query_name(rule_set.source.features[step.feature]))
-            return f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {name} */"
+            query = f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {name} */"
+            if step.feature not in program.formulas:
+                return [query]
+            return [
+                f"{space}if (isnan(x[{step.feature}])) /* a formula without a value: no rule */",
+                f"{space}    return -1;",
+                query,
+            ]
         case "else":
-            return f"{space}}} else {{"
+            return [f"{space}}} else {{"]
         case "end":
-            return f"{space}}}"
+            return [f"{space}}}"]
         case "part":
-            return f"{space}return {_finder(index, step.target)}(x);"
+            return [f"{space}return {_finder(index, step.target)}(x);"]
         case "rule":
             if step.target == NO_RULE:
-                return f"{space}return -1;"
+                return [f"{space}return -1;"]
             rule = rule_set.rules[step.target]
-            return f"{space}return {step.target}; /* {_rule_comment(rule, rule_set)} */"
+            return [f"{space}return {step.target}; /* {_rule_comment(rule, rule_set)} */"]
 
 
-def _query(feature: int, threshold: float, *, negated: bool = False) -> str:
-    query = f"(double)x[{feature}] <= {_number(threshold)}"
-    return f"!({query})" if negated else query
+def _query(feature: int, threshold: float, op: str = "<=") -> str:
+    return f"(double)x[{feature}] {op} {_number(threshold)}"
 
 
 def _number(value: float) -> str:
@@ -341,7 +406,8 @@ def _valid(program: Program) -> str:
 
 def _decide(program: Program) -> str:
     calls = [
-        f"    rule[{index}] = {_finder(index, 0)}(state);" for index in range(len(program.orders))
+        f"    rule[{index}] = {_finder(index, 0)}({'x' if program.derives else 'state'});"
+        for index in range(len(program.orders))
     ]
     if not program.continuous:
         keeps, becomes = "proposed[i] == shield_value[rule[i]]", "shield_value[rule[i]]"
@@ -358,11 +424,13 @@ def _decide(program: Program) -> str:
             _SIGNATURE.format(kind=_kind(program)),
             "{",
             "    int changed = 0;",
+            *(["    float x[SHIELD_VALUES];"] if program.derives else []),
             "    if (!shield_is_valid(state, proposed)) {",
             "        for (int i = 0; i < SHIELD_ACTIONS; i++)",
             f"            rule[i] = -1{', executed[i] = proposed[i]' if passes else ''};",
             "        return SHIELD_INVALID;",
             "    }",
+            *(["    shield_derive(state, x);"] if program.derives else []),
             *calls,
             "    for (int i = 0; i < SHIELD_ACTIONS; i++) {",
             f"        if (rule[i] < 0 || {keeps}) {{",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from sarl_core.environments.formulas import Formula
+from sarl_core.explaining.exports.arithmetic import assignments, derived_lines, used_operations
 from sarl_core.explaining.exports.program import (
     CodeLine,
     DimensionProgram,
@@ -31,7 +33,7 @@ The rules were learned from examples and guarantee nothing.
 {invalid}"""
 
 from array import array
-from math import isfinite
+from math import {functions}
 '''
 
 _INVALID: dict[OnInvalid, tuple[str, str]] = {
@@ -67,6 +69,29 @@ def numbers(values, count):
     return found if len(found) == count and all(map(isfinite, found)) else None
 '''
 
+_HELPERS = {
+    "/": '''
+def quotient(a, b):
+    """Divided as computers do: by zero it is infinite, or no number."""
+    if b:
+        return a / b
+    return nan if not a or isnan(a) else copysign(inf, a) * copysign(1.0, b)
+
+''',
+    "min": '''
+def least(a, b):
+    """The lesser of two; what is no number stays so."""
+    return a if isnan(a) or a < b else b
+
+''',
+    "max": '''
+def most(a, b):
+    """The larger of two; what is no number stays so."""
+    return a if isnan(a) or a > b else b
+
+''',
+}
+
 _DISCRETE = '''
 
 def is_label(value, first, last):
@@ -99,6 +124,7 @@ def shield(state, action):
     x = numbers(state, FEATURES)
     if x is None or not are_labels((action,) if SINGLE else action):
 {answer}\
+{derive}\
     rules = [find(x) for find in FIND]
     if SINGLE:
         value = VALUES[rules[0]] if rules[0] >= 0 else action
@@ -124,6 +150,7 @@ def shield(state, action):
     x, proposed = numbers(state, FEATURES), numbers(action, len(FIND))
     if x is None or proposed is None:
 {answer}\
+{derive}\
     rules = [find(x) for find in FIND]
     executed = list(proposed)
     for index, rule in enumerate(rules):
@@ -161,7 +188,7 @@ def rules_to_python(
     functions = [
         part
         for index, order in enumerate(program.orders)
-        for part in _finders(index, order, rule_set)
+        for part in _finders(index, order, program)
     ]
     docstring, answer = _INVALID[on_invalid]
     body = _CONTINUOUS if program.continuous else _DISCRETE
@@ -169,13 +196,15 @@ def rules_to_python(
     return (
         "\n".join(
             [
-                _HEAD.format(invalid=docstring),
+                _HEAD.format(invalid=docstring, functions=_imported(program)),
                 *_names(program),
                 *_table(program),
                 *functions,
+                *_derive(program),
                 "",
                 f"FIND = ({finders},)",
-                _NUMBERS + body.format(answer=answer),
+                _NUMBERS
+                + body.format(answer=answer, derive="    derive(x)\n" if program.derives else ""),
             ]
         ).rstrip()
         + "\n"
@@ -189,9 +218,11 @@ def _names(program: Program) -> list[str]:
         f"{one_line(rule_set.source.env_id) or 'an unnamed environment'}. The state:"
     ]
     lines += [f"#   {line}" for line in state_lines(rule_set.source.features)]
+    derived = [f"#   {line}" for line in derived_lines(rule_set.source.features)]
+    lines += ["# Derived from it:", *derived] if derived else []
     lines.append("# The actions:")
     lines += [f"#   {line}" for line in action_lines(rule_set.actions)]
-    lines.append(f"FEATURES = {len(rule_set.source.features)}")
+    lines.append(f"FEATURES = {program.width}")
     if not program.continuous:
         lines.append(f"SINGLE = {len(program.orders) == 1}")
         lines.append(f"LABELS = {program.labels!r}")
@@ -226,7 +257,38 @@ def _row(outcome: Replacement, *, continuous: bool) -> str:
     return f"({', '.join([*numbers, str(outcome.open_low), str(outcome.open_high)])})"
 
 
-def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str]:
+def _imported(program: Program) -> str:
+    """What the module needs of `math`."""
+    operations = used_operations(program.rule_set.source.features)
+    names = {"isfinite"}
+    names |= {"isnan"} if program.formulas else set()
+    names |= {"copysign", "inf", "nan"} if "/" in operations else set()
+    return ", ".join(sorted(names))
+
+
+def _derive(program: Program) -> list[str]:
+    """The function that works out what is derived from the state; none where nothing is."""
+    if not program.derives:
+        return []
+    features = program.rule_set.source.features
+    operations = used_operations(features)
+    functions = {"/": "quotient", "min": "least", "max": "most", "abs": "abs"}
+    lines = [text for name, text in _HELPERS.items() if name in operations]
+    lines += [
+        "",
+        "def derive(x):",
+        '    """Put behind the state what is derived from it, each rounded to 32 bits."""',
+    ]
+    for feature in features:
+        if feature.derived is not None:
+            steps = assignments(feature.derived, "x[{}]".format, _number, functions)
+            lines.append(f"    # {one_line(feature.name)}")
+            lines += [f"    t{step} = {text}" for step, text in enumerate(steps)]
+            lines.append(f"    x.append(t{len(steps) - 1})")
+    return ["\n".join([*lines, ""])]
+
+
+def _finders(index: int, order: DimensionProgram, program: Program) -> list[str]:
     """The functions that find the rule of one action dimension."""
     always = any(not rule.conditions for _, rule in order.scanned)
     finders = []
@@ -235,8 +297,8 @@ def _finders(index: int, order: DimensionProgram, rule_set: RuleSet) -> list[str
         if number == 0:
             lines.append(f"    # {one_line(order.dimension.name)}: the rule in force.")
             for place, rule in order.scanned:
-                lines += _scan(place, rule, rule_set)
-        lines += [line for step in part if (line := _line(step, index, rule_set)) is not None]
+                lines += _scan(place, rule, program.rule_set)
+        lines += [line for step in part for line in _lines(step, index, program)]
         finders.append("\n".join([*lines, ""]))
     return finders
 
@@ -250,7 +312,10 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     if not rule.conditions:
         return [f"    {text}"]
     queries = [
-        f"{'not ' if op == '>' else ''}x[{feature}] <= {_number(threshold)}"
+        # Of two numbers one is at most the other, or above it; what is no number is neither.
+        f"x[{feature}] > {_number(threshold)}"
+        if op == ">" and isinstance(rule_set.source.features[feature].derived, Formula)
+        else f"{'not ' if op == '>' else ''}x[{feature}] <= {_number(threshold)}"
         for feature, op, threshold in rule.conditions
     ]
     return [
@@ -260,23 +325,30 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     ]
 
 
-def _line(step: CodeLine, index: int, rule_set: RuleSet) -> str | None:
-    space = "    " * (step.level + 1)
+def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
+    space, rule_set = "    " * (step.level + 1), program.rule_set
     match step.kind:
         case "if":
             name = query_name(rule_set.source.features[step.feature])
-            return f"{space}if x[{step.feature}] <= {_number(step.threshold)}:  # {name}"
+            query = f"{space}if x[{step.feature}] <= {_number(step.threshold)}:  # {name}"
+            if step.feature not in program.formulas:
+                return [query]
+            return [
+                f"{space}if isnan(x[{step.feature}]):  # a formula without a value: no rule",
+                f"{space}    return -1",
+                query,
+            ]
         case "else":
-            return f"{space}else:"
+            return [f"{space}else:"]
         case "end":
-            return None
+            return []
         case "part":
-            return f"{space}return {_finder(index, step.target)}(x)"
+            return [f"{space}return {_finder(index, step.target)}(x)"]
         case "rule":
             if step.target == NO_RULE:
-                return f"{space}return -1"
+                return [f"{space}return -1"]
             rule = rule_set.rules[step.target]
-            return f"{space}return {step.target}  # {_rule_comment(rule, rule_set)}"
+            return [f"{space}return {step.target}  # {_rule_comment(rule, rule_set)}"]
 
 
 def _number(value: float) -> str:

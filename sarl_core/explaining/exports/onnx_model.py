@@ -7,14 +7,22 @@ float32 states exactly as the threshold itself does, so nothing is lost.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.dataset import (
+    derived_document,
+    derived_features,
+    observed_features,
+)
+from sarl_core.demonstrations.derived import Definition
 from sarl_core.errors import WorkError
+from sarl_core.explaining.exports.arithmetic import Operand, calculations
 from sarl_core.explaining.exports.program import (
     DimensionProgram,
     Program,
@@ -30,6 +38,7 @@ from sarl_core.shielding.shield import OnInvalid
 
 # Versions of the operators that runtimes have known for years.
 _OPERATORS, _TREES, _FORMAT = 13, 1, 7
+_FURTHER = 10_000_000  # numbers of nodes that no rule has
 
 
 def rules_to_onnx(
@@ -62,7 +71,10 @@ def rules_to_onnx(
             "an ONNX file needs the package onnx, which is not installed; run `pip install onnx`, "
             "or choose another format"
         ) from error
+    rule_set = program.rule_set
     graph = _Graph(helper)
+    if program.derives:
+        _derive(graph, program)
     for index, order in enumerate(program.orders):
         _find(graph, index, order)
     outputs = [f"rule_of_{i}" for i in range(len(program.orders))]
@@ -74,7 +86,7 @@ def rules_to_onnx(
         _replace_continuous(graph, program)
     else:
         _replace_discrete(graph, program)
-    d, m = len(rule_set.source.features), len(program.orders)
+    d, m = program.width, len(program.orders)
     kind = TensorProto.FLOAT if program.continuous else TensorProto.INT64
     info = helper.make_tensor_value_info
     model = helper.make_model(
@@ -98,13 +110,19 @@ def rules_to_onnx(
         doc_string="A shield of rules, learned from examples; it guarantees nothing. "
         + _INVALID[on_invalid],
     )
+    features = rule_set.source.features
     helper.set_model_props(
         model,
         {
             "environment": rule_set.source.env_id,
             "on_invalid": on_invalid,
             "features": json.dumps(
-                [{"name": f.name, "unit": f.unit} for f in rule_set.source.features]
+                [{"name": f.name, "unit": f.unit} for f in observed_features(features)]
+            ),
+            **(
+                {"derived": json.dumps(list(map(derived_document, derived_features(features))))}
+                if program.derives
+                else {}
             ),
             "actions": json.dumps([order.dimension.name for order in program.orders]),
             **({} if program.continuous else {"labels": json.dumps(_labels(program))}),
@@ -114,6 +132,68 @@ def rules_to_onnx(
     onnx.checker.check_model(model)
     content: bytes = model.SerializeToString()
     return content
+
+
+_DOUBLE, _FLOAT = 11, 1  # of ONNX
+_OPERATOR = {"+": "Add", "-": "Sub", "*": "Mul", "/": "Div"}
+
+
+def _derive(graph: _Graph, program: Program) -> None:
+    """Add what works out the derived features, in doubles: `state_values`, (B, d + k + f).
+
+    Behind the d features and the k derived ones stands for each of the f formulas 1 where it has
+    no value, else 0: the trees cannot ask what is no number.
+    """
+    features = program.rule_set.source.features
+    graph.add("Cast", ["state"], "exact_state", to=_DOUBLE)
+    parts, missing = ["state"], list[str]()
+    for place, feature in enumerate(features):
+        if feature.derived is None:
+            continue
+        name = f"derived_{place}"
+        exact = _worked_out(graph, feature.derived, name)
+        parts.append(graph.add("Cast", [exact], name, to=_FLOAT))
+        if place in program.formulas:
+            graph.flags[place] = len(features) + len(missing)
+            equal = graph.add("Equal", [name, name], f"{name}_is_number")
+            none = graph.add("Not", [equal], f"{name}_is_none")
+            missing.append(graph.add("Cast", [none], f"{name}_missing", to=_FLOAT))
+    graph.values = graph.add("Concat", [*parts, *missing], "state_values", axis=1)
+
+
+def _worked_out(graph: _Graph, definition: Definition, name: str) -> str:
+    """The operations of one derived feature; what the last one is called, (B, 1)."""
+
+    def operand(one: Operand) -> str:
+        if one.kind == "earlier":
+            return f"{name}_{one.value}"
+        if one.kind == "number":
+            text = f"{name}_number_{one.value!r}"
+            return graph.table(text, np.array([[one.value]], dtype=np.float64))
+        column = f"column_{one.value}"
+        if column not in graph.columns:
+            graph.columns.add(column)
+            place = graph.table(f"place_{one.value}", np.array([one.value], dtype=np.int64))
+            graph.add("Gather", ["exact_state", place], column, axis=1)
+        return column
+
+    steps = calculations(definition)
+    for number, step in enumerate(steps):
+        output, inputs = f"{name}_{number}", list(map(operand, step.operands))
+        if step.name == "abs":
+            graph.add("Abs", inputs, output)
+        elif len(inputs) == 1:
+            graph.add("Neg", inputs, output)
+        elif step.name in _OPERATOR:
+            graph.add(_OPERATOR[step.name], inputs, output)
+        else:  # which of two, with NaN and zeros: not as the operators of that name have it
+            how = {"min": "Less", "max": "Greater"}[step.name]
+            equal = graph.add("Equal", [inputs[0], inputs[0]], f"{output}_is_number")
+            none = graph.add("Not", [equal], f"{output}_is_none")
+            first = graph.add(how, inputs, f"{output}_compared")
+            chosen = graph.add("Or", [none, first], f"{output}_first")
+            graph.add("Where", [chosen, *inputs], output)
+    return f"{name}_{len(steps) - 1}"
 
 
 _INVALID: dict[OnInvalid, str] = {
@@ -170,11 +250,23 @@ def _execute(graph: _Graph, program: Program, decided: str) -> None:
 
 @dataclass
 class _Graph:
-    """Operators and tables, as they are put together."""
+    """Operators and tables, as they are put together.
+
+    Attributes:
+        helper: Of the package `onnx`.
+        nodes: So far.
+        tables: By their names.
+        values: What the trees walk with.
+        columns: Of the state, in doubles, that there are already.
+        flags: Of each formula the column of `state_values` that says whether it has no value.
+    """
 
     helper: Any
     nodes: list[Any] = field(default_factory=list)
     tables: dict[str, NDArray[Any]] = field(default_factory=dict)
+    values: str = "state"
+    columns: set[str] = field(default_factory=set)
+    flags: dict[int, int] = field(default_factory=dict)
 
     def add(self, operator: str, inputs: Sequence[str], output: str, **options: Any) -> str:
         """Add an operator and give the name of what it puts out."""
@@ -190,20 +282,27 @@ class _Graph:
         """Add trees that walk with the state."""
         return self.add(
             "TreeEnsembleRegressor",
-            ["state"],
+            [self.values],
             output,
             domain="ai.onnx.ml",
             n_targets=trees.count,
             aggregate_function="SUM",
             post_transform="NONE",
-            **{name: values for name, values in vars(trees).items() if name != "count"},
+            **trees.attributes(),
         )
 
 
 class _Trees:
     """Trees in the form of the operator: each adds a number to one column of the output."""
 
-    def __init__(self) -> None:
+    def __init__(self, flags: Mapping[int, int], missing: float) -> None:
+        """Take in what has to be known of formulas.
+
+        Args:
+            flags: As those of the graph.
+            missing: What a tree gives where it asks about a formula without a value.
+        """
+        self._flags, self._missing = flags, missing
         self.count = 0
         self.nodes_treeids: list[int] = []
         self.nodes_nodeids: list[int] = []
@@ -218,8 +317,21 @@ class _Trees:
         self.target_weights: list[float] = []
 
     def query(self, node: int, feature: int, threshold: float, below: int, above: int) -> None:
-        """A node that leads on."""
+        """A node that leads on; before one that asks about a formula stands whether it has one."""
+        if feature in self._flags:
+            further = _FURTHER + 2 * len(self.nodes_nodeids)
+            self._node(node, self._flags[feature], 0.5, "BRANCH_LEQ", further, further + 1)
+            self.leaf(further + 1, self._missing)
+            node = further
         self._node(node, feature, float(largest_float32(threshold)), "BRANCH_LEQ", below, above)
+
+    def attributes(self) -> dict[str, Any]:
+        """What the operator takes."""
+        return {
+            name: values
+            for name, values in vars(self).items()
+            if name.startswith(("nodes_", "target_"))
+        }
 
     def leaf(self, node: int, weight: float) -> None:
         """A node that ends."""
@@ -231,7 +343,21 @@ class _Trees:
 
     def end(self) -> None:
         """The tree is complete; the next begins."""
+        first = bisect_left(self.nodes_treeids, self.count)
+        if max(self.nodes_nodeids[first:]) >= _FURTHER:
+            self._number(first, bisect_left(self.target_treeids, self.count))
         self.count += 1
+
+    def _number(self, first: int, first_leaf: int) -> None:
+        """Number the nodes of the latest tree without gaps, in their order."""
+        numbers = {node: place for place, node in enumerate(self.nodes_nodeids[first:])}
+        for start, ids in (
+            (first, self.nodes_nodeids),
+            (first_leaf, self.target_nodeids),
+            (first, self.nodes_truenodeids),
+            (first, self.nodes_falsenodeids),
+        ):
+            ids[start:] = [numbers[node] for node in ids[start:]]
 
     def _node(
         self, node: int, feature: int, value: float, mode: str, below: int, above: int
@@ -247,7 +373,7 @@ class _Trees:
 
 def _find(graph: _Graph, index: int, order: DimensionProgram) -> None:
     """Add what finds the rule of one action dimension: `rule_of_<index>`, (B, 1) int64."""
-    trees = _Trees()
+    trees = _Trees(graph.flags, NO_RULE)
     if len(order.nodes) == 1:  # a tree of one leaf, which some runtimes do not take
         trees.query(0, 0, 0.0, 1, 2)
         trees.leaf(1, order.nodes[0].rule)
@@ -264,7 +390,7 @@ def _find(graph: _Graph, index: int, order: DimensionProgram) -> None:
         graph.add("Cast", [walked], name, to=7)  # int64
         return
     tree = graph.add("Cast", [walked], f"tree_{index}", to=7)
-    trees = _Trees()
+    trees = _Trees(graph.flags, 0.0)
     for _, rule in order.scanned:
         _chain(trees, rule)
     applies = graph.trees(trees, f"applies_{index}")

@@ -8,13 +8,15 @@ does with a state or an action that is none is the choice that the program was m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.dataset import Feature, observed_features
+from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, require
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import one_line
 from sarl_core.mining.rule_set import RuleSet
@@ -31,7 +33,7 @@ _MOST_LEVELS = 20
 class Replacement(NamedTuple):
     """What a rule makes of a proposed action.
 
-    An action carries the rule's label if it is neither below `low` nor above `high`; it is kept.
+    An action carries the rule's label if it is neither below `low` nor above `high`; it is left.
 
     Attributes:
         value: What any other action becomes, a whole number or a float32 one; None for the
@@ -73,7 +75,7 @@ class Program:
     """All that code needs to know.
 
     Attributes:
-        rule_set: Where it comes from.
+        rule_set: Where it comes from, without derived features that no rule asks about.
         projection: What a continuous action that breaks a rule becomes.
         on_invalid: What becomes of a step whose state is no state, or whose action is none.
         orders: One an action dimension.
@@ -85,6 +87,25 @@ class Program:
     on_invalid: OnInvalid
     orders: tuple[DimensionProgram, ...]
     outcomes: tuple[Replacement, ...]
+
+    @property
+    def width(self) -> int:
+        """Number of features of the state; derived ones follow them."""
+        return len(observed_features(self.rule_set.source.features))
+
+    @property
+    def derives(self) -> bool:
+        """Whether something is worked out from the state."""
+        return self.width < len(self.rule_set.source.features)
+
+    @property
+    def formulas(self) -> frozenset[int]:
+        """Which features are formulas, and may have no value."""
+        return frozenset(
+            place
+            for place, feature in enumerate(self.rule_set.source.features)
+            if isinstance(feature.derived, Formula)
+        )
 
     @property
     def continuous(self) -> bool:
@@ -129,7 +150,7 @@ def state_lines(features: Sequence[Feature]) -> list[str]:
         f"{index:>3}  {one_line(feature.name)}"
         + (f" ({one_line(feature.unit)})" if feature.unit else "")
         + ("" if feature.indicator is None else " (1 if so, else 0)")
-        for index, feature in enumerate(features)
+        for index, feature in enumerate(observed_features(features))
     ]
 
 
@@ -198,6 +219,7 @@ def program_of(
             "every rule of the rule set is switched off, so there is nothing to export; switch "
             "one on"
         )
+    rule_set = _asked_alone(rule_set)
     return Program(
         rule_set,
         projection,
@@ -259,6 +281,26 @@ def largest_float32(number: float) -> np.float32:
         nearest = np.float32(number)
     lower = np.float32(-np.inf)
     return np.nextafter(nearest, lower) if float(nearest) > number else nearest
+
+
+def _asked_alone(rule_set: RuleSet) -> RuleSet:
+    """The same rules without derived features that none of them asks about."""
+    features = rule_set.source.features
+    asked = {one.feature for rule in rule_set.rules for one in rule.conditions}
+    left = [place for place, one in enumerate(features) if one.derived is None or place in asked]
+    if len(left) == len(features):
+        return rule_set
+    to = {place: now for now, place in enumerate(left)}
+    rules = tuple(
+        replace(
+            rule,
+            conditions=tuple(one._replace(feature=to[one.feature]) for one in rule.conditions),
+            box=rule.box and DataBox(*(tuple(side[place] for place in left) for side in rule.box)),
+        )
+        for rule in rule_set.rules
+    )
+    source = replace(rule_set.source, features=tuple(features[place] for place in left))
+    return replace(rule_set, rules=rules, source=source)
 
 
 def _order(rule_set: RuleSet, index: int) -> DimensionProgram:

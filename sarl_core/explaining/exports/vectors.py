@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.dataset import observed_features
+from sarl_core.explaining.exports.derived_thresholds import DerivedThresholds
 from sarl_core.explaining.exports.program import DimensionProgram, largest_float32, program_of
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
@@ -58,7 +60,8 @@ def make_vectors(
 ) -> Vectors:
     """States at every threshold, one step above it and one below, and what is no state or action.
 
-    The other features of a state are such that it reaches the threshold on the way to the rule.
+    The other features of a state are such that it reaches the threshold on the way to the rule; of
+    thresholds on derived features as nearly as there are such states (`DerivedThresholds`).
     Behind them come states with a number that is none or infinite, and actions that are none.
 
     Args:
@@ -73,12 +76,17 @@ def make_vectors(
         InputError: As `program_of`.
     """
     program = program_of(rule_set, projection, on_invalid)
+    rule_set = program.rule_set
     rng = np.random.default_rng(0)
     typical = _typical_values(rule_set)
+    derived = DerivedThresholds(rule_set.source.features, typical)
     rows = [typical]
     for order in program.orders:
         for path, feature, threshold in _queries(order):
-            rows += _at(path, feature, threshold, typical, rng)
+            if feature < len(typical) and not any(one.feature >= len(typical) for one in path):
+                rows += _at(path, feature, threshold, typical, rng)
+            else:
+                rows += derived.states(path, Condition(feature, "<=", threshold), rng)
     for feature in range(len(typical)):
         for value in _ODD:
             odd = typical.copy()
@@ -201,9 +209,10 @@ def _typical_values(rule_set: RuleSet) -> NDArray[np.float32]:
     for rule in rule_set.rules:
         for feature, _, threshold in rule.conditions:
             by_feature.setdefault(feature, []).append(threshold)
-    values = np.zeros(len(rule_set.source.features), dtype=np.float32)
+    values = np.zeros(len(observed_features(rule_set.source.features)), dtype=np.float32)
     for feature, thresholds in by_feature.items():
-        values[feature] = largest_float32(float(np.median(thresholds)))
+        if feature < len(values):
+            values[feature] = largest_float32(float(np.median(thresholds)))
     return values
 
 
