@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations, with_formulas
 from sarl_core.cli.options import (
     AgentName,
     ChoiceName,
     Columns,
+    Derived,
     Divider,
     EnvOfFile,
     Files,
@@ -25,6 +27,7 @@ from sarl_core.cli.options import (
     Seed,
     out_option,
     with_columns,
+    with_derived,
     with_played_environment,
 )
 from sarl_core.errors import InputError
@@ -43,6 +46,7 @@ _NOBODY = "none"
 
 @with_played_environment
 @with_columns
+@with_derived
 def aggregate(
     context: typer.Context,
     files: Files,
@@ -54,6 +58,7 @@ def aggregate(
         ),
     ],
     columns: Columns,
+    derived: Derived,
     missing: MissingName = "refuse",
     max_rules: Annotated[
         int, typer.Option("--max-rules", help="Most rules of each action dimension.")
@@ -147,6 +152,8 @@ def aggregate(
         read = start.notes
         start, notes = in_order_of(start, describe_environment(environment))
         notes = tuple(dict.fromkeys((*read, *notes)))
+        start = with_formulas(start, derived)
+        plan = replace(plan, combined=pairs_of(start, derived))
     if nobody:
         _gaps(start, plan, environment, agents[0], out, jobs, as_json, notes)
         return
@@ -280,6 +287,10 @@ def _gaps(
         from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
 
         at = plan.thresholds
+        if plan.combined:
+            from sarl_core.mining.combining.choice import with_combinations
+
+            start = with_combinations(start, pairs=plan.combined, divider=plan.divider)
         rules = mine_rules(start, supp_min=at.support, conf_min=at.confidence, divider=plan.divider)
         try:
             for so_far in gaps_so_far(

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.demonstrations.formats.mapping.roles import Roles
+    from sarl_core.mining.combining.candidates import Pair
     from sarl_core.shielding.shield import Shield
 
 
@@ -110,22 +111,35 @@ def with_wanted(
     Raises:
         InputError: If a formula is none, or a feature is unknown.
     """
+    demonstrations = with_formulas(demonstrations, derived)
+    if derived.pairs:
+        from sarl_core.mining.combining.choice import with_combinations
+
+        pairs = pairs_of(demonstrations, derived)
+        demonstrations = with_combinations(demonstrations, pairs=pairs, divider=divider)
+    return demonstrations
+
+
+def with_formulas(demonstrations: Demonstrations, derived: Derived) -> Demonstrations:
+    """The same with formulas alone."""
     if derived.formulas:
         from sarl_core.demonstrations.dataset import formula_feature
 
         observed = demonstrations.observed
         formulas = [formula_feature(text, observed) for text in derived.formulas]
         demonstrations = demonstrations.deriving([*demonstrations.derived, *formulas])
-    if derived.pairs:
-        from sarl_core.mining.combining.candidates import pairs_by_name, pairs_of_like_kind
-        from sarl_core.mining.combining.choice import with_combinations
-
-        named = [text for text in derived.pairs if text != EVERY_PAIR]
-        pairs = pairs_by_name(demonstrations, named)
-        if EVERY_PAIR in derived.pairs:
-            pairs = tuple(dict.fromkeys((*pairs, *pairs_of_like_kind(demonstrations))))
-        demonstrations = with_combinations(demonstrations, pairs=pairs, divider=divider)
     return demonstrations
+
+
+def pairs_of(demonstrations: Demonstrations, derived: Derived) -> tuple[Pair, ...]:
+    """The pairs of features that a person wants combined; () for none."""
+    from sarl_core.mining.combining.candidates import pairs_by_name, pairs_of_like_kind
+
+    named = [text for text in derived.pairs if text != EVERY_PAIR]
+    pairs = pairs_by_name(demonstrations, named)
+    if EVERY_PAIR in derived.pairs:
+        pairs = tuple(dict.fromkeys((*pairs, *pairs_of_like_kind(demonstrations))))
+    return pairs
 
 
 def read_shield(

@@ -229,6 +229,22 @@ class Extension:
         return state + array("f", values).tolist()
 
 
+def extended_state(state: Sequence[float], features: Sequence[_Defined]) -> Sequence[float]:
+    """One state with the values of derived features.
+
+    Args:
+        state: d numbers; or d + k, which stays as it is.
+        features: d observed and k derived ones.
+
+    Returns:
+        d + k numbers; the same object where nothing is to be done.
+    """
+    extension = Extension.of(features)
+    if len(state) != extension.width or not extension.definitions:
+        return state
+    return extension.one([float(value) for value in state])
+
+
 def extend(observations: NDArray[np.float32], features: Sequence[_Defined]) -> NDArray[np.float32]:
     """Put the values of derived features behind those that are observed.
 

@@ -61,7 +61,7 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
                     "recorded from the action (a copy of it, a lamp that follows it), leave it "
                     "out, since a rule about it explains nothing"
                 )
-    return sentences + _next_states(demonstrations.observations, names, together)
+    return sentences + _next_states(demonstrations.raw_observations, names, together)
 
 
 def _share_given(values: NDArray[np.float32], actions: NDArray[Any], kind: str) -> float | None:

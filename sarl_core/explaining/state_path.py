@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.derived import Extension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, RuleNode, tree_of
 from sarl_core.mining.rules import Condition
@@ -48,6 +50,7 @@ class PathFinder:
             rule_set: The rules; those that are switched off are left out.
         """
         self.rule_set = rule_set
+        self._extension = Extension.of(rule_set.source.features)
         self._trees: list[list[RuleNode] | None] = [
             tree_of(
                 [
@@ -64,13 +67,14 @@ class PathFinder:
 
         Args:
             dimension: Index of the action dimension.
-            state: Shape (d,).
+            state: Shape (d,), or with what the rules derive (d + k,).
             rule: Index of the rule in force there, -1 for none, as it was recorded.
 
         Returns:
             The queries it was asked. A rule that a person placed is not in the tree: its own
             conditions are the way to it.
         """
+        state = self._extension.many(state[None])[0]
         nodes = self._trees[dimension]
         if rule >= 0 and (nodes is None or self.rule_set.rules[rule].placed):
             conditions = self.rule_set.rules[rule].conditions
@@ -83,6 +87,8 @@ class PathFinder:
             queries.append(_query(condition, state))
             node = nodes[node.left if below else node.right]
         ends = node.rule if node is not None else NO_RULE
+        if any(math.isnan(query.value) for query in queries):  # a formula has no value there
+            ends = NO_RULE
         return StatePath(tuple(queries), ends if ends != NO_RULE else None)
 
 

@@ -265,7 +265,7 @@ class _Run:
     ) -> None:
         self.plan, self.env_id, self.jobs, self.executor = plan, env_id, jobs, executor
         self.agent, self.expert = agent, expert
-        self.answers = Answers(env_id, expert, start)
+        self.answers = Answers(env_id, expert, start, pairs=plan.combined, divider=plan.divider)
         self.rounds: list[AggregationRound] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
         self.choice: _Choice | None = None
@@ -289,7 +289,7 @@ class _Run:
     def grow(self, index: int) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
         pairs = self.answers.pairs(index)
-        label_scores = label_scores_of(self.expert, pairs.observations)
+        label_scores = label_scores_of(self.expert, pairs.raw_observations)
         ways: dict[str, Any] = {}
         if label_scores is not None:
             # Two ways to say what matters, in turns; which is better is seen, not known.

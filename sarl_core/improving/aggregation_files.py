@@ -124,6 +124,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         "projection": plan.projection,
         "seed": plan.seed,
         **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
+        **({"combined": _combined(aggregation)} if plan.combined else {}),
         "episodes_a_round": plan.episodes,
         "generations": plan.generations,
         "rounds": [_round(one) for one in aggregation.rounds],
@@ -151,6 +152,12 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         },
         "made": datetime.now(UTC).date().isoformat(),
     }
+
+
+def _combined(aggregation: Aggregation) -> list[list[str]]:
+    """The pairs of features of which combinations could be asked about."""
+    features = aggregation.rule_set.source.features
+    return [[features[place].name for place in pair] for pair in aggregation.plan.combined]
 
 
 def _most_rules(aggregation: Aggregation) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
+from sarl_core.demonstrations.dataset import observed_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress
@@ -137,7 +138,7 @@ def _gaps(played: Episodes, shield: Shield, notes: tuple[str, ...]) -> Gaps:
     missing = table.rules < 0
     rows = np.flatnonzero(missing.any(axis=1))
     return Gaps(
-        feature_names=tuple(feature.name for feature in shield.rule_set.source.features),
+        feature_names=tuple(one.name for one in observed_features(shield.rule_set.source.features)),
         episode=table.episode[rows],
         step=table.step[rows],
         observations=table.observation[rows],

@@ -8,6 +8,7 @@ from typing import get_args
 from sarl_core.errors import InputError, quoted
 from sarl_core.improving.refinement import EPISODES
 from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.choices import Choice
 from sarl_core.rollouts.seeds import (
@@ -40,6 +41,8 @@ class Plan:
         max_steps: An episode that has not ended by then is cut off; `episodes.MAX_STEPS` where
             None.
         choose: What comes first where the best is chosen.
+        combined: Pairs of features of which combinations may be asked about, by their indices in
+            the environment's order; () for none.
     """
 
     max_rules: int
@@ -54,6 +57,7 @@ class Plan:
     seed: int = 0
     max_steps: int | None = None
     choose: Choice = "return"
+    combined: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what cannot be done.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -15,6 +16,8 @@ from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
+from sarl_core.mining.combining.candidates import Pair
+from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.rollouts.steps import StepTable
 
 # More states of one round are too alike to be worth their time.
@@ -139,13 +142,23 @@ def answered(
 class Answers:
     """What an expert said, at first and round by round."""
 
-    def __init__(self, env_id: EnvironmentOrId, expert: Agent, start: Demonstrations) -> None:
+    def __init__(
+        self,
+        env_id: EnvironmentOrId,
+        expert: Agent,
+        start: Demonstrations,
+        *,
+        pairs: Sequence[Pair] = (),
+        divider: int = 2,
+    ) -> None:
         """Ask about the states that were demonstrated.
 
         Args:
             env_id: The environment.
             expert: Who is asked.
-            start: What was shown so far; the expert answers anew.
+            start: What was shown so far; the expert answers anew. What it derives stays derived.
+            pairs: Features that are combined, as `with_combinations` takes them; () for none.
+            divider: Number of intervals of continuous dimensions.
 
         Raises:
             InputError: If the expert does not always do the same in the same state, or the
@@ -153,8 +166,10 @@ class Answers:
         """
         start = in_order_of(start, describe_environment(env_id)).demonstrations
         self._env_id, self._expert = env_id, expert
-        self._observations = [start.observations]
-        self._actions: list[Actions] = [ask(expert, start.observations, start.episodes)]
+        self._derived, self._combined, self._divider = start.derived, pairs, divider
+        observations = start.raw_observations
+        self._observations = [observations]
+        self._actions: list[Actions] = [ask(expert, observations, start.episodes)]
         self._episodes = [start.episodes]
         self._steps = [np.arange(len(start)) if start.steps is None else start.steps]
 
@@ -182,18 +197,22 @@ class Answers:
             rounds: How many have been taken up by then.
 
         Returns:
-            The pairs of the start and of the latest rounds.
+            The pairs of the start and of the latest rounds, with what is derived; which
+            combinations are worth it may differ from round to round.
         """
         rounds_used = [0, *range(max(1, rounds + 1 - _ROUNDS_USED), rounds + 1)]
 
         def column(parts: list[Any]) -> Any:
             return np.concatenate([parts[index] for index in rounds_used])
 
-        return answered(
+        pairs = answered(
             self._env_id,
             self._expert,
             column(self._observations),
             column(self._actions),
             column(self._episodes),
             column(self._steps),
-        )
+        ).deriving(self._derived)
+        if not self._combined:
+            return pairs
+        return with_combinations(pairs, pairs=self._combined, divider=self._divider)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import extended_state
 from sarl_core.mining.digits import amount_text, limit_texts
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
@@ -129,6 +130,8 @@ def is_flag(feature: Feature, bounds: Bounds) -> bool:
     """
     one = math.isinf(bounds.low) != math.isinf(bounds.high)
     threshold = bounds.high if math.isinf(bounds.low) else bounds.low
+    if feature.derived is not None:
+        return False
     if feature.indicator is not None:
         return one and 0.0 <= threshold < 1.0
     named = _states(feature) or any(word in feature.name.lower().split() for word in _FLAG_WORDS)
@@ -426,9 +429,10 @@ def sentence(
     """
     features = rule_set.source.features
     action = action_text(rule.action, rule_set.actions[rule.dimension])
+    values = [] if state is None else extended_state(np.asarray(state).tolist(), features)
 
     def text_of(bounds: Bounds) -> str:
-        beside = () if state is None else (float(state[bounds.feature]),)
+        beside = (float(values[bounds.feature]),) if len(values) else ()
         return condition_text(bounds, features[bounds.feature], beside=beside)
 
     parts = _condition_texts(rule, features, text_of, the="the ")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.derived import Combination, Extension
 from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
 from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
 from sarl_core.shielding.decisions import Ground, deciding, ground_of, labels_at, regions
 
 SAMPLED_STATES = 10_000
@@ -177,15 +179,17 @@ def sampled_states(
         seed: The same seed gives the same states.
 
     Returns:
-        Shape (count, d), float32: each feature uniform from a little below its least threshold to
-        a little above its largest; 0 where nothing asks about it. A column of words holds each of
-        them as often.
+        Shape (count, d + k), float32: each feature uniform from a little below its least threshold
+        to a little above its largest; 0 where nothing asks about it. A column of words holds each
+        of them as often. What is derived is worked out from the others, which reach as far as its
+        thresholds need them to.
     """
-    width = len(rule_sets[0].source.features)
+    extension = Extension.of(rule_sets[0].source.features)
+    width = extension.width
     low, high = np.full(width, np.inf), np.full(width, -np.inf)
     for rule_set in rule_sets:
         for rule in rule_set.rules:
-            for feature, _, threshold in rule.conditions:
+            for feature, threshold in _observed_thresholds(rule, extension):
                 low[feature] = min(low[feature], threshold)
                 high[feature] = max(high[feature], threshold)
     bounded = np.isfinite(low)
@@ -203,4 +207,20 @@ def sampled_states(
         several = max(len(places), 2)  # of two words one feature is enough
         words = np.eye(several, dtype=np.float32)[generator.integers(several, size=count)]
         states[:, places] = words[:, : len(places)]
-    return states
+    return extension.many(states)
+
+
+def _observed_thresholds(rule: Rule, extension: Extension) -> Iterator[tuple[int, float]]:
+    """What a rule asks of features; of those that something is derived from, how far they count."""
+    for feature, _, threshold in rule.conditions:
+        if feature < extension.width:
+            yield feature, threshold
+            continue
+        definition = extension.definitions[feature - extension.width]
+        weights = [1.0] * len(definition.features)
+        if isinstance(definition, Combination):
+            weights[1] = definition.ratio
+        for one, weight in zip(definition.features, weights, strict=True):
+            reach = (abs(threshold) or 1.0) / abs(weight)
+            yield one, reach
+            yield one, -reach

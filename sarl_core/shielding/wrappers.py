@@ -262,13 +262,13 @@ def check_fit(
     spaces = gymnasium.spaces
     source, actions = shield.rule_set.source, shield.rule_set.actions
     rules_of = f"the rules (of {source.env_id or 'an unnamed environment'})"
-    features, asked = (
+    features, width = (
         spaces.utils.flatdim(observation_space),
         len(observed_features(source.features)),
     )
-    if features != asked:
+    if features != width:
         raise InputError(
-            f"{rules_of} ask about {asked} features and the environment's "
+            f"{rules_of} ask about {width} features and the environment's "
             f"observations have {features}; use rules of this environment"
         )
     labels = _labels_of(action_space)

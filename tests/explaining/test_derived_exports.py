@@ -115,14 +115,14 @@ def test_the_vectors_lie_at_the_thresholds_of_combinations_and_a_step_beside_the
     vectors = make_vectors(rule_set)
     valid = vectors.states[~vectors.invalid]
     values = extend(valid, rule_set.source.features)
-    asked = {
+    queried = {
         (one.feature, one.threshold)
         for rule in rule_set
         for one in rule.conditions
         if one.feature >= 4
     }
-    assert len(asked) > 5
-    for feature, threshold in asked:
+    assert len(queried) > 5
+    for feature, threshold in queried:
         at = largest_float32(threshold)
         column = values[:, feature]
         for number in (at, *(np.nextafter(at, np.float32(side)) for side in (-np.inf, np.inf))):
@@ -137,8 +137,8 @@ def test_a_state_without_a_value_has_no_rule_that_asks_for_it() -> None:
     assert np.isnan(extend(states, rule_set.source.features)).any()
     wanted = expected(rule_set, "centre", states, np.zeros((1, 1), dtype=np.int64))
     for place in wanted.rules[wanted.rules >= 0].tolist():
-        asked = [one.feature for one in rule_set[place].conditions]
-        assert not np.isnan(extend(states, rule_set.source.features)[0, asked]).any()
+        queried = [one.feature for one in rule_set[place].conditions]
+        assert not np.isnan(extend(states, rule_set.source.features)[0, queried]).any()
 
 
 @settings(max_examples=8, deadline=None)

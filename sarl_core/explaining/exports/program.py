@@ -219,7 +219,7 @@ def program_of(
             "every rule of the rule set is switched off, so there is nothing to export; switch "
             "one on"
         )
-    rule_set = _asked_alone(rule_set)
+    rule_set = _without_idle(rule_set)
     return Program(
         rule_set,
         projection,
@@ -283,11 +283,11 @@ def largest_float32(number: float) -> np.float32:
     return np.nextafter(nearest, lower) if float(nearest) > number else nearest
 
 
-def _asked_alone(rule_set: RuleSet) -> RuleSet:
+def _without_idle(rule_set: RuleSet) -> RuleSet:
     """The same rules without derived features that none of them asks about."""
     features = rule_set.source.features
-    asked = {one.feature for rule in rule_set.rules for one in rule.conditions}
-    left = [place for place, one in enumerate(features) if one.derived is None or place in asked]
+    queried = {one.feature for rule in rule_set.rules for one in rule.conditions}
+    left = [place for place, one in enumerate(features) if one.derived is None or place in queried]
     if len(left) == len(features):
         return rule_set
     to = {place: now for now, place in enumerate(left)}

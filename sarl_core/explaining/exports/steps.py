@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.formats.metadata import KEY
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.explaining.words.states import state_columns
@@ -43,6 +44,12 @@ class RecordedSteps:
     rule_set: RuleSet | None
     chosen: str = ""
 
+    @property
+    def all_features(self) -> tuple[Feature, ...]:
+        """The d features, and what the rules derive from them."""
+        further = () if self.rule_set is None else self.rule_set.source.features
+        return (*self.features, *further[len(self.features) :])
+
     def to_frame(self) -> pd.DataFrame:
         """One row a step.
 
@@ -51,13 +58,16 @@ class RecordedSteps:
             each `rule` column the rule's id in a `rule_id` column, empty where none applies. What
             the features say of a column of words stands in one column, in words.
         """
-        frame = self.steps.to_frame([feature.name for feature in self.features])
-        for column in state_columns(self.features):
+        features = self.all_features
+        states = extend(self.steps.observation, features)
+        steps = replace(self.steps, observation=states)
+        frame = steps.to_frame([feature.name for feature in features])
+        for column in state_columns(features):
             if column.of_words:
                 names = [f"obs_{feature.name}" for feature in column.features]
                 place = list(frame.columns).index(names[0])
                 frame = frame.drop(columns=names)
-                words = column.words(self.steps.observation)
+                words = column.words(states)
                 frame.insert(place, f"obs_{column.title}", words, allow_duplicates=True)
         seeds = [int(seed) for seed in self.seeds]
         frame.insert(1, "seed", [seeds[episode] for episode in self.steps.episode.tolist()])
@@ -103,7 +113,7 @@ def steps_to_parquet(record: RecordedSteps) -> bytes:
         "env_id": record.env_id,
         "agent": record.agent,
         "seeds": [int(seed) for seed in record.seeds],
-        "features": [{"name": one.name, "unit": one.unit} for one in record.features],
+        "features": [{"name": one.name, "unit": one.unit} for one in record.all_features],
         "rules": None if rule_set is None else len(rule_set.rules),
         "demonstrations": None if rule_set is None else rule_set.source.digest,
         "chosen": record.chosen,

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import extend
 from sarl_core.explaining.report.demonstrations import ActionShares, action_shares
 from sarl_core.explaining.report.svg import NEUTRAL, share_bar
 from sarl_core.explaining.report.tally import Tally
@@ -216,7 +217,8 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
 def _beyond(
     played: PlayedEpisodes, rule_set: RuleSet, demonstrations: Demonstrations, *, boxed: bool
 ) -> Beyond:
-    states, rules = played.steps.observation, played.steps.rules
+    states = extend(played.steps.observation, demonstrations.features)
+    rules = played.steps.rules
     low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
     outside = ((states < low) | (states > high)).any(axis=1)
     covered = (rules >= 0).any(axis=1)

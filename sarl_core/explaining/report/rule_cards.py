@@ -12,6 +12,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.derived import extended_state
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow
 from sarl_core.explaining.report.svg import SvgScale, evidence_bar, interval_bar
@@ -300,6 +301,7 @@ def _picture(
     frame: ExampleFrame, rule: Rule, rule_set: RuleSet, ranges: Sequence[FeatureRow]
 ) -> Picture:
     dimension, features = rule_set.actions[rule.dimension], rule_set.source.features
+    state = extended_state(frame.observation.tolist(), features)
     value = frame.executed[rule.dimension].item()
     did = done_text(value, dimension)
     followed = dimension.label_of(value) == rule.action
@@ -310,7 +312,7 @@ def _picture(
         f"rule applies; {frame.player} chose {did}",
         caption=f"{name}: {did}{'' if followed else ', against the rule'}",
         values="; ".join(
-            _value_text(frame.observation[bounds.feature].item(), features[bounds.feature], bounds)
+            _value_text(state[bounds.feature], features[bounds.feature], bounds)
             for bounds in rule.bounds[:_MOST_VALUES]
             if not is_flag(features[bounds.feature], bounds)
         ),

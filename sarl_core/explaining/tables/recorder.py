@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import extend
 from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import counted, done_text
@@ -34,7 +35,7 @@ def recorder_columns(
         steps: T of them.
         rows: Those to show.
         dimensions: The m action dimensions.
-        features: The d features.
+        features: The d features; what the rules derive from them follows.
         rule_set: The rules of the shield; None without one, and then without what it says.
         seeds: Of the episodes where there are several, to name them.
 
@@ -85,15 +86,17 @@ def recorder_columns(
         columns["Failure"] = part.failed.tolist()
     if not np.isnan(steps.cost).all():
         columns["Cost"] = part.cost.tolist()
-    for column in state_columns(features):
+    known = rule_set.source.features if rule_set is not None else features
+    states = extend(part.observation, known)
+    for column in state_columns((*features, *known[len(features) :])):
         index = column.places[0]
         title = f"{column.title} ({column.unit})" if column.unit else column.title
         if title in columns:
             title = f"{title} [{index}]"  # a column of a table has a name of its own
         columns[title] = (
-            list(column.words(part.observation))
+            list(column.words(states))
             if column.of_words
-            else part.observation[:, index].astype(np.float64).tolist()
+            else states[:, index].astype(np.float64).tolist()
         )
     return columns
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.demonstrations.dataset import Demonstrations, Feature, observed_features
+from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.names import Names, in_order_of, names_of, renamed_description
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
@@ -99,7 +100,7 @@ def named_description(
     """
     candidates = []
     if rule_set is not None and rule_set.source.env_id in ("", description.env_id):
-        features, actions = rule_set.source.features, rule_set.actions
+        features, actions = observed_features(rule_set.source.features), rule_set.actions
         candidates.append(
             Names(
                 tuple(feature.name for feature in features),
@@ -135,7 +136,7 @@ def step_view(
         rule_set: The rules of the shield, or None.
 
     Returns:
-        The step.
+        The step; its state with what the rules derive from it.
     """
     views = []
     for index, dimension in enumerate(dimensions):
@@ -163,7 +164,8 @@ def step_view(
     in_force = steps.rules[row].tolist() if rule_set is not None else []
     asking = [rule_set.rules[rule] for rule in in_force if rule >= 0] if rule_set else []
     named = rule_set.source.features if rule_set is not None else features
-    state = state_rows(steps.observation[row], features, named, asking)
+    values = extend(steps.observation[row][None], named)[0]
+    state = state_rows(values, (*features, *named[len(features) :]), named, asking)
     return StepView(
         int(steps.step[row]),
         tuple(views),

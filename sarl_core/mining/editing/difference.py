@@ -16,6 +16,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.dataset import observed_features
+from sarl_core.demonstrations.derived import definitions_of
 from sarl_core.environments.feature_order import NamedFeatures, only_counts
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
@@ -79,7 +81,8 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
         InputError: If their features, actions or intervals differ.
     """
     known = first.source.env_id != "" and first.source.env_id == second.source.env_id
-    if len(first.source.features) != len(second.source.features):
+    observed = [observed_features(each.source.features) for each in (first, second)]
+    if len(observed[0]) != len(observed[1]):
         raise _of_other_features(first, second)
     if len(first.actions) != len(second.actions):
         raise InputError(
@@ -90,7 +93,7 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
         second,
         NamedFeatures(
             "the first rules",
-            tuple(feature.name for feature in first.source.features),
+            tuple(feature.name for feature in observed[0]),
             first.source.env_id,
         ),
         tuple(action.name for action in first.actions),
@@ -100,6 +103,11 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
     if others and fitted.rule_set is not second:
         raise _of_other_features(first, second)
     second = fitted.rule_set
+    if definitions_of(first.source.features) != definitions_of(second.source.features):
+        raise InputError(
+            "the two rule sets derive different features; let them derive the same: "
+            "in_shared_words(first, second)"
+        )
     for one, other in zip(first.actions, second.actions, strict=True):
         if one.edges != other.edges:
             divided = [

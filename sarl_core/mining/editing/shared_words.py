@@ -10,6 +10,7 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.fields import Indicator
 from sarl_core.demonstrations.words import columns_of_words, words_of
 from sarl_core.errors import quoted
+from sarl_core.mining.editing.shared_derived import deriving_alike
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule
@@ -42,7 +43,7 @@ class _Own(NamedTuple):
 
 
 def in_shared_words(first: RuleSet, second: RuleSet) -> SharedWords:
-    """Let two rule sets know each other's words, so that they can be compared.
+    """Let two rule sets know each other's words and derived features, for a comparison.
 
     No condition of a rule becomes another one: of two words, "not heavy" stays "not heavy".
 
@@ -51,8 +52,9 @@ def in_shared_words(first: RuleSet, second: RuleSet) -> SharedWords:
         second: Another.
 
     Returns:
-        The same objects where both know the same words, or have other columns of words.
+        The same objects where both know the same, or have other columns of words.
     """
+    first, second = deriving_alike(first, second)
     words = [_words(each.source.features) for each in (first, second)]
     differing = {
         column: tuple(dict.fromkeys((*known, *words[1][column])))

@@ -170,7 +170,7 @@ def _labels(demonstrations: Demonstrations, divider: int) -> NDArray[np.int64]:
 def _same_states(demonstrations: Demonstrations) -> NDArray[np.int64]:
     """A number for every state, the same for equal ones, (N,)."""
     # Zero has two signs and is one number; then equal states are equal bytes.
-    states = np.ascontiguousarray(demonstrations.observations + np.float32(0.0))
+    states = np.ascontiguousarray(demonstrations.raw_observations + np.float32(0.0))
     whole = states.view(np.dtype((np.void, states.itemsize * states.shape[1]))).reshape(-1)
     # As np.unique does, which has every state three times over.
     order = np.argsort(whole)
@@ -205,7 +205,7 @@ def _nearest_elsewhere(
     visits = state * (int(demonstrations.episodes.max()) + 1) + demonstrations.episodes
     _, row, visit = np.unique(visits, return_index=True, return_inverse=True)
     episode = demonstrations.episodes[row]
-    observed = demonstrations.observations.astype(np.float64)
+    observed = demonstrations.raw_observations.astype(np.float64)
     spread = observed.std(axis=0)
     points = observed[row] / np.where(spread > 0, spread, 1.0)
     tree = cKDTree(points)
