@@ -20,6 +20,8 @@ from sarl_core.demonstrations.unit_algebra import quotient
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, quoted
 
+_FEW = 4_096  # states whose combinations are worked out all at once: a call costs more than they do
+
 LARGEST_RATIO = 1e30  # times a float32 number it is still a float64 one
 
 
@@ -186,6 +188,10 @@ class Extension:
         # For single states bare numbers where there is nothing else, as there mostly is not.
         self._pairs = [(one.terms[0][0], one.terms[1][0], one.ratio) for one in pairs]
         self._pairs_alone = len(pairs) == len(self.definitions)
+        # For a few states together arrays of the same.
+        self._firsts = np.array([first for first, _, _ in self._pairs], dtype=np.int64)
+        self._seconds = np.array([second for _, second, _ in self._pairs], dtype=np.int64)
+        self._ratios = np.array([ratio for _, _, ratio in self._pairs])
 
     @classmethod
     def of(cls, features: Sequence[_Defined]) -> Extension:
@@ -208,6 +214,12 @@ class Extension:
         states = np.empty((len(raw), self.width + len(self.definitions)), dtype=np.float32)
         states[:, : self.width] = raw
         with np.errstate(all="ignore"):
+            if self._pairs_alone and len(raw) <= _FEW:
+                exact = raw.astype(np.float64)
+                states[:, self.width :] = (
+                    exact[:, self._firsts] + self._ratios * exact[:, self._seconds]
+                )
+                return states
             for place, definition in enumerate(self.definitions, start=self.width):
                 states[:, place] = definition.values(raw)
         return states

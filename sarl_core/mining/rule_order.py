@@ -117,6 +117,34 @@ def fits(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
     return True
 
 
+def without_idle(rule_set: RuleSet) -> RuleSet:
+    """The same rules without derived features that none of them asks about.
+
+    Args:
+        rule_set: The rules.
+
+    Returns:
+        For whoever works out what is derived at every step; the same object where all are asked
+        about. Derived features have other numbers; rules keep theirs.
+    """
+    features = rule_set.source.features
+    queried = {one.feature for rule in rule_set.rules for one in rule.conditions}
+    left = [place for place, one in enumerate(features) if one.derived is None or place in queried]
+    if len(left) == len(features):
+        return rule_set
+    to = {place: now for now, place in enumerate(left)}
+    rules = tuple(
+        replace(
+            rule,
+            conditions=tuple(one._replace(feature=to[one.feature]) for one in rule.conditions),
+            box=rule.box and DataBox(*(tuple(side[place] for place in left) for side in rule.box)),
+        )
+        for rule in rule_set.rules
+    )
+    source = replace(rule_set.source, features=tuple(features[place] for place in left))
+    return replace(rule_set, rules=rules, source=source)
+
+
 def _check_actions(actions: tuple[LabelledDimension, ...], demonstrations: Demonstrations) -> None:
     advice = "choose demonstrations of the rules' environment"
     for rules, demonstrated in zip(actions, demonstrations.action_dimensions, strict=True):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations.derived import Combination, Extension
 from sarl_core.errors import InputError, require
+from sarl_core.mining.rule_order import without_idle
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import take_back_unanswered
@@ -142,11 +143,14 @@ class Shield:
         self.outside: Outside = outside
         self.on_invalid: OnInvalid = on_invalid
         self._actions = rule_set.actions
+        # What no rule asks about need not be worked out at every step.
+        used = without_idle(rule_set)
+        self._rules = used.rules
         self._matchers = tuple(
             Matcher.of(
                 [
                     (index, rule)
-                    for index, rule in enumerate(rule_set.rules)
+                    for index, rule in enumerate(used.rules)
                     if rule.dimension == dimension and rule.enabled
                 ]
             )
@@ -154,11 +158,11 @@ class Shield:
         )
         self._labels = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
         self._label_list: list[int] = self._labels.tolist()
-        self._boxes = Boxes(rule_set.rules, len(rule_set.source.features))
+        self._boxes = Boxes(used.rules, len(used.source.features))
         self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
         self._states = StateReader(rule_set)
-        self._extension = Extension.of(rule_set.source.features)
+        self._extension = Extension.of(used.source.features)
         self._extends = bool(self._extension.definitions)
         self._formulas = not all(
             isinstance(one, Combination) for one in self._extension.definitions
@@ -178,7 +182,7 @@ class Shield:
         """The rule that applies to one state, some of whose formulas may have no value."""
         rule, margin = self._matchers[dimension].match(state)
         if rule is not None and any(
-            isnan(state[feature]) for feature, _, _ in self.rule_set.rules[rule].conditions
+            isnan(state[feature]) for feature, _, _ in self._rules[rule].conditions
         ):
             return None, margin
         return rule, margin
@@ -466,7 +470,7 @@ class Shield:
         for dimension, matcher in enumerate(self._matchers):
             rules[:, dimension], near = matcher.match_batch(states)
             if self._formulas:
-                take_back_unanswered(rules[:, dimension], states, self.rule_set.rules)
+                take_back_unanswered(rules[:, dimension], states, self._rules)
             margin = np.minimum(margin, near)
         return rules, margin
 

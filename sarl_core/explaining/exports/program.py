@@ -8,7 +8,7 @@ does with a state or an action that is none is the choice that the program was m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,9 +16,9 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Feature, observed_features
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, require
-from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import one_line
+from sarl_core.mining.rule_order import without_idle
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
 from sarl_core.mining.rules import Rule
@@ -219,7 +219,7 @@ def program_of(
             "every rule of the rule set is switched off, so there is nothing to export; switch "
             "one on"
         )
-    rule_set = _without_idle(rule_set)
+    rule_set = without_idle(rule_set)
     return Program(
         rule_set,
         projection,
@@ -281,26 +281,6 @@ def largest_float32(number: float) -> np.float32:
         nearest = np.float32(number)
     lower = np.float32(-np.inf)
     return np.nextafter(nearest, lower) if float(nearest) > number else nearest
-
-
-def _without_idle(rule_set: RuleSet) -> RuleSet:
-    """The same rules without derived features that none of them asks about."""
-    features = rule_set.source.features
-    queried = {one.feature for rule in rule_set.rules for one in rule.conditions}
-    left = [place for place, one in enumerate(features) if one.derived is None or place in queried]
-    if len(left) == len(features):
-        return rule_set
-    to = {place: now for now, place in enumerate(left)}
-    rules = tuple(
-        replace(
-            rule,
-            conditions=tuple(one._replace(feature=to[one.feature]) for one in rule.conditions),
-            box=rule.box and DataBox(*(tuple(side[place] for place in left) for side in rule.box)),
-        )
-        for rule in rule_set.rules
-    )
-    source = replace(rule_set.source, features=tuple(features[place] for place in left))
-    return replace(rule_set, rules=rules, source=source)
 
 
 def _order(rule_set: RuleSet, index: int) -> DimensionProgram:
