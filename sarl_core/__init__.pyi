@@ -2,6 +2,7 @@
 from .auditing.audit import Audit as Audit
 from .auditing.audit import audit as audit
 from .demonstrations.dataset import Demonstrations as Demonstrations
+from .demonstrations.dataset import with_formulas as with_formulas
 from .demonstrations.formats import load_demonstrations as load_demonstrations
 from .demonstrations.formats import save_demonstrations as save_demonstrations
 from .environments.environment import Environment as Environment
@@ -12,6 +13,7 @@ from .explaining.exports.export import export_rules as export_rules
 from .explaining.report.report import make_report as make_report
 from .mining.algorithm_1 import mine_rules as mine_rules
 from .mining.classifier import RuleClassifier as RuleClassifier
+from .mining.combining.choice import with_combinations as with_combinations
 from .mining.rule_set import RuleSet as RuleSet
 from .mining.rule_set import load_rules as load_rules
 from .mining.rules import Rule as Rule

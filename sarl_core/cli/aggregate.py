@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations, with_formulas
+from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations
 from sarl_core.cli.options import (
     AgentName,
     ChoiceName,
@@ -127,6 +127,7 @@ def aggregate(
     nobody = expert == _NOBODY
     terminal.check_output(out, (".csv",) if nobody else (".json",))
     with terminal.working("Starting"):
+        from sarl_core.demonstrations.dataset import with_formulas
         from sarl_core.demonstrations.names import in_order_of
         from sarl_core.environments.description import describe_environment
         from sarl_core.improving.aggregation import recorded_environment
@@ -152,7 +153,7 @@ def aggregate(
         read = start.notes
         start, notes = in_order_of(start, describe_environment(environment))
         notes = tuple(dict.fromkeys((*read, *notes)))
-        start = with_formulas(start, derived)
+        start = with_formulas(start, derived.formulas)
         plan = replace(plan, combined=pairs_of(start, derived))
     if nobody:
         _gaps(start, plan, environment, agents[0], out, jobs, as_json, notes)

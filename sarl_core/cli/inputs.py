@@ -111,23 +111,15 @@ def with_wanted(
     Raises:
         InputError: If a formula is none, or a feature is unknown.
     """
-    demonstrations = with_formulas(demonstrations, derived)
+    if derived.formulas:
+        from sarl_core.demonstrations.dataset import with_formulas
+
+        demonstrations = with_formulas(demonstrations, derived.formulas)
     if derived.pairs:
         from sarl_core.mining.combining.choice import with_combinations
 
         pairs = pairs_of(demonstrations, derived)
         demonstrations = with_combinations(demonstrations, pairs=pairs, divider=divider)
-    return demonstrations
-
-
-def with_formulas(demonstrations: Demonstrations, derived: Derived) -> Demonstrations:
-    """The same with formulas alone."""
-    if derived.formulas:
-        from sarl_core.demonstrations.dataset import formula_feature
-
-        observed = demonstrations.observed
-        formulas = [formula_feature(text, observed) for text in derived.formulas]
-        demonstrations = demonstrations.deriving([*demonstrations.derived, *formulas])
     return demonstrations
 
 

@@ -541,3 +541,27 @@ class Demonstrations(DemonstrationFields):
             return_std=float(returns.std(ddof=1)) if several and returns is not None else None,
             label_shares=tuple(shares),
         )
+
+
+def with_formulas(demonstrations: Demonstrations, formulas: Sequence[str]) -> Demonstrations:
+    """Demonstrations with formulas that a person wrote as further features.
+
+    Args:
+        demonstrations: N steps; what they derive already stays.
+        formulas: Each as "time to collision [s] = gap / (own_speed - lead_speed)": a name, a unit
+            in brackets or none, and numbers, names of features, ``+ - * /``, ``min``, ``max``,
+            ``abs`` and parentheses.
+
+    Returns:
+        The same steps, with the formulas behind their features.
+
+    Raises:
+        InputError: If one is no formula, names an unknown feature, has the name of another
+            feature, or no value in some step (0/0).
+    """
+    must = "what formulas are about must be Demonstrations"
+    require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+    if isinstance(formulas, str):
+        raise InputError("the formulas must be a list of texts; put one into a list: [text]")
+    added = [formula_feature(text, demonstrations.observed) for text in formulas]
+    return demonstrations.deriving([*demonstrations.derived, *added])

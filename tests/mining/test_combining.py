@@ -105,8 +105,9 @@ def test_the_choice_is_the_same_every_time_and_is_not_long() -> None:
 def test_pairs_are_named_with_commas() -> None:
     made = demonstrations()
     assert pairs_by_name(made, ["Velocity, position, noise"]) == ((1, 0), (1, 3), (0, 3))
-    chosen = with_combinations(made, pairs=pairs_by_name(made, ["velocity, position"]))
+    chosen = with_combinations(made, pairs=[("Velocity", "position")])
     assert all(one.name.startswith("velocity") for one in chosen.features[4:])
+    assert chosen.digest == with_combinations(made, pairs=[(1, 0)]).digest
 
 
 @pytest.mark.parametrize(

@@ -61,25 +61,12 @@ def pairs_by_name(demonstrations: Demonstrations, texts: Sequence[str]) -> tuple
 
 def _named(demonstrations: Demonstrations, text: str) -> list[int]:
     """Indices of the features that a list names."""
-    names = [feature.name for feature in demonstrations.observed]
-    plain = plain_names(names)
     places: list[int] = []
     for name in text.split(","):
-        wanted = " ".join(plain_names((name,)))
-        if wanted not in plain:
-            raise InputError(
-                f"{quoted(name.strip())} is no feature that could be combined; the features are "
-                f"{shortened(names)}"
-            )
-        place = plain.index(wanted)
-        if demonstrations.observed[place].indicator is not None:
-            raise InputError(
-                f"{quoted(names[place])} says which word a column holds and is no amount; combine "
-                "features that are numbers"
-            )
+        place = amount_named(demonstrations, name)
         if place in places:
             raise InputError(
-                f"{quoted(names[place])} is combined with itself; name two different features"
+                f"{quoted(name.strip())} is combined with itself; name two different features"
             )
         places.append(place)
     if len(places) < 2:
@@ -88,6 +75,35 @@ def _named(demonstrations: Demonstrations, text: str) -> list[int]:
             "behind a comma"
         )
     return places
+
+
+def amount_named(demonstrations: Demonstrations, name: str) -> int:
+    """The index of a feature that a person names to combine it.
+
+    Args:
+        demonstrations: N states.
+        name: Whatever its capitals, with spaces or underscores.
+
+    Returns:
+        Of a feature that is a number.
+
+    Raises:
+        InputError: If there is none of that name, or it says which word a column holds.
+    """
+    names = [feature.name for feature in demonstrations.observed]
+    plain, (wanted,) = plain_names(names), plain_names((name,))
+    if wanted not in plain:
+        raise InputError(
+            f"{quoted(name.strip())} is no feature that could be combined; the features are "
+            f"{shortened(names)}"
+        )
+    place = plain.index(wanted)
+    if demonstrations.observed[place].indicator is not None:
+        raise InputError(
+            f"{quoted(names[place])} says which word a column holds and is no amount; combine "
+            "features that are numbers"
+        )
+    return place
 
 
 def candidates(demonstrations: Demonstrations, pairs: Sequence[Pair]) -> tuple[Combination, ...]:

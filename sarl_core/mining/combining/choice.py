@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination, DerivedFeature, Extension
 from sarl_core.errors import InputError, require
-from sarl_core.mining.combining.candidates import Pair, candidates, pairs_of_like_kind
+from sarl_core.mining.combining.candidates import (
+    Pair,
+    amount_named,
+    candidates,
+    pairs_of_like_kind,
+)
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.tree import fitted
 
@@ -25,7 +30,7 @@ _AT_ONCE = 512  # candidates; of more, the best of each such part are looked at 
 def with_combinations(
     demonstrations: Demonstrations,
     *,
-    pairs: Sequence[Pair] | None = None,
+    pairs: Sequence[Pair | tuple[str, str]] | None = None,
     divider: int = 2,
     most: int = MOST_COMBINATIONS,
 ) -> Demonstrations:
@@ -37,7 +42,8 @@ def with_combinations(
 
     Args:
         demonstrations: N steps; what they derive already stays.
-        pairs: Indices of features that were observed; all of like kind where not given.
+        pairs: Names or indices of two features that were observed, each; where not given, all
+            that are amounts: neither words nor flags.
         divider: Number of intervals of continuous action dimensions.
         most: Combinations to keep, at most.
 
@@ -50,13 +56,12 @@ def with_combinations(
     must = "what features are combined of must be Demonstrations"
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
     d = len(demonstrations.observed)
-    for pair in pairs or ():
-        if len(pair) != 2 or any(not 0 <= place < d for place in pair) or pair[0] == pair[1]:
-            raise InputError(
-                f"{pair} are no two of the {d} features; give two different indices from 0"
-            )
     known = {one.definition for one in demonstrations.derived}
-    chosen = pairs_of_like_kind(demonstrations) if pairs is None else tuple(pairs)
+    chosen = (
+        pairs_of_like_kind(demonstrations)
+        if pairs is None
+        else [_pair(demonstrations, pair) for pair in pairs]
+    )
     possible = [one for one in candidates(demonstrations, chosen) if one not in known]
     if not possible:
         raise InputError(
@@ -79,6 +84,19 @@ def with_combinations(
     used = sorted(order[worth[order] > 0.0].tolist())
     combined = [DerivedFeature(possible[place]) for place in used]
     return demonstrations.deriving([*demonstrations.derived, *combined])
+
+
+def _pair(demonstrations: Demonstrations, pair: Pair | tuple[str, str]) -> Pair:
+    """Indices of two features."""
+    d = len(demonstrations.observed)
+    places = [
+        amount_named(demonstrations, one) if isinstance(one, str) else int(one) for one in pair
+    ]
+    if len({*places}) != 2 or len(places) != 2 or not all(0 <= place < d for place in places):
+        raise InputError(
+            f"{pair} are no two of the {d} features; give two different names, or indices from 0"
+        )
+    return places[0], places[1]
 
 
 def _gains(
