@@ -112,11 +112,8 @@ def report(
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
-        given = recoded(
-            read_demonstrations(demonstrations, env, columns, missing),
-            rule_set.source.features,
-            called=str(demonstrations),
-        )
+        read = read_demonstrations(demonstrations, env, columns, missing)
+        given = recoded(read, rule_set.source.features, called=str(demonstrations))
         card = read_card(rules)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
@@ -135,7 +132,14 @@ def report(
             "--out": out,
         }
         mined = mining_command(
-            rule_set, rules, demonstrations, given, env=env, columns=columns, missing=missing
+            rule_set,
+            rules,
+            demonstrations,
+            given,
+            env=env,
+            columns=columns,
+            missing=missing,
+            read=read,
         )
         document = make_report(
             rule_set,

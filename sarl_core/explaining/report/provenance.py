@@ -12,8 +12,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.environment import Environment
+from sarl_core.environments.formulas import Formula
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
@@ -84,7 +86,7 @@ def command_line(
     Args:
         command: As "report".
         argument: Its file.
-        options: Name to value; several in a list or tuple, None for none.
+        options: Name to value; several in a list or tuple, None for none, True for the name alone.
 
     Returns:
         One line, with whatever a shell would take for more than a name in quotes.
@@ -94,7 +96,7 @@ def command_line(
         values = value if isinstance(value, (list, tuple)) else [value]
         for one in values:
             if one is not None:
-                words += [name, str(one)]
+                words += [name] if one is True else [name, str(one)]
     return f"{_PROGRAM} {shlex.join(words)}"
 
 
@@ -107,6 +109,7 @@ def mining_command(
     env: Environment | None = None,
     columns: Roles | None = None,
     missing: Missing = "refuse",
+    read: Demonstrations | None = None,
 ) -> str | None:
     """How rules were mined, as far as they tell themselves; `commands_that_hold` tries it.
 
@@ -118,6 +121,7 @@ def mining_command(
         env: That was named when they were read, which gives names and bounds; None for none.
         columns: What was said of their columns.
         missing: What became of steps that lack a value.
+        read: The demonstrations as their file has them; without derived features where None.
 
     Returns:
         One line; None for rules from other data, of a budget, tried on episodes kept aside, or
@@ -128,6 +132,9 @@ def mining_command(
         for rule in rule_set.rules
     )
     if rule_set.cut != "thresholds" or rule_set.source.digest != given.digest or not plain:
+        return None
+    derived = _derived_options(given, read or given.deriving(()), rule_set.divider)
+    if derived is None:
         return None
     limits = rule_set.thresholds
     named = next((name for name, pair in NAMED_SETTINGS.items() if pair == limits), None)
@@ -142,12 +149,41 @@ def mining_command(
             "--lift": threshold_text(limits.lift) if limits.lift else None,
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
+            **derived,
             "--column": as_options(columns or {}),
             "--missing": None if missing == "refuse" else missing,
             **({} if env is None else env.options),
             "--out": rules,
         },
     )
+
+
+def _derived_options(
+    given: Demonstrations, read: Demonstrations, divider: int
+) -> dict[str, object] | None:
+    """How derived features are asked for; None where no options would give them."""
+    before = len(read.derived)
+    derived = given.derived[before:]
+    formulas = [one for one in derived if isinstance(one.definition, Formula)]
+    combined = [one.definition for one in derived[len(formulas) :]]
+    if given.derived[:before] != read.derived or any(isinstance(o, Formula) for o in combined):
+        return None
+    options: dict[str, object] = {
+        "--feature": [
+            f"{one.name}{f' [{one.unit}]' if one.unit else ''} = {one.definition}"
+            for one in formulas
+        ]
+    }
+    if not combined:
+        return options
+    base = read.deriving([*read.derived, *formulas])
+    names = [feature.name for feature in base.observed]
+    pairs = [(first, second) for first, second in dict.fromkeys(o.features for o in combined)]
+    named = [f"{names[first]}, {names[second]}" for first, second in pairs]
+    for chosen, option in ((None, [True]), (pairs, named)):
+        if with_combinations(base, pairs=chosen, divider=divider).derived == given.derived:
+            return options | {"--combine": option}
+    return None
 
 
 def commands_that_hold(
