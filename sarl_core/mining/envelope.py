@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.mining.applications import Applications, applications
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_order import rules_for
@@ -59,6 +60,7 @@ def with_splits(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
     Raises:
         InputError: If the rules are for other features or actions.
     """
+    demonstrations = recoded(demonstrations, rule_set.source.features, called="the demonstrations")
     rule_set = rules_for(rule_set, demonstrations).rule_set
     conditions = [condition for rule in rule_set.rules for condition in rule.conditions]
     splits = splits_of(

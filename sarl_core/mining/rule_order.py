@@ -13,6 +13,7 @@ from sarl_core.demonstrations.dataset import (
     observed_features,
     with_derived,
 )
+from sarl_core.demonstrations.derived import definitions_of
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import FeatureOrder, NamedFeatures, line_up
 from sarl_core.errors import InputError
@@ -94,6 +95,12 @@ def rules_for(
         ),
         tuple(dimension.name for dimension in demonstrations.action_dimensions),
     )
+    derived = definitions_of(fitted.rule_set.source.features)
+    if derived != definitions_of(demonstrations.features):
+        raise InputError(
+            f"the rules ask about features that {called} do not derive alike; bring them to the "
+            "rules' features: recoded(demonstrations, rules.source.features, called='the log')"
+        )
     _check_actions(fitted.rule_set.actions, demonstrations)
     if fitted.rule_set is rule_set and rule_set.source.digest == demonstrations.digest:
         return Fitted(rule_set, ())  # mined from these very pairs

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
@@ -98,6 +99,7 @@ def recount(rule_set: RuleSet, demonstrations: Demonstrations) -> tuple[PolicyTr
         InputError: If the rules are not the leaves of trees, or are for other features or
             actions.
     """
+    demonstrations = recoded(demonstrations, rule_set.source.features, called="the demonstrations")
     rule_set = rules_for(rule_set, demonstrations).rule_set
     return tuple(
         count_tree(

@@ -7,14 +7,18 @@ asked once between each two of them, and nothing is sampled.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sarl_core.demonstrations.derived import Extension
 from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.errors import InputError
+from sarl_core.mining.rule_order import without_idle
+from sarl_core.shielding.crossings import crossings
 from sarl_core.shielding.shield import BatchDecision, Shield
 
 Floats = NDArray[np.float64]
@@ -103,8 +107,11 @@ class Neighbourhood:
             shield: In force.
         """
         self.shield = shield
-        rules = shield.rule_set.rules
-        d = len(shield.rule_set.source.features)
+        used = without_idle(shield.rule_set)
+        rules, features = used.rules, used.source.features
+        self._extension = Extension.of(features)
+        self._wide = (self._extension.width, len(shield.rule_set.source.features))
+        d = len(features)
         self._index = np.array(
             [index for index, rule in enumerate(rules) if rule.enabled], dtype=np.int64
         )
@@ -121,7 +128,7 @@ class Neighbourhood:
         self._first, self._last = after(low), at_most(high)
         # Where its data begins, and what comes after the last of it.
         self._begin, self._beyond = at_least(least), after(most)
-        columns = columns_of_words([one.indicator for one in shield.rule_set.source.features])
+        columns = columns_of_words([one.indicator for one in features])
         self._words = [np.array(places) for places in columns.values() if len(places) > 1]
 
     def near_misses(
@@ -129,11 +136,14 @@ class Neighbourhood:
     ) -> tuple[NearMiss, ...]:
         """Rules that would apply if few features were a little different.
 
+        What is derived changes with the features that are observed; those are moved. A rule that
+        lacks something derived is said once for each feature that could bring it about alone.
+
         Args:
             state: Shape (d,); finite, taken as float32.
-            spreads: What a change of each feature is measured in, (d,), above 0.
+            spreads: What a change of each observed feature is measured in, (d,), above 0.
             features: How many features have to change, 1 or 2.
-            most: How many rules at most.
+            most: How many at most.
 
         Returns:
             The nearest first.
@@ -142,6 +152,14 @@ class Neighbourhood:
             InputError: If the state has another length, or a value is not finite.
         """
         here = self._state(state)
+        if self._extension.definitions:
+            return self._derived_misses(here, spreads[: len(here)], features, most)
+        return self._observed_misses(here, spreads, features, most)
+
+    def _observed_misses(
+        self, here: States, spreads: Floats, features: int, most: int
+    ) -> tuple[NearMiss, ...]:
+        """The same where nothing is derived: each feature moves alone."""
         wanted = np.clip(here, self._first, self._last)
         # A bound that no finite number reaches makes a rule that never applies.
         possible = (self._first <= self._last).all(axis=1) & np.isfinite(wanted).all(axis=1)
@@ -168,6 +186,92 @@ class Neighbourhood:
             )
             for row, distance, at in zip(rows.tolist(), distances.tolist(), in_force, strict=True)
         )
+
+    def _derived_misses(
+        self, here: States, spreads: Floats, features: int, most: int
+    ) -> tuple[NearMiss, ...]:
+        """The same where features move what is derived from them."""
+        whole = self._extension.many(here[None])[0]
+        broken = ~((self._first <= whole) & (whole <= self._last))
+        misses: list[NearMiss] = []
+        for row in range(len(self._index)):
+            if not broken[row].any():
+                continue
+            wanted = (
+                self._one_moved(here, row, broken[row])
+                if features == 1
+                else self._clipped(here, row, broken[row], features)
+            )
+            for state in wanted:
+                moved = np.flatnonzero(state != here)
+                way = np.abs(state[moved].astype(np.float64) - here[moved].astype(np.float64))
+                in_force = self.shield.rules_in_force(state[None])[0] == self._index[row]
+                misses.append(
+                    NearMiss(
+                        int(self._index[row]),
+                        tuple(
+                            FeatureChange(at, float(here[at]), float(state[at]))
+                            for at in moved.tolist()
+                        ),
+                        float((way / spreads[moved]).sum()),
+                        bool(in_force.any()),
+                    )
+                )
+        return tuple(sorted(misses, key=lambda miss: miss.distance)[:most])
+
+    def _one_moved(self, here: States, row: int, broken: NDArray[np.bool_]) -> Iterator[States]:
+        """For each feature that alone can let a rule apply, the nearest state in which it does."""
+        of_words = {at: places for places in self._words for at in places.tolist()}
+        for feature in range(len(here)):
+            columns = self._moving(feature)
+            if (
+                feature in of_words
+                or not broken[columns].any()
+                or broken[columns].sum() < broken.sum()
+            ):
+                continue
+            edges = self._edges(here, feature, np.array([row]), boxes=False)
+            values = np.concatenate([edges, np.nextafter(edges, _DOWN)])
+            states = np.repeat(here[None], len(values), axis=0)
+            states[:, feature] = values
+            states = states[np.isfinite(values) & self._applies(states, row)]
+            if len(states):
+                way = np.abs(states[:, feature].astype(np.float64) - float(here[feature]))
+                yield states[int(np.argmin(way))]
+
+    def _clipped(
+        self, here: States, row: int, broken: NDArray[np.bool_], features: int
+    ) -> Iterator[States]:
+        """The nearest state in which a rule applies that lacks nothing derived."""
+        d = len(here)
+        state = np.clip(here, self._first[row, :d], self._last[row, :d])
+        possible = not broken[d:].any() and broken[:d].sum() == features
+        if possible and np.isfinite(state).all() and self._applies(state[None], row)[0]:
+            yield state
+
+    def _applies(self, states: States, row: int) -> NDArray[np.bool_]:
+        """Whether a rule's conditions hold, (B,)."""
+        values = self._extension.many(states)
+        return np.asarray(((self._first[row] <= values) & (values <= self._last[row])).all(axis=1))
+
+    def _moving(self, feature: int) -> list[int]:
+        """A feature and what is derived from it, as columns."""
+        derived = enumerate(self._extension.definitions, start=self._extension.width)
+        return [feature, *(place for place, one in derived if feature in one.features)]
+
+    def _edges(self, here: States, feature: int, rows: NDArray[np.int64], *, boxes: bool) -> States:
+        """Where along a feature conditions of rules, or edges of their boxes, are passed."""
+        edges = []
+        for column in self._moving(feature):
+            bounds = [self._first[rows, column], after(self._last[rows, column])]
+            if boxes:
+                bounds += [self._begin[rows, column], self._beyond[rows, column]]
+            if column == feature:
+                edges += bounds
+            else:
+                definition = self._extension.definitions[column - self._extension.width]
+                edges.append(crossings(definition, here, feature, np.concatenate(bounds)))
+        return _starts(*edges)[1:]
 
     def _other_word(
         self,
@@ -199,7 +303,10 @@ class Neighbourhood:
         return np.asarray(fits.any(axis=1))
 
     def lines(self, state: ArrayLike, action: Any) -> tuple[FeatureLine, ...]:
-        """What the shield would do along each feature.
+        """What the shield would do along each feature that is observed.
+
+        What is derived from a feature moves with it. Along a combination nothing is missed; along
+        a formula what lies between two of some 2,000 numbers may be.
 
         A feature that says that a column holds one of three or more words has two stretches: the
         state as it is, and from 1 on the state in which the column holds that word.
@@ -215,7 +322,8 @@ class Neighbourhood:
             InputError: If the state has another length, or a value is not finite.
         """
         here = self._state(state)
-        broken = ~((self._first <= here) & (here <= self._last))
+        whole = self._extension.many(here[None])[0]
+        broken = ~((self._first <= whole) & (whole <= self._last))
         count = broken.sum(axis=1)
         starts, states = [], []
         of_words = {at: places for places in self._words for at in places.tolist()}
@@ -228,13 +336,8 @@ class Neighbourhood:
                 states.append(at)
                 continue
             # Rules whose other conditions hold; no other can apply anywhere along the line.
-            rows = np.flatnonzero(count == broken[:, feature])
-            edges = _starts(
-                self._first[rows, feature],
-                after(self._last[rows, feature]),
-                self._begin[rows, feature],
-                self._beyond[rows, feature],
-            )
+            rows = np.flatnonzero(count == broken[:, self._moving(feature)].sum(axis=1))
+            edges = _starts(self._edges(here, feature, rows, boxes=True))
             at = np.repeat(here[None], len(edges), axis=0)
             at[:, feature] = edges
             # Before the first start: any value below it, so the one just below.
@@ -258,7 +361,9 @@ class Neighbourhood:
 
     def _state(self, state: ArrayLike) -> States:
         here = np.asarray(state, dtype=np.float32)
-        wide = self._first.shape[1]
+        wide, whole = self._wide
+        if here.shape == (whole,):
+            here = here[:wide]
         if here.shape != (wide,) or not np.isfinite(here).all():
             raise InputError(
                 f"the state is no list of {wide} finite numbers; give one for each feature"

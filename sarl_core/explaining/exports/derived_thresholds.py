@@ -18,6 +18,7 @@ from sarl_core.demonstrations.dataset import Feature, observed_features
 from sarl_core.demonstrations.derived import Extension
 from sarl_core.explaining.exports.program import largest_float32
 from sarl_core.mining.rules import Condition
+from sarl_core.shielding.crossings import numbers_at, places_of
 
 _DRAWN = 256  # states that are looked at for one query
 _STEPS = np.arange(-24, 25)  # of float32, by which each feature of a combination is moved
@@ -121,11 +122,11 @@ class DerivedThresholds:
                 break
             below = between
         for _ in range(_HALVINGS):
-            first, last = (int(_ordered(one[[feature]])[0]) for one in (below, above))
+            first, last = (int(places_of(one[[feature]])[0]) for one in (below, above))
             if abs(last - first) <= 1:
                 break
             between = below.copy()
-            between[feature] = _numbers(np.array([(first + last) // 2]))[0]
+            between[feature] = numbers_at(np.array([(first + last) // 2]))[0]
             if self._is_below(between, query):
                 below = between
             else:
@@ -145,18 +146,6 @@ class DerivedThresholds:
         places = np.stack(np.meshgrid(*[_STEPS] * len(moved), indexing="ij"), -1)
         states = np.repeat(state[None], places[..., 0].size, axis=0)
         for column, feature in enumerate(moved):
-            steps = places[..., column].reshape(-1) + _ordered(state[[feature]])[0]
-            states[:, feature] = _numbers(steps)
+            steps = places[..., column].reshape(-1) + places_of(state[[feature]])[0]
+            states[:, feature] = numbers_at(steps)
         return list(states[np.isfinite(states).all(axis=1)])
-
-
-def _ordered(values: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Whole numbers in the order of float32 ones, without gaps."""
-    bits = values.view(np.int32).astype(np.int64)
-    return np.where(bits < 0, -(bits & 0x7FFFFFFF), bits)
-
-
-def _numbers(places: NDArray[np.int64]) -> NDArray[np.float32]:
-    """The float32 numbers at places of that order."""
-    values = np.abs(places).astype(np.int32).view(np.float32)
-    return np.where(places < 0, -values, values)
