@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.derived import extended_state
+from sarl_core.environments.formulas import Formula
 from sarl_core.mining.digits import amount_text, limit_texts
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
@@ -446,6 +447,25 @@ def sentence(
         return f"{text}."
     states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
+
+
+def formula_texts(rule_set: RuleContents) -> list[str]:
+    """What the formulas are that rules ask about.
+
+    Args:
+        rule_set: Any.
+
+    Returns:
+        As "time to collision (s) = gap / (own speed - lead speed)"; a combination says itself what
+        it is.
+    """
+    queried = {one.feature for rule in rule_set.rules for one in rule.conditions}
+    texts = [
+        f"{feature.name}{f' ({feature.unit})' if feature.unit else ''} = {feature.derived}"
+        for place, feature in enumerate(rule_set.source.features)
+        if isinstance(feature.derived, Formula) and place in queried
+    ]
+    return ["".join(sign if sign.isprintable() else " " for sign in text) for text in texts]
 
 
 def limits_text(rule_set: RuleContents) -> str:

@@ -21,6 +21,7 @@ from sarl_core.mining.language import (
     conditions_text,
     counted,
     exact_condition,
+    formula_texts,
     label_text,
     limits_text,
     merged_length,
@@ -232,6 +233,8 @@ class RuleSet(RuleContents, Sequence[Rule]):
             self._counts_text(),
             "They were learned from examples and guarantee nothing.",
         ]
+        if formulas := formula_texts(self):
+            lines += ["", "Formulas that they ask about:", *(f"  {one}" for one in formulas)]
         for index, dimension in enumerate(self.actions):
             rules = reading_order(self.of_dimension(index))
             lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]

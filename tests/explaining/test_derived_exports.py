@@ -19,9 +19,11 @@ from sarl_core.demonstrations.dataset import formula_feature
 from sarl_core.demonstrations.derived import Combination, DerivedFeature, extend
 from sarl_core.explaining.exports.code_c import rules_to_c
 from sarl_core.explaining.exports.code_python import rules_to_python
+from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.exports.onnx_model import rules_to_onnx
 from sarl_core.explaining.exports.program import largest_float32, program_of
 from sarl_core.explaining.exports.vectors import make_vectors, proposed_actions
+from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.rules import Condition
 from sarl_core.shielding.projection import Projection
 from tests.explaining.exported import agree, expected, run_c, run_onnx, run_python
@@ -171,6 +173,16 @@ def test_exports_say_what_is_derived_and_how_to_compile() -> None:
         one.key: json.loads(one.value) for one in model.metadata_props if one.key == "derived"
     }
     assert {"terms", "formula"} <= {key for one in properties["derived"] for key in one}
+
+
+def test_what_is_read_says_what_formulas_are() -> None:
+    rule_set = mined(continuous=False, formulas=True)
+    assert "  time to collision (s) = gap / (own speed - lead speed)\n" in rule_set.to_text()
+    markdown = rules_to_markdown(rule_set)
+    formula = markdown_text("time to collision (s) = gap / (own speed - lead speed)")
+    assert f"\n- {formula}\n" in markdown
+    plain = mined(continuous=False, formulas=False)
+    assert "Formulas" not in plain.to_text() + rules_to_markdown(plain)
 
 
 def test_what_no_rule_asks_about_is_not_worked_out() -> None:

@@ -33,7 +33,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         What it was mined from and how, then a table for each action dimension: rules that a
         person placed in their order, then those that apply most often. Every name is escaped.
     """
-    from sarl_core.mining.language import limits_text
+    from sarl_core.mining.language import formula_texts, limits_text
 
     source = rule_set.source
     # Rules that overlap or are off have counts that do not add up to a share of the states.
@@ -51,6 +51,13 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         "",
         "They were learned from examples and guarantee nothing.",
     ]
+    if formulas := formula_texts(rule_set):
+        lines += [
+            "",
+            "Formulas that they ask about:",
+            "",
+            *(f"- {markdown_text(one)}" for one in formulas),
+        ]
     held_out = any(rule.held_out is not None for rule in rule_set.rules)
     headings = ["Rule", "If", "Then", "The expert did so in", "States"]
     headings += ["Held out"] if held_out else []
