@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 
 import pytest
@@ -131,3 +132,14 @@ def test_demonstrations_that_were_saved_with_formulas_keep_them(run, tmp_path):
     save_demonstrations(made, tmp_path / "lunar.parquet")
     run("mine", tmp_path / "lunar.parquet", "--setting", "filtered", "--out", tmp_path / "r.json")
     assert [one.name for one in derived_of(tmp_path / "r.json")] == ["fall"]
+
+
+def test_a_report_says_the_command_that_makes_its_rules_again(run, tmp_path):
+    rules, report = tmp_path / "rules.json", tmp_path / "report.html"
+    arguments = ("--combine", "pole angle, pole angular velocity", "--feature", LEAVE)
+    run("mine", CART, *arguments, "--support", 0.05, "--confidence", 0.9, "--out", rules)
+    run("report", rules, "--demonstrations", CART, "--frames", 0, "--out", report)
+    text = html.unescape(report.read_text(encoding="utf-8"))
+    again = f"--feature '{LEAVE}' --combine 'pole angle, pole angular velocity' --out {rules}"
+    assert f"mine {CART} --support 0.05 --confidence 0.9 {again}" in text
+    assert "plus" in text

@@ -16,6 +16,7 @@ from typing import Any
 from sarl_core.agents.agent import Agent, has_expert
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.comparison import Result, compared
@@ -184,6 +185,7 @@ def make_report(
         demonstrations_name=demonstrations_name,
     )
     as_given = rule_set
+    demonstrations = recoded(demonstrations, rule_set.source.features, called="the demonstrations")
     rule_set, notes = report_rules(rule_set, demonstrations)
     if same_environment(rule_set, demonstrations):
         # A rule file keeps the names of its day; a report speaks as the demonstrations do.

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError
 from sarl_core.mining.evidence import FEWEST_EPISODES, EpisodeCounts, HeldOut, held_out_of, t_reach
 from sarl_core.mining.rule_order import rules_for
@@ -87,6 +88,7 @@ def with_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSet:
     Raises:
         InputError: If the rules are for other features or actions.
     """
+    held_out = recoded(held_out, rule_set.source.features, called="the demonstrations")
     rule_set = rules_for(rule_set, held_out).rule_set
     counts = count_rules(rule_set, held_out).held_out()
     return replace(
@@ -112,6 +114,7 @@ def with_untried_held_out(rule_set: RuleSet, held_out: Demonstrations) -> RuleSe
     """
     if all(rule.held_out is not None for rule in rule_set.rules):
         return rule_set
+    held_out = recoded(held_out, rule_set.source.features, called="the demonstrations")
     rule_set = rules_for(rule_set, held_out).rule_set
     untried = tuple(rule for rule in rule_set.rules if rule.held_out is None)
     tried = iter(with_held_out(replace(rule_set, rules=untried), held_out).rules)
