@@ -105,7 +105,7 @@ class DerivedFeature:
     unit: str = ""
 
 
-class _Named(Protocol):
+class _Called(Protocol):
     @property
     def name(self) -> str: ...
     @property
@@ -117,7 +117,7 @@ class _Defined(Protocol):
     def derived(self) -> Definition | None: ...
 
 
-def combination_name(combination: Combination, features: Sequence[_Named]) -> str:
+def combination_name(combination: Combination, features: Sequence[_Called]) -> str:
     """What a combination is called.
 
     Args:

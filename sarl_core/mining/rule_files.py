@@ -260,7 +260,7 @@ class _Indicator(_Part):
     otherwise: str = ""
 
 
-class _Derived(_Part):
+class _Definition(_Part):
     terms: tuple[tuple[int, Number], tuple[int, Number]] | None = None
     formula: str | None = None
 
@@ -285,7 +285,7 @@ class _Feature(_Part):
     name: str
     unit: str = ""
     indicator: _Indicator | None = None
-    derived: _Derived | None = None
+    derived: _Definition | None = None
     splits: list[Any] | None = None
     binary: bool = False
 
