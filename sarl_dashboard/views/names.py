@@ -22,7 +22,7 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
     """A table as columns, the names as they stand."""
     own = names_of(raw)
     if table == FEATURES:
-        low, high = raw.observations.min(axis=0), raw.observations.max(axis=0)
+        low, high = raw.raw_observations.min(axis=0), raw.raw_observations.max(axis=0)
         return {
             "Name": list(names.features),
             "Unit": list(names.units),

@@ -54,8 +54,8 @@ def _scene(demonstrations: Demonstrations, episode: int) -> Replay | str:
     steps = replay.episodes[0].steps
     assert steps is not None  # a replay records them
     states = steps.observation
-    if states.shape != recorded.observations.shape or not np.allclose(
-        states, recorded.observations
+    if states.shape != recorded.raw_observations.shape or not np.allclose(
+        states, recorded.raw_observations
     ):
         return (
             f"the scene cannot be drawn: played again with seed {first + episode}, {env_id} gives "
