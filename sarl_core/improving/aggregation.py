@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.agents.own import AgentFaultError
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
@@ -27,6 +27,7 @@ from sarl_core.improving.refinement import generation_cost, generation_seed, ref
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.combining.queries import trees_over_used
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
@@ -294,13 +295,19 @@ class _Run:
         if label_scores is not None:
             # Two ways to say what matters, in turns; which is better is seen, not known.
             ways = {"scores": label_scores} if index % 2 else {"weights": importance(label_scores)}
-        return grow_budgeted_trees(
+        trees = grow_budgeted_trees(
             pairs,
             max_rules=self.plan.max_rules,
             divider=self.plan.divider,
             seed=self.plan.seed + index,
             **ways,
         )
+        return trees_over_used(trees, pairs)
+
+    def pairs(self, choice: _Choice) -> Demonstrations:
+        """What the trees of a choice were grown from, with what they derive."""
+        derived = derived_features(choice.trees[0].source.features)
+        return self.answers.pairs(choice.index, derived=derived)
 
     def rules(self, trees: tuple[PolicyTree, ...]) -> RuleSet:
         at = self.plan.thresholds
@@ -411,7 +418,7 @@ class _Run:
         marks = refine(
             self.env_id,
             start.trees,
-            self.answers.pairs(start.index),
+            self.pairs(start),
             agent=self.agent,
             projection=self.plan.projection,
             generations=self.plan.generations,
@@ -445,7 +452,7 @@ class _Run:
         if choice is None:  # stopped early: the episodes of the rounds are all there is
             best = max(range(len(self.rounds)), key=lambda index: self.rounds[index].score)
             choice = _Choice(best, self.trees[best])
-        pairs = self.answers.pairs(choice.index)
+        pairs = self.pairs(choice)
         return Aggregation(
             env_id=str(self.env_id),
             plan=self.plan,

@@ -12,6 +12,7 @@ from sarl_core.agents.agent import Agent, EpisodicAgent, PolicyAgent
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.agents.spaces import Actions
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
@@ -190,11 +191,14 @@ class Answers:
         self._episodes.append(self._episodes[-1][-1] + 1 + table.episode[rows])
         self._steps.append(table.step[rows])
 
-    def pairs(self, rounds: int) -> Demonstrations:
+    def pairs(
+        self, rounds: int, *, derived: Sequence[DerivedFeature] | None = None
+    ) -> Demonstrations:
         """What is learned from after so many rounds.
 
         Args:
             rounds: How many have been taken up by then.
+            derived: What is derived; chosen anew where not given.
 
         Returns:
             The pairs of the start and of the latest rounds, with what is derived; which
@@ -212,7 +216,7 @@ class Answers:
             column(self._actions),
             column(self._episodes),
             column(self._steps),
-        ).deriving(self._derived)
-        if not self._combined:
+        ).deriving(self._derived if derived is None else derived)
+        if derived is not None or not self._combined:
             return pairs
         return with_combinations(pairs, pairs=self._combined, divider=self._divider)

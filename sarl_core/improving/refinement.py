@@ -1,9 +1,9 @@
-"""Moving the thresholds and labels of a few rules to where they achieve more.
+"""Moving the thresholds, ratios and labels of a few rules to where they achieve more.
 
 A tree that imitates its expert is not yet the best tree of its size. An evolution strategy
-(Salimans et al. 2017) shakes all thresholds and labels at once, in pairs of opposite directions
-and on the same episodes, and follows those that bring more return. The queries' features and
-their order stay.
+(Salimans et al. 2017) shakes all of them at once, in pairs of opposite directions and on the same
+episodes, and follows those that bring more return. The queries' features, of combinations the two
+that are combined, and their order stay.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
+from sarl_core.mining.combining.candidates import rounded_ratio
+from sarl_core.mining.combining.queries import asked_only, with_ratios
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import executor_of, run_each
 from sarl_core.progress import Progress, report
@@ -40,15 +43,60 @@ _FEW = 2_000  # rows that tell a shield nothing but that its rules exist
 
 
 @dataclass(frozen=True)
+class _Candidate:
+    """Trees to try, one an action dimension, and what they derive."""
+
+    structures: tuple[TreeStructure, ...]
+    derived: tuple[DerivedFeature, ...]
+
+    def trees(self, pairs: Demonstrations, divider: int) -> tuple[PolicyTree, ...]:
+        """The trees with what these pairs say of them."""
+        known = pairs if pairs.derived == self.derived else pairs.deriving(self.derived)
+        return tuple(
+            count_tree(structure, known, index, divider=divider)
+            for index, structure in enumerate(self.structures)
+        )
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A query about a combination, and how its line is turned.
+
+    Attributes:
+        node: Of the query.
+        ratio: From which it starts.
+        scale: What the ratio changes by, so that values change by their spread.
+        centre: Value of the second feature around which the line turns.
+    """
+
+    node: int
+    ratio: float
+    scale: float
+    centre: float
+
+
+@dataclass(frozen=True)
 class _Parameters:
-    """What is moved: thresholds in units of their spread, and a score a label at each leaf."""
+    """What is moved: thresholds and ratios in units of their spread, a score a label at leaves."""
 
     trees: tuple[PolicyTree, ...]
     spreads: tuple[NDArray[np.float64], ...]
+    lines: tuple[tuple[_Line, ...], ...]
+    derived: tuple[DerivedFeature, ...]
+    observed: int
+
+    @classmethod
+    def of(cls, trees: Sequence[PolicyTree], pairs: Demonstrations) -> _Parameters:
+        """What may be moved in trees that were grown from these pairs."""
+        spreads = tuple(_spread(tree, pairs) for tree in trees)
+        lines = tuple(
+            _lines(tree, pairs, spread) for tree, spread in zip(trees, spreads, strict=True)
+        )
+        return cls(tuple(trees), spreads, lines, pairs.derived, len(pairs.observed))
 
     def start(self) -> NDArray[np.float64]:
         parts = []
-        for tree in self.trees:
+        for tree, lines in zip(self.trees, self.lines, strict=True):
             leaves = tree.feature == LEAF
             shares = tree.counts[leaves] / np.maximum(tree.samples[leaves], 1)[:, None]
             likely = np.log(np.maximum(shares, _LEAST_SHARE))
@@ -56,29 +104,40 @@ class _Parameters:
             labels = tree.label[leaves][:, None]
             best = likely.max(axis=1, keepdims=True)
             np.put_along_axis(likely, labels, best, axis=1)
-            parts += [np.zeros(int((~leaves).sum())), (likely - best).reshape(-1)]
+            parts += [np.zeros(int((~leaves).sum()) + len(lines)), (likely - best).reshape(-1)]
         return np.concatenate(parts)
 
-    def structures(self, values: NDArray[np.float64]) -> list[TreeStructure]:
-        candidates = []
+    def candidate(self, values: NDArray[np.float64]) -> _Candidate:
+        structures = []
+        derived: list[DerivedFeature] = list(self.derived)
         at = 0
-        for tree, spread in zip(self.trees, self.spreads, strict=True):
+        for tree, spread, lines in zip(self.trees, self.spreads, self.lines, strict=True):
             leaves = tree.feature == LEAF
             inner, labels = ~leaves, tree.dimension.n_labels
             threshold, label = tree.threshold.copy(), tree.label.copy()
             threshold[inner] += values[at : at + inner.sum()] * spread[inner]
             at += int(inner.sum())
+            ratios = {}
+            for line, turn in zip(lines, values[at : at + len(lines)].tolist(), strict=True):
+                ratio = rounded_ratio(line.ratio + turn * line.scale)
+                if ratio:  # of 0 the query would ask about one feature
+                    ratios[line.node] = ratio
+                    threshold[line.node] += (ratio - line.ratio) * line.centre
+            at += len(lines)
             count = int(leaves.sum()) * labels
             label[leaves] = values[at : at + count].reshape(-1, labels).argmax(axis=1)
             at += count
-            candidates.append(
-                without_idle_queries(
-                    TreeStructure(
-                        tree.feature, threshold, tree.children_left, tree.children_right, label
-                    )
-                )
+            structure, derived = with_ratios(
+                TreeStructure(
+                    tree.feature, threshold, tree.children_left, tree.children_right, label
+                ),
+                derived,
+                ratios,
+                observed=self.observed,
             )
-        return candidates
+            structures.append(without_idle_queries(structure))
+        used, definitions = asked_only(structures, derived, observed=self.observed)
+        return _Candidate(tuple(used), definitions)
 
 
 def refine(
@@ -99,6 +158,8 @@ def refine(
     better: Callable[[tuple[PolicyTree, ...]], None] | None = None,
 ) -> list[tuple[PolicyTree, ...]]:
     """Search around trees for better ones of the same shape.
+
+    What combinations count their second feature for is moved too, to ratios of two digits.
 
     Args:
         env_id: The environment.
@@ -126,7 +187,7 @@ def refine(
         WorkError: If a process ended in the middle of its work.
         CancelledError: If `progress` returned False.
     """
-    parameters = _Parameters(tuple(trees), tuple(_spread(tree, pairs) for tree in trees))
+    parameters = _Parameters.of(trees, pairs)
     few = pairs_of(pairs, _FEW)
     generator = np.random.default_rng(seed)
     here = parameters.start()
@@ -137,17 +198,14 @@ def refine(
     most: tuple[float, ...] = ()
 
     def trees_at(point: NDArray[np.float64]) -> tuple[PolicyTree, ...]:
-        return tuple(
-            count_tree(structure, pairs, index, divider=trees[0].divider)
-            for index, structure in enumerate(parameters.structures(point))
-        )
+        return parameters.candidate(point).trees(pairs, trees[0].divider)
 
     workers = executor_of(jobs, executor)
     for number in range(1, generations + 1):
         directions = generator.normal(size=(PAIRS, len(here)))
         first = generation_seed(seed, number)
         shaken = [
-            parameters.structures(here + side * _SHAKE * direction)
+            parameters.candidate(here + side * _SHAKE * direction)
             for direction in directions
             for side in (1, -1)
         ]
@@ -156,7 +214,7 @@ def refine(
             [
                 (
                     env_id,
-                    structures,
+                    candidate,
                     few,
                     trees[0].divider,
                     agent,
@@ -165,7 +223,7 @@ def refine(
                     max_steps,
                     choose,
                 )
-                for structures in shaken
+                for candidate in shaken
             ],
             lost=LOST,
             executor=workers,
@@ -230,9 +288,28 @@ def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
     return spread
 
 
+def _lines(
+    tree: PolicyTree, pairs: Demonstrations, spread: NDArray[np.float64]
+) -> tuple[_Line, ...]:
+    """The queries of a tree about combinations."""
+    lines = []
+    observed = len(pairs.observed)
+    for node in np.flatnonzero(tree.feature >= observed).tolist():
+        asked = pairs.derived[int(tree.feature[node]) - observed].definition
+        values = pairs.observations[tree.rows(node)]
+        if not isinstance(asked, Combination) or not len(values):
+            continue
+        second = values[:, asked.features[1]]
+        low, high = np.quantile(second, _SPREAD)
+        if high > low:
+            scale = spread[node] / (0.5 * float(high - low))
+            lines.append(_Line(node, asked.ratio, scale, float(np.median(second))))
+    return tuple(lines)
+
+
 def _mean_scores(
     env_id: EnvironmentOrId,
-    structures: Sequence[TreeStructure],
+    candidate: _Candidate,
     few: Demonstrations,
     divider: int,
     agent: Agent,
@@ -241,11 +318,7 @@ def _mean_scores(
     max_steps: int | None,
     choose: Choice,
 ) -> tuple[float, ...]:
-    trees = [
-        count_tree(structure, few, index, divider=divider)
-        for index, structure in enumerate(structures)
-    ]
-    shield = Shield(leaf_rules(trees), projection=projection)
+    shield = Shield(leaf_rules(candidate.trees(few, divider)), projection=projection)
     played = rollout(
         env_id,
         agent,

@@ -122,10 +122,15 @@ def candidates(demonstrations: Demonstrations, pairs: Sequence[Pair]) -> tuple[C
     for first, second in pairs:
         if not (spread[first] > 0.0 and spread[second] > 0.0):
             continue
-        ratios = {float(f"{weight * spread[first] / spread[second]:.1e}") for weight in RATIOS}
+        ratios = {rounded_ratio(weight * spread[first] / spread[second]) for weight in RATIOS}
         result += [
             Combination(((first, 1.0), (second, ratio)))
             for ratio in sorted(ratios)
             if 0.0 < abs(ratio) <= LARGEST_RATIO
         ]
     return tuple(result)
+
+
+def rounded_ratio(ratio: float) -> float:
+    """A ratio with two significant digits, which is what is used and what is read."""
+    return float(f"{ratio:.1e}")
