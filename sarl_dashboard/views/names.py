@@ -33,7 +33,7 @@ def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[
                     if feature.indicator is None
                     else "–"
                     for feature, value, *ends in zip(
-                        raw.features, values.tolist(), low.tolist(), high.tolist(), strict=True
+                        raw.observed, values.tolist(), low.tolist(), high.tolist(), strict=True
                     )
                 ]
                 for title, values in (("Least", low), ("Largest", high))

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import extended_state
 from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.what_if import (
@@ -111,7 +112,7 @@ def decision_html(
         return render(
             "states/decision", badges=badges, outcome=outcome, rule="", outside="", note=note
         )
-    values = tuple(state.astype(np.float64).tolist())
+    values = tuple(extended_state(state.tolist(), rule_set.source.features))
     rows = [(one.condition, one.value, one.room) for one in condition_views(rule, values, rule_set)]
     caption = "The rule's conditions and the state's values"
     beyond = outside_texts(rule, values, rule_set.source.features)

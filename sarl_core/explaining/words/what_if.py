@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.digits import value_text
@@ -265,7 +266,7 @@ def node_of_way(
     if (rule_set.cut == "leaves") != leaves:
         return None
     if rule is None or rule.origin == "manual":
-        return int(tree.apply(state[None])[0])
+        return int(tree.apply(extend(state[None], tree.source.features))[0])
     # A file may have renamed or rounded it: it is the node's if it asks what the way there asks.
     before, _, number = rule.id.rpartition(".")
     if before != str(tree.index) or not (number.isascii() and number.isdigit()):

@@ -29,8 +29,8 @@ class Situation:
         demonstrations: The chosen ones.
         rules: The rules.
         neighbourhood: The shield, laid out for questions about single states.
-        spans: Where the values of each feature lie.
-        spreads: What a change of each feature is measured in.
+        spans: Where the values of each observed feature lie.
+        spreads: What a change of each of them is measured in.
     """
 
     demonstrations: Demonstrations
@@ -41,13 +41,13 @@ class Situation:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """The features, those first that most rules ask about."""
+        """The observed features, those first that most rules ask about, or that count in them."""
         return _order(self.rules.rule_set)
 
     @property
     def columns(self) -> dict[str, list[int]]:
         """Where the indicators of each column of words stand."""
-        return columns_of_words([one.indicator for one in self.demonstrations.features])
+        return columns_of_words([one.indicator for one in self.demonstrations.observed])
 
     def indicators(self, places: Sequence[int]) -> list[Indicator]:
         """Of one column of words."""
@@ -75,7 +75,7 @@ def _neighbourhood(rule_set: RuleSet, projection: Projection, outside: Outside) 
 
 @cached()
 def _spans(demonstrations: Demonstrations) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
-    observations, features = demonstrations.observations, demonstrations.features
+    observations, features = demonstrations.raw_observations, demonstrations.observed
     spans = list(feature_spans(observations))
     # Of words the most frequent one stands in the middle: medians need not be any of them.
     for places in columns_of_words([one.indicator for one in features]).values():
@@ -90,7 +90,12 @@ def _spans(demonstrations: Demonstrations) -> tuple[tuple[Span, ...], NDArray[np
 
 @cached()
 def _order(rule_set: RuleSet) -> tuple[int, ...]:
-    return by_use(rule_set)
+    features = rule_set.source.features
+    order: list[int] = []
+    for index in by_use(rule_set):
+        derived = features[index].derived
+        order += [index] if derived is None else derived.features
+    return tuple(dict.fromkeys(order))
 
 
 @cached()

@@ -101,7 +101,7 @@ def _take(situation: Situation, more: int = 0) -> None:
 
 def _state(situation: Situation, source: str, number: int) -> NDArray[np.float32] | str:
     """A state of a source, shape (d,); or a sentence, where it has none."""
-    observations = situation.demonstrations.observations
+    observations = situation.demonstrations.raw_observations
     if source == MEDIAN:
         return _middle(situation.spans)
     if source in (COVERED, UNCOVERED):

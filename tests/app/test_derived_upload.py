@@ -1,0 +1,85 @@
+"""Every page with demonstrations that derive features from what was observed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sarl_core import (
+    load_demonstrations,
+    save_demonstrations,
+    with_combinations,
+    with_formulas,
+)
+from tests.app.screens import ROUTER, html, open_page, run_through, texts
+from tests.app.test_demonstrations_page import upload
+
+DATA = ROUTER.parents[1] / "data" / "demonstrations"
+PAGES = (
+    "episodes",
+    "names",
+    "thresholds",
+    "rules",
+    "evidence",
+    "what_if",
+    "edit",
+    "difference",
+    "export",
+    "report",
+    "replay",
+    "shield",
+    "audit",
+    "ablation",
+    "improve",
+    "learning",
+)
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Cart Pole with combinations and a formula."""
+    demonstrations = with_formulas(
+        with_combinations(load_demonstrations(DATA / "cartpole.parquet"), most=4),
+        ["lean [rad] = abs(pole_angle)"],
+    )
+    path: Path = tmp_path_factory.mktemp("derived") / "combined.parquet"
+    save_demonstrations(demonstrations, path)
+    return path.read_bytes()
+
+
+def test_every_page_opens_with_what_is_derived(content: bytes) -> None:
+    app = upload(open_page("demonstrations"), ("combined.parquet", content))
+    assert not app.exception, app.exception
+    for page in PAGES:
+        app.switch_page(f"{page}.py").run()
+        assert not app.exception, (page, app.exception)
+    app.switch_page("rules.py").run()
+    assert " of pole angular velocity" in texts(app) + html(app)
+
+
+def test_what_if_has_a_slider_for_each_number_that_was_observed_and_no_other(
+    content: bytes,
+) -> None:
+    app = upload(open_page("demonstrations"), ("combined.parquet", content))
+    app.switch_page("what_if.py").run()
+    assert sorted(slider.label for slider in app.slider if (slider.key or "").startswith("x")) == [
+        "cart position (m)",
+        "cart velocity (m/s)",
+        "pole angle (rad)",
+        "pole angular velocity (rad/s)",
+    ]
+    before = html(app)
+    for take in ("a demonstrated state", "a random covered state", "a random uncovered state"):
+        app.selectbox(key="take").set_value(take).run()
+        assert not app.exception, (take, app.exception)
+    assert html(app) != before
+
+
+def test_a_replay_says_what_was_derived_at_each_step(content: bytes) -> None:
+    app = upload(open_page("demonstrations"), ("combined.parquet", content))
+    app.switch_page("replay.py").run()
+    app.selectbox(key="agent").set_value("novice").run()
+    run_through(app, "replay")
+    assert not app.exception, app.exception
+    assert " of pole angular velocity" in texts(app) + html(app)
