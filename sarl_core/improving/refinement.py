@@ -21,7 +21,7 @@ from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.combining.candidates import rounded_ratio
-from sarl_core.mining.combining.queries import asked_only, with_ratios
+from sarl_core.mining.combining.queries import over_queried, with_ratios
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import executor_of, run_each
 from sarl_core.progress import Progress, report
@@ -59,7 +59,7 @@ class _Candidate:
 
 
 @dataclass(frozen=True)
-class _Line:
+class _CombinedQuery:
     """A query about a combination, and how its line is turned.
 
     Attributes:
@@ -81,7 +81,7 @@ class _Parameters:
 
     trees: tuple[PolicyTree, ...]
     spreads: tuple[NDArray[np.float64], ...]
-    lines: tuple[tuple[_Line, ...], ...]
+    lines: tuple[tuple[_CombinedQuery, ...], ...]
     derived: tuple[DerivedFeature, ...]
     observed: int
 
@@ -136,7 +136,7 @@ class _Parameters:
                 observed=self.observed,
             )
             structures.append(without_idle_queries(structure))
-        used, definitions = asked_only(structures, derived, observed=self.observed)
+        used, definitions = over_queried(structures, derived, observed=self.observed)
         return _Candidate(tuple(used), definitions)
 
 
@@ -290,20 +290,20 @@ def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
 
 def _lines(
     tree: PolicyTree, pairs: Demonstrations, spread: NDArray[np.float64]
-) -> tuple[_Line, ...]:
+) -> tuple[_CombinedQuery, ...]:
     """The queries of a tree about combinations."""
     lines = []
     observed = len(pairs.observed)
     for node in np.flatnonzero(tree.feature >= observed).tolist():
-        asked = pairs.derived[int(tree.feature[node]) - observed].definition
+        queried = pairs.derived[int(tree.feature[node]) - observed].definition
         values = pairs.observations[tree.rows(node)]
-        if not isinstance(asked, Combination) or not len(values):
+        if not isinstance(queried, Combination) or not len(values):
             continue
-        second = values[:, asked.features[1]]
+        second = values[:, queried.features[1]]
         low, high = np.quantile(second, _SPREAD)
         if high > low:
             scale = spread[node] / (0.5 * float(high - low))
-            lines.append(_Line(node, asked.ratio, scale, float(np.median(second))))
+            lines.append(_CombinedQuery(node, queried.ratio, scale, float(np.median(second))))
     return tuple(lines)
 
 

@@ -1,4 +1,4 @@
-"""Trees and what they derive: only what is asked about, and combinations with other ratios."""
+"""Trees and what they derive: only what they ask about, and combinations with other ratios."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def with_ratios(
     """
     feature, both = structure.feature.copy(), list(derived)
     for node, ratio in ratios.items():
-        asked = derived[int(feature[node]) - observed].definition
-        if not isinstance(asked, Combination):
+        queried = derived[int(feature[node]) - observed].definition
+        if not isinstance(queried, Combination):
             raise ValueError(f"node {node} asks about no combination")
-        first, second = asked.features
+        first, second = queried.features
         moved = DerivedFeature(Combination(((first, 1.0), (second, rounded_ratio(ratio)))))
         if moved not in both:
             both.append(moved)
@@ -44,7 +44,7 @@ def with_ratios(
     return replace(structure, feature=feature), both
 
 
-def asked_only(
+def over_queried(
     structures: Sequence[TreeStructure], derived: Sequence[DerivedFeature], *, observed: int
 ) -> tuple[list[TreeStructure], tuple[DerivedFeature, ...]]:
     """The same trees, with no derived feature that none of them asks about.
@@ -57,10 +57,10 @@ def asked_only(
     Returns:
         The trees over the derived features that are left, and those, in their order.
     """
-    asked = np.unique(np.concatenate([structure.feature for structure in structures]))
-    asked = asked[asked >= observed]
+    queried = np.unique(np.concatenate([structure.feature for structure in structures]))
+    queried = queried[queried >= observed]
     places = np.arange(observed + len(derived))
-    places[asked] = observed + np.arange(len(asked))
+    places[queried] = observed + np.arange(len(queried))
     return (
         [
             replace(
@@ -69,7 +69,7 @@ def asked_only(
             )
             for structure in structures
         ],
-        tuple(derived[place - observed] for place in asked.tolist()),
+        tuple(derived[place - observed] for place in queried.tolist()),
     )
 
 
@@ -85,7 +85,7 @@ def trees_over_used(
     Returns:
         As many.
     """
-    structures, derived = asked_only(
+    structures, derived = over_queried(
         [
             TreeStructure(
                 tree.feature, tree.threshold, tree.children_left, tree.children_right, tree.label
