@@ -7,7 +7,7 @@ from functools import partial
 import streamlit as st
 
 from sarl_dashboard.components.downloads import as_file, download
-from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.data import uncombined_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
 from sarl_dashboard.views.demonstrations.actions import show_actions
 from sarl_dashboard.views.demonstrations.features import show_features
@@ -24,7 +24,7 @@ st.caption(
     "What the expert did: at every step a state, and the action taken in it. Rules are "
     "mined from these pairs."
 )
-demonstrations = chosen_demonstrations()
+demonstrations = uncombined_demonstrations()
 upload_section(expanded=demonstrations is None)
 if demonstrations is None:
     st.info(

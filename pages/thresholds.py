@@ -14,6 +14,7 @@ from sarl_dashboard.state.compact_set import chosen_compact
 from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
+from sarl_dashboard.views.thresholds.combinations import combinations_choice
 from sarl_dashboard.views.thresholds.controls import show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
 from sarl_dashboard.views.thresholds.divider import show_divider
@@ -31,6 +32,7 @@ st.caption(
     "have done the same in at least a certain share of those (confidence)."
 )
 top = st.container()
+combinations_choice()
 display = chosen_display(trees, compact, held_out_demonstrations())
 thresholds = chosen_thresholds()
 landscape = display.landscape(thresholds)

@@ -10,14 +10,14 @@ from streamlit.errors import StreamlitAPIException
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.components.hold_out import parting_lines
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import combining, compact_set
 from sarl_dashboard.state.data import (
     all_demonstrations,
     choose_dataset,
     chosen_dataset,
-    chosen_demonstrations,
     dataset_label,
     dataset_names,
+    uncombined_demonstrations,
 )
 from sarl_dashboard.state.thresholds import (
     MIN_DIVIDER,
@@ -69,7 +69,7 @@ def sidebar(*, with_thresholds: bool = True) -> None:
             key="_data_choice",
             on_change=lambda: choose_dataset(st.session_state["_data_choice"]),
         )
-        demonstrations = chosen_demonstrations()
+        demonstrations = uncombined_demonstrations()
         if demonstrations is None:
             st.caption("Nothing uploaded yet: see the Demonstrations page.")
             return
@@ -79,6 +79,9 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         ]
         whole = all_demonstrations()
         lines += parting_lines(whole) if whole is not None else []
+        # On pages that do not ask for it the choice keeps its place in the URL by this.
+        if combining.chosen().on:
+            lines.append("**Combinations** of two features on")
         if compact_set.in_force():
             lines.append("**Compact rules** in force")
             if with_thresholds:

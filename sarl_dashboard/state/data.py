@@ -15,7 +15,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
-from sarl_dashboard.state import given_names, hold_out
+from sarl_dashboard.state import combining, given_names, hold_out
 from sarl_dashboard.state.hold_out import Parts
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import refuse
@@ -54,6 +54,7 @@ def chosen_dataset() -> str:
 def choose_dataset(name: str) -> None:
     """Choose a data set, with all its episodes; for callbacks."""
     hold_out.leave_out(())
+    combining.choose_all()
     set_url_choice("data", name, DEFAULT_DATA)
 
 
@@ -96,8 +97,8 @@ def raw_demonstrations() -> Demonstrations | None:
 
 
 # The way of the data: as it was read (`raw_demonstrations`), under the names given to it
-# (`all_demonstrations`), less what is left out, less what is held out (`_hold_out`). What rules are
-# mined from is what remains.
+# (`all_demonstrations`), less what is left out, less what is held out (`hold_out`), with
+# combinations of its features (`combining`). What rules are mined from is what remains.
 
 
 def all_demonstrations() -> Demonstrations | None:
@@ -110,13 +111,21 @@ def data_key() -> str:
     """What tells the data that rules are mined from, whatever names were given to them."""
     raw, choice = raw_demonstrations(), hold_out.chosen()
     drawn = (choice.share, choice.seed) if choice.share else ()
-    return repr(("" if raw is None else raw.digest, choice.left_out, drawn))
+    combinations = combining.chosen()
+    derived = (combinations,) if combinations.on else ()
+    return repr(("" if raw is None else raw.digest, choice.left_out, drawn, *derived))
+
+
+def uncombined_parts() -> Parts | None:
+    """What is mined from and what is held out, as it was observed; None without an upload."""
+    demonstrations = all_demonstrations()
+    return None if demonstrations is None else hold_out.parted(demonstrations)
 
 
 def data_parts() -> Parts | None:
     """What is mined from and what is held out; None while nothing is uploaded."""
-    demonstrations = all_demonstrations()
-    return None if demonstrations is None else hold_out.parted(demonstrations)
+    parts = uncombined_parts()
+    return None if parts is None else combining.combined(parts)
 
 
 def chosen_demonstrations() -> Demonstrations | None:
@@ -132,6 +141,12 @@ def held_out_demonstrations() -> Demonstrations | None:
     """The episodes that rules are tried on; None where nothing is held out."""
     parts = data_parts()
     return None if parts is None else parts.held_out
+
+
+def uncombined_demonstrations() -> Demonstrations | None:
+    """The chosen demonstrations with no combinations, whatever rules are mined with."""
+    parts = uncombined_parts()
+    return None if parts is None else parts.mined
 
 
 def require_demonstrations() -> Demonstrations:

@@ -12,7 +12,7 @@ from sarl_core.agents.offers import Offers
 from sarl_core.environments.description import OWN_MODULES, describe_environment
 from sarl_core.environments.environment import Environment, EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
-from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
+from sarl_dashboard.state.data import SHIPPED_SETS, uncombined_demonstrations
 
 
 @cache
@@ -69,7 +69,7 @@ def environment_of(choice: str | None) -> Environment:
     """
     if choice and choice != AS_DEMONSTRATED:
         return registered(choice)
-    demonstrations = chosen_demonstrations()
+    demonstrations = uncombined_demonstrations()
     if demonstrations is None or not demonstrations.env_id:
         raise InputError(
             "the demonstrations do not say which environment they are from; choose "
@@ -88,7 +88,7 @@ def continuous(choice: str | None) -> bool:
 
 def demonstrated(env_id: EnvironmentOrId, seed: int, episodes: int) -> bool:
     """Whether the chosen demonstrations were recorded on some of these seeds."""
-    demonstrations = chosen_demonstrations()
+    demonstrations = uncombined_demonstrations()
     return (
         demonstrations is not None
         and demonstrations.seed is not None

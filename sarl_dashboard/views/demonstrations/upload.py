@@ -12,7 +12,7 @@ from sarl_core.demonstrations.formats import ColumnRole, read_files
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.components.column_form import ColumnForm
-from sarl_dashboard.state.data import chosen_demonstrations, set_upload
+from sarl_dashboard.state.data import set_upload, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
@@ -141,7 +141,7 @@ def _problem() -> None:
     error = st.session_state.get("_upload_error")
     if error:
         refuse(error)
-        if chosen_demonstrations() is not None:
+        if uncombined_demonstrations() is not None:
             st.caption("Nothing has changed: the set below is still the one chosen.")
     lacking = error is not None and _LEFT_OUT in error
     if uploaded_files() and (lacking or st.session_state.get("upload_missing")):

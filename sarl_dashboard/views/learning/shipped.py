@@ -14,7 +14,7 @@ from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.cache import cached
 from sarl_dashboard.jobs import learning
-from sarl_dashboard.state.data import SHIPPED_SETS, chosen_demonstrations
+from sarl_dashboard.state.data import SHIPPED_SETS, uncombined_demonstrations
 from sarl_dashboard.state.rule_files import RULES_FOLDER
 from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.study import show_study
@@ -54,7 +54,7 @@ def show_shipped() -> None:
             icon=":material/school:",
         )
         return
-    demonstrations = chosen_demonstrations()
+    demonstrations = uncombined_demonstrations()
     env_id = demonstrations.env_id if demonstrations is not None else ""
     fitting = [name for name, study in studies.items() if study.env_id == env_id]
     name = st.segmented_control(

@@ -1,0 +1,63 @@
+"""The switch that lets rules ask about combinations of two features, and which these may be."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.mining.language import counted
+from sarl_dashboard.state import combining, compact_set
+from sarl_dashboard.state.combining import Choice
+from sarl_dashboard.state.data import data_parts, uncombined_parts
+from sarl_dashboard.text import escaped, in_full
+
+
+def combinations_choice() -> None:
+    """The switch; where it is on, the features that may be combined, and what came of it."""
+    observed, parts = uncombined_parts(), data_parts()
+    if observed is None or parts is None:
+        return
+    choice = combining.chosen()
+    # The widgets follow the URL, so a link and the browser's "back" both reach them.
+    st.session_state["_combinations"] = choice.on
+    with st.container(horizontal=True, vertical_alignment="center", gap="medium", key="combining"):
+        st.toggle(
+            "Combinations of two features",
+            key="_combinations",
+            on_change=_switch,
+            help="Let rules ask about two features together, as “position plus 0.5 s of "
+            "velocity”: the ratios that tell most about the actions are chosen from the episodes "
+            "that rules are mined from.",
+        )
+        if not choice.on:
+            return
+        possible = combining.combinable(observed.mined)
+        names = [feature.name for feature in observed.mined.features]
+        some = [index for index in choice.features if index in possible]
+        st.session_state["_combined_features"] = some
+        with st.popover("Features to combine", icon=":material/join:"):
+            st.multiselect(
+                "Features to combine",
+                possible,
+                key="_combined_features",
+                format_func=lambda index: escaped(names[index]),
+                placeholder="all that are numbers: choose two or more",
+                on_change=_choose_features,
+            )
+        count = len(parts.mined.derived) - len(observed.mined.derived)
+        if count:
+            st.caption(
+                f"Rules may ask about {counted(count, 'combination')} as well.", width="content"
+            )
+    problem = combining.problem(observed)
+    if problem:
+        st.warning(in_full(problem), icon=":material/join:")
+
+
+def _switch() -> None:
+    compact_set.choose(False)
+    combining.choose(Choice(st.session_state["_combinations"], combining.chosen().features))
+
+
+def _choose_features() -> None:
+    compact_set.choose(False)
+    combining.choose(Choice(True, tuple(st.session_state["_combined_features"])))
