@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import SarlError
 from sarl_core.mining.budgeted_trees import leaf_rules
 from sarl_core.mining.rule_set import RuleSet
@@ -34,11 +35,13 @@ class Compact:
         shipped: The rules as they are in the file.
         trees: The same rules as trees, one an action dimension, counted on the demonstrations.
         counted: The rules with what was counted.
+        demonstrations: Those they were counted on, with what these rules derive.
     """
 
     shipped: RuleSet
     trees: tuple[PolicyTree, ...]
     counted: RuleSet
+    demonstrations: Demonstrations
 
     @cached_property
     def _in_file(self) -> dict[tuple[int, tuple[Condition, ...]], Rule]:
@@ -85,9 +88,11 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
 
 @cached(show_spinner="Counting the compact rules …")
 def _counted(shipped: RuleSet, demonstrations: Demonstrations) -> Compact:
+    features = shipped.source.features
+    demonstrations = recoded(demonstrations, features, called="the demonstrations")
     trees = recount(shipped, demonstrations)
     rules = leaf_rules(trees)
-    compact = Compact(shipped, trees, rules)
+    compact = Compact(shipped, trees, rules, demonstrations)
     # The box is of the pairs that the rules were built from, whatever they are counted on.
     boxed = tuple(replace(rule, box=compact.as_shipped(rule).box) for rule in rules)
     return replace(compact, counted=replace(rules, rules=boxed))

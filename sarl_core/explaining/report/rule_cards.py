@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.derived import extended_state
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.figures.combinations import combination_plots
 from sarl_core.explaining.figures.distributions import FeatureRow
+from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.explaining.report.svg import SvgScale, evidence_bar, interval_bar
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.evidence import what_tells
@@ -37,6 +39,7 @@ from sarl_core.mining.rules import Bounds, Rule
 from sarl_core.rendering.example_frames import ExampleFrame, Examples
 
 _MOST_VALUES = 3  # under a picture
+_MOST_POINTS = 500  # of a combination: a report holds many
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,7 @@ class Card:
         support: How often it applies, in words.
         evidence: One entry a source.
         conditions: One a feature.
+        combinations: Of two features, drawn; "" where it asks about none.
         pictures: Frames at which it applied.
     """
 
@@ -116,6 +120,7 @@ class Card:
     support: str
     evidence: tuple[Evidence, ...]
     conditions: tuple[ConditionRow, ...]
+    combinations: Markup
     pictures: tuple[Picture, ...]
 
 
@@ -143,6 +148,8 @@ def rule_card(
     rule = rule_set.rules[index]
     dimension = rule_set.actions[rule.dimension]
     frames = examples.frames.get(index, ()) if examples is not None else ()
+    features = rule_set.source.features
+    planes = combination_plots(demonstrations, rule, dimension, features, most=_MOST_POINTS)
     # Where several rules apply, or this one is off, it applies to more states than it decides.
     rows = np.flatnonzero(rule.applies(demonstrations.observations))
     applying, decided = len(rows), len(tally.rows(index, rule.dimension))
@@ -155,6 +162,7 @@ def rule_card(
         support=_support(rule, applying, decided, tally),
         evidence=_evidence(rule, rule_set, index, tally, applying),
         conditions=_conditions(rule, rule_set, ranges, demonstrations.observations[rows]),
+        combinations=combinations_html(planes, features, dimension),
         pictures=tuple(_picture(frame, rule, rule_set, ranges) for frame in frames),
     )
 

@@ -22,7 +22,7 @@ class InForce:
     """The rules in force, and what they come from.
 
     Attributes:
-        demonstrations: The chosen ones.
+        demonstrations: The chosen ones, with what the rules derive.
         trees: One an action dimension.
         thresholds: At which they are cut.
         compact: The compact set whose rules they are; None for mined ones.
@@ -53,4 +53,6 @@ def rules_in_force(demonstrations: Demonstrations) -> InForce:
         rule_set = (
             mined_rules(trees, thresholds, data_parts()) if compact is None else compact.counted
         )
+    if compact is not None:
+        demonstrations = compact.demonstrations
     return InForce(demonstrations, trees, thresholds, compact, rule_set)

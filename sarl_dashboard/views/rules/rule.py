@@ -13,9 +13,11 @@ from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.figures.combinations import combination_plots
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.html.path import path_table
 from sarl_core.explaining.html.rule_card import measures_text, rule_card
+from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.explaining.html.rule_examples import examples_html
 from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.tables.rule_evidence import feature_evidence, path_steps
@@ -121,6 +123,11 @@ def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) ->
         evidence = feature_evidence(demonstrations, tree, rule)
         figures = features_html(evidence, tree.source.features, label_colour(rule.action))
         parts.append(heading("What it asks, feature by feature") + figures)
+        features = tree.source.features
+        planes = combination_plots(demonstrations, rule, tree.dimension, features)
+        if planes:
+            drawn = combinations_html(planes, features, tree.dimension)
+            parts.append(heading("What it asks of two features together") + drawn)
     if rule.samples:
         title = "Example states" if rule.samples > 1 else "The one state it applies to"
         parts.append(heading(title) + examples_html(demonstrations, tree, rule))
