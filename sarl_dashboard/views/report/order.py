@@ -106,11 +106,13 @@ def commands(
 ) -> tuple[str, ...]:
     """How the report is made again; () where a file alone does not hold what it is made of."""
     raw = raw_demonstrations()
-    if raw is None or raw.digest != demonstrations.digest:
+    if raw is None or raw.digest != demonstrations.deriving(raw.derived).digest:
         return ()  # episodes are held out or left out, or things have other names
     mined = None
     if choices.rules not in (COMPACT, OWN_FILE):
-        mined = mining_command(rule_set, named.rules, named.demonstrations, demonstrations)
+        mined = mining_command(
+            rule_set, named.rules, named.demonstrations, demonstrations, read=raw
+        )
     offered = offers().environment(demonstrations.env_id)
     again = command_line(
         "report",
