@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import path_of, read_demonstrations, with_wanted
+from sarl_core.cli.inputs import pairs_of, path_of, read_demonstrations, with_wanted
 from sarl_core.cli.options import (
     Columns,
     Derived,
@@ -134,6 +134,7 @@ def mine(
     with terminal.working("Mining"):
         from sarl_core.cli.evidence_answers import Tried
         from sarl_core.mining.algorithm_1 import mine_rules
+        from sarl_core.mining.combining.choice import chosen_again
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
         from sarl_core.mining.validation import cross_fitting, holding_out
         from sarl_core.mining.validation.episode_counts import count_rules
@@ -144,10 +145,14 @@ def mine(
         Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
         demonstrations = read_demonstrations(files, env, columns, missing)
         demonstrations = with_wanted(demonstrations, derived, divider=divider)
+        combined = pairs_of(demonstrations, derived)
         oddities = describe_oddities(demonstrations)
         tried = split = None
         if hold_out is not None:
             split = holding_out.hold_out(demonstrations, hold_out, seed=seed)
+            if combined:  # what is held out has no say in what is combined
+                mined = chosen_again(split.mined, combined, divider=divider)
+                split = split._replace(mined=mined, held_out=split.held_out.deriving(mined.derived))
             demonstrations = split.mined
         rule_set = mine_rules(
             demonstrations,
@@ -159,7 +164,12 @@ def mine(
         )
         judged = None
         if cross_fit:
-            fit = cross_fitting.cross_fit(demonstrations, divider=divider, seed=seed)
+            fit = cross_fitting.cross_fit(
+                demonstrations,
+                divider=divider,
+                seed=seed,
+                combined=combined,
+            )
             judged = fit.at(rule_set.thresholds)
         if split is not None:
             rule_set = holding_out.with_held_out(rule_set, split.held_out)

@@ -57,7 +57,7 @@ class Combination:
             )
 
     @property
-    def features(self) -> tuple[int, ...]:
+    def features(self) -> tuple[int, int]:
         """Indices of the two features."""
         return self.terms[0][0], self.terms[1][0]
 

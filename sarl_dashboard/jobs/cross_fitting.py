@@ -16,7 +16,7 @@ from sarl_core.progress import Progress
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import combining, compact_set
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
@@ -28,7 +28,7 @@ def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
     """What the trees without each fold depend on."""
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
-    return ("elsewhere", demonstrations.pairs_digest, divider)
+    return ("elsewhere", demonstrations.pairs_digest, divider, combining.pairs(demonstrations))
 
 
 def judged(thresholds: Thresholds) -> Judged | None:
@@ -66,9 +66,16 @@ def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:
 def begin(demonstrations: Demonstrations, divider: int) -> None:
     """Grow the trees without each fold, in the place of what is on its way; for a callback too."""
     key, session = key_of(demonstrations, divider), owner()
+    combined = combining.pairs(demonstrations)
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
-        return cross_fit(demonstrations, divider=divider, executor=executor, progress=progress)
+        return cross_fit(
+            demonstrations,
+            divider=divider,
+            combined=combined,
+            executor=executor,
+            progress=progress,
+        )
 
     PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, session)))
 

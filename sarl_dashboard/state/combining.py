@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.errors import InputError
-from sarl_core.mining.combining.candidates import pairs_of_like_kind
+from sarl_core.mining.combining.candidates import Pair, pairs_of_like_kind
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.hold_out import Parts
@@ -104,6 +104,17 @@ def problem(parts: Parts) -> str:
     return _derived(parts.mined, choice.features).problem if choice.on else ""
 
 
+def pairs(demonstrations: Demonstrations) -> tuple[Pair, ...]:
+    """The pairs of features that may be combined; () where they are off."""
+    choice = chosen()
+    return _among(demonstrations, choice.features) if choice.on else ()
+
+
+def _among(demonstrations: Demonstrations, features: tuple[int, ...]) -> tuple[Pair, ...]:
+    possible = _pairs(demonstrations)
+    return tuple(pair for pair in possible if not features or {*pair} <= {*features})
+
+
 def _derived(mined: Demonstrations, features: tuple[int, ...]) -> Combined:
     divider = MIN_DIVIDER if mined.is_discrete else chosen_divider()
     return _best(mined, features, divider)
@@ -114,17 +125,15 @@ def _derived(mined: Demonstrations, features: tuple[int, ...]) -> Combined:
     hash_funcs={Demonstrations: attrgetter("pairs_digest")},
 )
 def _best(mined: Demonstrations, features: tuple[int, ...], divider: int) -> Combined:
-    pairs = _pairs(mined)
-    if features:
-        pairs = tuple(pair for pair in pairs if {*pair} <= {*features})
     try:
-        return Combined(with_combinations(mined, pairs=pairs, divider=divider).derived, "")
+        combined = with_combinations(mined, pairs=_among(mined, features), divider=divider)
+        return Combined(combined.derived, "")
     except InputError as error:
         return Combined(mined.derived, str(error))
 
 
 @cached(hash_funcs={Demonstrations: attrgetter("pairs_digest")})
-def _pairs(demonstrations: Demonstrations) -> tuple[tuple[int, int], ...]:
+def _pairs(demonstrations: Demonstrations) -> tuple[Pair, ...]:
     return pairs_of_like_kind(demonstrations)
 
 

@@ -29,6 +29,7 @@ from sarl_core.explaining.report.thresholds import thresholds_part
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.files import as_path, whole_file
+from sarl_core.mining.combining.choice import pairs_chosen_from
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.language import counted, merged_length, share_text
@@ -345,6 +346,8 @@ def _elsewhere(
     """What the rules are worth where they were not mined, and a warning; "" where not known."""
     if len(demonstrations) > _MOST_FITTED or not mined_again(rule_set, trees):
         return "", ""
-    fit = cross_fit(demonstrations, divider=rule_set.divider)
+    divider = rule_set.divider
+    combined = pairs_chosen_from(demonstrations, divider=divider)
+    fit = cross_fit(demonstrations, divider=divider, combined=combined)
     judged = fit.at(rule_set.thresholds)
     return judged_sentence(judged), parting_text(rule_set.fidelity, judged)

@@ -86,6 +86,50 @@ def with_combinations(
     return demonstrations.deriving([*demonstrations.derived, *combined])
 
 
+def chosen_again(
+    demonstrations: Demonstrations, pairs: Sequence[Pair], *, divider: int
+) -> Demonstrations:
+    """Demonstrations with combinations of their own in the place of those that they have.
+
+    Args:
+        demonstrations: N steps, perhaps fewer than their combinations were chosen from.
+        pairs: Of features that may be combined.
+        divider: Number of intervals of continuous action dimensions.
+
+    Returns:
+        The same steps; with no combinations where, in these steps, nothing can be combined.
+    """
+    others = [one for one in demonstrations.derived if not isinstance(one.definition, Combination)]
+    plain = demonstrations.deriving(others)
+    try:
+        return with_combinations(plain, pairs=pairs, divider=divider)
+    except InputError:
+        return plain
+
+
+def pairs_chosen_from(demonstrations: Demonstrations, *, divider: int) -> tuple[Pair, ...]:
+    """The pairs of features that the combinations of demonstrations were chosen from.
+
+    Args:
+        demonstrations: N steps.
+        divider: Number of intervals of continuous action dimensions.
+
+    Returns:
+        All that are amounts, where these give the same combinations; else the pairs that are
+        combined; () where none is.
+    """
+    pairs = [
+        one.definition.features
+        for one in demonstrations.derived
+        if isinstance(one.definition, Combination)
+    ]
+    if not pairs:
+        return ()
+    every = pairs_of_like_kind(demonstrations)
+    again = chosen_again(demonstrations, every, divider=divider)
+    return every if again.derived == demonstrations.derived else tuple(dict.fromkeys(pairs))
+
+
 def _pair(demonstrations: Demonstrations, pair: Pair | tuple[str, str]) -> Pair:
     """Indices of two features."""
     d = len(demonstrations.observed)

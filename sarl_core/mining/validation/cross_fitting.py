@@ -11,6 +11,7 @@ them there is `hold_out` alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.combining.candidates import Pair
+from sarl_core.mining.combining.choice import chosen_again
 from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
@@ -181,6 +184,7 @@ def cross_fit(
     divider: int = 2,
     folds: int | None = None,
     seed: int = 0,
+    combined: Sequence[Pair] = (),
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> CrossFit:
@@ -193,6 +197,8 @@ def cross_fit(
         folds: How many; one an episode where there are fewer. Where not given `FOLDS`, or
             `FEWER_FOLDS` from `MANY_STEPS` on.
         seed: Same seed, same folds.
+        combined: Pairs of features that rules may combine. Where there are some, each fold's trees
+            choose their own combinations of them: the fold has no say in that either.
         executor: Its processes grow the trees.
         progress: Told how many folds are done; may stop the rest.
 
@@ -219,27 +225,36 @@ def cross_fit(
     dealt = [order[first :: min(folds, count)] for first in range(min(folds, count))]
     fitted = run_each(
         fold_of,
-        [(parted, some, divider) for some in dealt],
+        [(parted, some, divider, tuple(combined)) for some in dealt],
         executor=executor,
         progress=progress,
     )
     return CrossFit(tuple(fitted), whole)
 
 
-def fold_of(demonstrations: Demonstrations, episodes: Integers, divider: int) -> Fold:
+def fold_of(
+    demonstrations: Demonstrations,
+    episodes: Integers,
+    divider: int,
+    combined: Sequence[Pair] = (),
+) -> Fold:
     """Grow trees without some episodes, and send those down them.
 
     Args:
         demonstrations: E episodes.
         episodes: Numbers of those that the trees are not to know.
         divider: Number of intervals of continuous dimensions.
+        combined: Pairs of features of which combinations are chosen, without those episodes.
 
     Returns:
         Both.
     """
     others = np.setdiff1d(demonstrations.episodes, episodes)
-    trees = grow_policy_trees(demonstrations.select(others), divider=divider)
-    judged = demonstrations.select(episodes)
+    mined, judged = demonstrations.select(others), demonstrations.select(episodes)
+    if combined:
+        mined = chosen_again(mined, combined, divider=divider)
+        judged = judged.deriving(mined.derived)
+    trees = grow_policy_trees(mined, divider=divider)
     return Fold(trees, tuple(count_nodes(tree, judged) for tree in trees))
 
 
