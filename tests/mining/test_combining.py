@@ -21,13 +21,14 @@ from sarl_core.mining.combining.candidates import (
     pairs_by_name,
     pairs_of_like_kind,
 )
-from sarl_core.mining.combining.choice import with_combinations
+from sarl_core.mining.combining.choice import pairs_chosen_from, with_combinations
 from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition
+from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.shielding.decisions import deciding, ground_of
 from sarl_core.shielding.disagreement import disagreement, sampled_states
 
@@ -313,3 +314,17 @@ def test_a_rule_by_hand_may_ask_about_what_is_derived(combined: RuleSet) -> None
     assert Shield(edited).decide(state, 1).rules == (0,)
     assert Shield(edited).decide(state, 1).executed == 0
     assert Shield(edited).decide(state, 1).margin == pytest.approx(0.5)
+
+
+def test_a_fold_has_no_say_in_what_is_combined_for_it() -> None:
+    plain = demonstrations()
+    pairs = pairs_of_like_kind(plain)
+    combined = with_combinations(plain, pairs=pairs)
+    fit = cross_fit(combined, combined=pairs, folds=3)
+    numbers = set(plain.episodes.tolist())
+    for fold in fit.folds:
+        without = numbers - set(fold.counts[0].numbers.tolist())
+        own = with_combinations(plain.select(sorted(without)), pairs=pairs)
+        assert fold.trees[0].source.features == own.features
+    assert pairs_chosen_from(combined, divider=2) == pairs
+    assert pairs_chosen_from(plain, divider=2) == ()
