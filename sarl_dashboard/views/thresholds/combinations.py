@@ -40,7 +40,7 @@ def combinations_choice() -> None:
                 possible,
                 key="_combined_features",
                 format_func=lambda index: escaped(names[index]),
-                placeholder="all that are numbers: choose two or more",
+                placeholder="all that are numbers",
                 on_change=_choose_features,
             )
         count = len(parts.mined.derived) - len(observed.mined.derived)
