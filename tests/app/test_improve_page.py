@@ -263,6 +263,7 @@ def test_one_run_at_a_time_and_who_comes_second_is_told() -> None:
 def test_gaps_are_what_the_library_gives() -> None:
     app = open_page("improve", data="cartpole", expert="nobody", round_episodes="12")
     assert "max_rules" not in [number.key for number in app.number_input]
+    assert "press Find the gaps" in texts(app)
     run(app)
     assert not errors(app)
     rules = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)

@@ -29,7 +29,7 @@ def run_of(order: ImprovementOrder | None) -> None:
         known = finished or latest
         if known is None or known.is_empty:
             if not at_work:
-                show_shipped()
+                show_shipped(gaps=order is not None and order.rules is not None)
             return
         show_outcome(
             known,

@@ -25,15 +25,30 @@ BUDGETS = "budgets.json"
 ADVICE = "write it again"
 
 
-def show_shipped() -> None:
-    """What the page does, and what has been achieved with it."""
+ROUNDS = (
+    "Choose how many rules there may be, then press Run. Each round the rules act in a novice's "
+    "place, and the expert says what it would have done in the states they lead to; the best round "
+    "is reported on fresh episodes."
+)
+GAPS = (
+    "Choose how many episodes, then press Find the gaps. The rules act in a novice's place, and "
+    "the states in which no rule applies are listed: those that need a demonstration."
+)
+
+
+def show_shipped(*, gaps: bool) -> None:
+    """What the page does, and what has been achieved with it.
+
+    Args:
+        gaps: Whether there is nobody to ask, so that states without a rule are looked for.
+    """
     st.info(
-        "Choose how many rules there may be, then press Run. Each round the rules act in a "
-        "novice's place, and the expert says what it would have done in the states they lead to; "
-        "the best round is reported on fresh episodes. The work goes on while you look at other "
-        "pages, and what is finished stays when you cancel.",
+        f"{GAPS if gaps else ROUNDS} The work goes on while you look at other pages, and what is "
+        "finished stays when you cancel.",
         icon=":material/play_circle:",
     )
+    if gaps:
+        return
     file = card_path(compact_file())
     try:
         if file.is_file():
