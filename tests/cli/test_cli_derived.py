@@ -77,7 +77,7 @@ def test_a_landscape_and_a_check_take_what_is_derived(run, tmp_path):
 
 def test_aggregate_takes_what_is_derived(run, tmp_path):
     out = tmp_path / "compact.json"
-    quick = ("--rounds", 1, "--episodes", 2, "--validation", 2, "--max-rules", 3)
+    quick = ("--rounds", 1, "--episodes", 2, "--validation", 2, "--max-rules", 12)
     run("aggregate", CART, *quick, "--combine", "--feature", LEAVE, "--out", out)
     names = [one.name for one in derived_of(out)]
     assert names[0] == "leave"

@@ -1,4 +1,4 @@
-"""Trees and what they derive: only what they ask about, and combinations with other ratios."""
+"""Trees and their combinations: those that they ask about, and some with other ratios."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def with_ratios(
 def over_queried(
     structures: Sequence[TreeStructure], derived: Sequence[DerivedFeature], *, observed: int
 ) -> tuple[list[TreeStructure], tuple[DerivedFeature, ...]]:
-    """The same trees, with no derived feature that none of them asks about.
+    """The same trees, with no combination that none of them asks about.
 
     Args:
         structures: Over d observed and k derived features.
@@ -57,8 +57,16 @@ def over_queried(
     Returns:
         The trees over the derived features that are left, and those, in their order.
     """
-    queried = np.unique(np.concatenate([structure.feature for structure in structures]))
-    queried = queried[queried >= observed]
+    features = np.concatenate([structure.feature for structure in structures])
+    queried = np.array(
+        [
+            observed + place
+            for place, one in enumerate(derived)
+            # A formula stays: a person wrote it.
+            if not isinstance(one.definition, Combination) or observed + place in features
+        ],
+        dtype=np.int64,
+    )
     places = np.arange(observed + len(derived))
     places[queried] = observed + np.arange(len(queried))
     return (
@@ -76,7 +84,7 @@ def over_queried(
 def trees_over_used(
     trees: Sequence[PolicyTree], demonstrations: Demonstrations
 ) -> tuple[PolicyTree, ...]:
-    """The same trees over demonstrations that derive only what some of them ask about.
+    """The same trees over demonstrations with those combinations that some of them ask about.
 
     Args:
         trees: One an action dimension.
