@@ -23,7 +23,7 @@ _OFF, _EVERY = "off", "every"
 _MOST_TEXT = 2_000
 
 
-class Choice(NamedTuple):
+class CombinationChoice(NamedTuple):
     """What was chosen.
 
     Attributes:
@@ -47,10 +47,10 @@ class Combined(NamedTuple):
     problem: str
 
 
-def chosen() -> Choice:
+def chosen() -> CombinationChoice:
     """What is in force (URL: combine, as "every" or as "0,2,3")."""
     text = url_text("combine", _OFF, _is_choice)
-    return Choice(text != _OFF, () if text in (_OFF, _EVERY) else _numbers(text))
+    return CombinationChoice(text != _OFF, () if text in (_OFF, _EVERY) else _numbers(text))
 
 
 def _is_choice(text: str) -> bool:
@@ -65,7 +65,7 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(sorted({int(part) for part in parts}))
 
 
-def choose(choice: Choice) -> None:
+def choose(choice: CombinationChoice) -> None:
     """Choose; for callbacks. One feature alone is no choice, and means all of like kind."""
     features = ",".join(map(str, sorted(set(choice.features))))
     some = features if len(set(choice.features)) > 1 else _EVERY
@@ -74,7 +74,7 @@ def choose(choice: Choice) -> None:
 
 def choose_all() -> None:
     """Let all features of like kind be combined, if any are: other data have other features."""
-    choose(Choice(chosen().on, ()))
+    choose(CombinationChoice(chosen().on, ()))
 
 
 def combinable(demonstrations: Demonstrations) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ import pytest
 from sarl_core import Demonstrations
 from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.figures.combinations import CombinationPlot, combination_plots
+from sarl_core.explaining.combination_plots import CombinationPlot, combination_plots
 from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import Condition, Rule

@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, faded, label_colour
-from sarl_core.explaining.figures.combinations import CombinationPlot, Point
+from sarl_core.explaining.combination_plots import CombinationPlot, Point
 from sarl_core.explaining.html.plot import Axis, Part, Scale, plot
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.ticks import round_ticks, tick_text

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.demonstrations.derived import extended_state
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.figures.combinations import combination_plots
+from sarl_core.explaining.combination_plots import combination_plots
 from sarl_core.explaining.figures.distributions import FeatureRow
 from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.explaining.report.svg import SvgScale, evidence_bar, interval_bar

@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.figures.combinations import combination_plots
+from sarl_core.explaining.combination_plots import combination_plots
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.html.path import path_table
 from sarl_core.explaining.html.rule_card import measures_text, rule_card

@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.mining.language import counted
 from sarl_dashboard.state import combining, compact_set
-from sarl_dashboard.state.combining import Choice
+from sarl_dashboard.state.combining import CombinationChoice
 from sarl_dashboard.state.data import data_parts, uncombined_parts
 from sarl_dashboard.text import escaped, in_full
 
@@ -55,9 +55,11 @@ def combinations_choice() -> None:
 
 def _switch() -> None:
     compact_set.choose(False)
-    combining.choose(Choice(st.session_state["_combinations"], combining.chosen().features))
+    combining.choose(
+        CombinationChoice(st.session_state["_combinations"], combining.chosen().features)
+    )
 
 
 def _choose_features() -> None:
     compact_set.choose(False)
-    combining.choose(Choice(True, tuple(st.session_state["_combined_features"])))
+    combining.choose(CombinationChoice(True, tuple(st.session_state["_combined_features"])))
