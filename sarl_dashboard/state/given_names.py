@@ -10,7 +10,7 @@ from typing import cast
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.names import Names, check_names, names_of, renamed, tidy
+from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
 from sarl_core.errors import InputError
 from sarl_dashboard.cache import cached
 
@@ -49,7 +49,7 @@ def draft(raw: Demonstrations) -> Names:
 def problem(raw: Demonstrations) -> str:
     """Why what stands in the tables is not in force; "" where it is."""
     try:
-        check_names(tidy(draft(raw)))
+        _renamed(raw, tidy(draft(raw)))
     except InputError as error:
         return str(error)
     return ""

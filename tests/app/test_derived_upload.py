@@ -12,8 +12,9 @@ from sarl_core import (
     with_combinations,
     with_formulas,
 )
-from tests.app.screens import ROUTER, html, open_page, run_through, texts
+from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts
 from tests.app.test_demonstrations_page import upload
+from tests.app.test_names_page import type_into
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 PAGES = (
@@ -83,3 +84,19 @@ def test_a_replay_says_what_was_derived_at_each_step(content: bytes) -> None:
     run_through(app, "replay")
     assert not app.exception, app.exception
     assert " of pole angular velocity" in texts(app) + html(app)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"), [("lean", "stands twice"), ('it\'s a "pole"', "both quotation marks")]
+)
+def test_a_name_that_a_formula_cannot_live_with_is_refused_and_pages_stay(
+    content: bytes, name: str, says: str
+) -> None:
+    app = upload(open_page("demonstrations"), ("combined.parquet", content))
+    app.switch_page("names.py").run()
+    type_into(app, 0, {2: {"Name": name}})
+    (error,) = errors(app)
+    assert says in error
+    app.switch_page("rules.py").run()
+    assert not app.exception, app.exception
+    assert "pole angle" in " ".join(app.dataframe[0].value["When"])
