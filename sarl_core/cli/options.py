@@ -6,12 +6,15 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
 import typer
 
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.demonstrations.formats.mapping.roles import ColumnRole
 
 Files = Annotated[
     list[Path],
@@ -344,21 +347,11 @@ def with_derived(command: Callable[..., None]) -> Callable[..., None]:
     Returns:
         The command as Typer reads it: with ``--combine`` and ``--feature`` in its place.
     """
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    parameters = [
-        one.replace(kind=keyword)
-        for one in inspect.signature(command, eval_str=True).parameters.values()
-        if one.name != "derived"
-    ]
-    for name, annotation in (("combine", _Combine), ("feature", _Formulas)):
-        parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
 
-    @wraps(command)
-    def run(*, combine: list[str] | None, feature: list[str] | None, **others: Any) -> None:
-        command(derived=Derived(tuple(combine or ()), tuple(feature or ())), **others)
+    def derived(combine: list[str] | None, feature: list[str] | None) -> Derived:
+        return Derived(tuple(combine or ()), tuple(feature or ()))
 
-    vars(run)["__signature__"] = inspect.Signature(parameters)
-    return run
+    return _with_options(command, derived, combine=_Combine, feature=_Formulas)
 
 
 def with_columns(command: Callable[..., None]) -> Callable[..., None]:
@@ -370,21 +363,42 @@ def with_columns(command: Callable[..., None]) -> Callable[..., None]:
     Returns:
         The command as Typer reads it: with ``--columns`` and ``--column`` in its place.
     """
+
+    def columns(columns_file: Path | None, column: list[str] | None) -> dict[str, ColumnRole]:
+        from sarl_core.demonstrations.formats.mapping.roles import load_roles, roles_from_options
+
+        roles = {} if columns_file is None else load_roles(columns_file)
+        return roles | roles_from_options(column or ())
+
+    return _with_options(command, columns, columns_file=_ColumnsFile, column=_ColumnRoles)
+
+
+def _with_options(
+    command: Callable[..., None], value: Callable[..., Any], **options: Any
+) -> Callable[..., None]:
+    """A command with options in the place of the parameter that has the name of `value`.
+
+    Args:
+        command: With that parameter.
+        value: Called with what the options hold; gives what the parameter is to hold.
+        options: How Typer reads each of them; None where it is not given.
+
+    Returns:
+        The command as Typer reads it.
+    """
     keyword = inspect.Parameter.KEYWORD_ONLY
     parameters = [
         one.replace(kind=keyword)
         for one in inspect.signature(command, eval_str=True).parameters.values()
-        if one.name != "columns"
+        if one.name != value.__name__
     ]
-    for name, annotation in (("columns_file", _ColumnsFile), ("column", _ColumnRoles)):
+    for name, annotation in options.items():
         parameters.append(inspect.Parameter(name, keyword, default=None, annotation=annotation))
 
     @wraps(command)
-    def run(*, columns_file: Path | None, column: list[str] | None, **others: Any) -> None:
-        from sarl_core.demonstrations.formats.mapping.roles import load_roles, roles_from_options
-
-        columns = {} if columns_file is None else load_roles(columns_file)
-        command(columns=columns | roles_from_options(column or ()), **others)
+    def run(**arguments: Any) -> None:
+        holds = value(**{name: arguments.pop(name) for name in options})
+        command(**{value.__name__: holds}, **arguments)
 
     vars(run)["__signature__"] = inspect.Signature(parameters)
     return run
