@@ -70,21 +70,6 @@ def tidy(names: Names) -> Names:
     )
 
 
-def check_names(names: Names) -> None:
-    """Refuse names that nobody could tell apart.
-
-    Args:
-        names: To check.
-
-    Raises:
-        InputError: If one is empty, or two features, actions or labels of one action share one.
-    """
-    _check("feature", names.features)
-    _check("action", names.actions)
-    for action, labels in zip(names.actions, names.labels, strict=True):
-        _check(f"label of action {action!r}", labels)
-
-
 def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
     """Demonstrations under other names.
 
@@ -96,9 +81,13 @@ def renamed(demonstrations: Demonstrations, names: Names) -> Demonstrations:
         The same pairs.
 
     Raises:
-        InputError: If a name is empty, stands twice, or their number is another.
+        InputError: If a name is empty, stands twice, is one that formulas cannot name, or their
+            number is another.
     """
-    check_names(names)
+    _check("feature", names.features)
+    _check("action", names.actions)
+    for action, labels in zip(names.actions, names.labels, strict=True):
+        _check(f"label of action {action!r}", labels)
     own = names_of(demonstrations)
     counts = [
         (len(one.features), len(one.units), len(one.actions), tuple(map(len, one.labels)))

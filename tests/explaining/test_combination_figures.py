@@ -53,7 +53,7 @@ def test_a_sample_of_the_demonstrations_stands_over_the_two_features() -> None:
     data = demonstrated()
     (one,) = plots(data, (2, ">", 6.0))
     assert one.features == (0, 1)
-    assert len(one.points) <= 2_000
+    assert len(one.points) == 1_200
     assert np.array_equal(one.points, plots(data, (2, ">", 6.0))[0].points)
     assert np.array_equal(one.labels, one.points[:, 0] + 2 * one.points[:, 1] > 6)
     rows = {tuple(row) for row in data.raw_observations.astype(float).tolist()}
