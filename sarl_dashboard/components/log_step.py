@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.auditing.audit import Audit
+from sarl_core.demonstrations.dataset import observed_features
 from sarl_core.explaining.figures.audit import step_texts
 from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.state_path import PathFinder
@@ -59,11 +60,12 @@ def _link_what_if(held: Audit, row: int, choice: str) -> None:
     demonstrations = chosen_demonstrations()
     if demonstrations is None or not fits(held.rule_set, demonstrations):
         return
-    names = [feature.name for feature in held.rule_set.source.features]
-    if names != [feature.name for feature in demonstrations.features]:
+    names = [feature.name for feature in observed_features(held.rule_set.source.features)]
+    if names != [feature.name for feature in demonstrations.observed]:
         return
-    # Its sliders reach as far as what was demonstrated.
-    state = within(held.observations[row], feature_spans(demonstrations.observations))
+    # Its sliders reach as far as what was demonstrated, and derive the rest.
+    state = held.observations[row, : len(names)]
+    state = within(state, feature_spans(demonstrations.raw_observations))
     values = {f"x{index}": repr(float(value)) for index, value in enumerate(state.tolist())}
     chosen = {"set": SET_ON_RULES_PAGE[choice]} if choice in SET_ON_RULES_PAGE else {}
     st.page_link(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from urllib.parse import parse_qs
 
 import pytest
 
@@ -100,3 +101,14 @@ def test_a_name_that_a_formula_cannot_live_with_is_refused_and_pages_stay(
     app.switch_page("rules.py").run()
     assert not app.exception, app.exception
     assert "pole angle" in " ".join(app.dataframe[0].value["When"])
+
+
+def test_a_step_of_a_log_leads_to_what_if_with_what_was_observed() -> None:
+    app = open_page("audit", data="cartpole", combine="every", confidence="0.9")
+    name = "cartpole.parquet"
+    log = (name, (DATA / name).read_bytes(), "application/octet-stream")
+    app.file_uploader(key="log").set_value(log).run()
+    assert not app.exception, app.exception
+    (link,) = [one.proto for one in app.get("page_link") if one.proto.page == "what_if"]
+    parameters = parse_qs(link.query_string)
+    assert {name for name in parameters if name.startswith("x")} == {"x0", "x1", "x2", "x3"}
