@@ -112,3 +112,19 @@ def test_a_step_of_a_log_leads_to_what_if_with_what_was_observed() -> None:
     (link,) = [one.proto for one in app.get("page_link") if one.proto.page == "what_if"]
     parameters = parse_qs(link.query_string)
     assert {name for name in parameters if name.startswith("x")} == {"x0", "x1", "x2", "x3"}
+
+
+def test_gaps_are_listed_by_what_was_observed() -> None:
+    app = open_page(
+        "improve", data="cartpole", combine="every", expert="nobody", round_episodes="2"
+    )
+    run_through(app, "improve")
+    assert not app.exception, app.exception
+    table = app.dataframe[0].value
+    observed = load_demonstrations(DATA / "cartpole.parquet").observed
+    assert list(table)[2:] == [f"{one.name} ({one.unit})" for one in observed]
+
+
+def test_a_model_takes_what_was_observed() -> None:
+    app = open_page("export", data="cartpole", combine="every", format="ONNX")
+    assert "`state` (B, 4) float32" in texts(app)

@@ -6,7 +6,7 @@ from functools import partial
 
 import streamlit as st
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, observed_features
 from sarl_core.errors import SarlError
 from sarl_core.explaining.exports.export import (
     Prepared,
@@ -85,8 +85,9 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
         st.caption(f"{form.meaning} {len(content) / 1024:,.1f} kB.")
     if form.suffix == ".onnx":
         kind = "int64" if not rule_set.actions[0].is_interval else "float32"
+        width = len(observed_features(rule_set.source.features))
         st.markdown(
-            f"Inputs: `state` (B, {len(rule_set.source.features)}) float32 and `proposed` "
+            f"Inputs: `state` (B, {width}) float32 and `proposed` "
             f"(B, {len(rule_set.actions)}) {kind}. Outputs: `executed`, alike, `rule` "
             "int64, the index of the rule in force or -1, and `invalid` (B, 1), whether the state "
             "or the action is none that the rules can be asked about."

@@ -70,7 +70,7 @@ def show_where(outcome: Outcome, gaps: Gaps) -> None:
         "they differ most come first."
     )
     histograms = gap_histograms(outcome.order.start, gaps)
-    features = outcome.order.start.features
+    features = outcome.order.start.observed
     with st.grid(3, min_column_width=280) as grid:
         for one in histograms[:MOST_FEATURES]:
             feature = features[one.feature]
@@ -97,7 +97,7 @@ def show_states(outcome: Outcome, gaps: Gaps) -> None:
             )
             for row in gaps.missing[rows]
         ]
-    for index, feature in enumerate(outcome.order.start.features):
+    for index, feature in enumerate(outcome.order.start.observed):
         name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         columns[name if name not in columns else f"{name} [{index}]"] = gaps.observations[
             rows, index
