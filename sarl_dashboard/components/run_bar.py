@@ -123,7 +123,7 @@ def episodes_bar(place: Place[EpisodeBatch], rows: Sequence[Row], episodes: int)
         Offer(
             key=None,  # each row is kept by itself, so it goes on from whatever was run before
             start=lambda: run_batch(rows, episodes),
-            about=f"{counted(episodes, 'episode')} for each of {counted(len(rows), 'combination')}"
+            about=f"{counted(episodes, 'episode')} for each of {counted(len(rows), 'setting')}"
             f"{f'; {done}.' if ready else '.'}",
             complete=ready == len(rows),
             problems=sorted({str(error) for key, error in problems if key in keys}),

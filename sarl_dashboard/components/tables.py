@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import streamlit as st
 
+from sarl_core.demonstrations.derived import Combination
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.tables.evidence import held_out_columns
 from sarl_core.explaining.tables.rules import rule_columns
@@ -18,6 +19,8 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
+_TALL_ROW = 76  # four lines
+_PHRASE = 260  # pixels: what a combination is called, on one line or two
 _NAME = 62  # pixels: four digits
 
 
@@ -50,7 +53,8 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
         ),
         "Action": action,
         "When": column.TextColumn(
-            width=472 - _NAME - action_width, help="The conditions under which the rule applies"
+            width=max(472 - _NAME - action_width, _PHRASE if _combines(rule_set) else 0),
+            help="The conditions under which the rule applies",
         ),
         "Support": column.NumberColumn(
             width=80, format="%.2f %%", help="Share of all states to which the rule applies"
@@ -113,6 +117,16 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any
     return pd.DataFrame({name: columns[name] for name in (*order, *others)})
 
 
-def table_height(rows: int, most: int) -> int | Literal["content"]:
-    """As high as its rows, or as so many of them."""
-    return "content" if rows <= most else (most + 1) * ROW_HEIGHT + ROW_HEIGHT // 2
+def row_height(*rule_sets: RuleSet) -> int:
+    """How high a row is: what combinations are called takes a phrase, which wraps."""
+    return _TALL_ROW if any(map(_combines, rule_sets)) else ROW_HEIGHT
+
+
+def _combines(rule_set: RuleSet) -> bool:
+    return any(isinstance(one.derived, Combination) for one in rule_set.source.features)
+
+
+def table_height(rows: int, most: int, row: int = ROW_HEIGHT) -> int | Literal["content"]:
+    """As high as its rows, or as so many of them; where rows are high, as fewer."""
+    high = (most + 1) * ROW_HEIGHT + ROW_HEIGHT // 2
+    return "content" if ROW_HEIGHT + rows * row <= high else high

@@ -80,6 +80,8 @@ def test_held_out_episodes_have_no_say_in_what_is_combined() -> None:
 def test_a_rule_shows_its_combination_and_the_demonstrations_stay_as_they_were() -> None:
     app = open_page("rules", data="cartpole", combine="every")
     page = html(app)
+    table = app.dataframe[0].proto
+    assert table.row_height > open_page("rules", data="cartpole").dataframe[0].proto.row_height
     assert "What it asks of two features together" in page
     assert "data:image/svg+xml" in page
     assert "What it asks of two features together" not in html(open_page("rules", data="cartpole"))

@@ -39,7 +39,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     assert 0 <= float(rows[2]["flips_per_second"]) <= 50
     # Without the expert: at once, and a link shows the same.
     screen.get_by_text("expert", exact=True).first.click()
-    expect(screen.get_by_text("4 episodes for each of 3 combinations")).to_be_visible()
+    expect(screen.get_by_text("4 episodes for each of 3 settings")).to_be_visible()
     settle(screen)
     assert parameters(screen)["agents"] == "novice"
     visit(screen, screen.url, "Shield")

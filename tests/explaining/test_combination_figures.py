@@ -6,13 +6,19 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations
+from sarl_core import Demonstrations, mine_rules
 from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.combination_plots import CombinationPlot, combination_plots
 from sarl_core.explaining.html.rule_combinations import combinations_html
+from sarl_core.explaining.report.demonstrations import demonstrations_part
+from sarl_core.explaining.report.rules import in_order, rules_part
+from sarl_core.explaining.report.tally import tally
+from sarl_core.explaining.tables.rule_evidence import example_columns
+from sarl_core.explaining.words.replay import state_rows
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.tree import grow_policy_trees
 
 
 def demonstrated(n: int = 5_000) -> Demonstrations:
@@ -114,3 +120,39 @@ def test_a_rule_without_combinations_has_no_picture() -> None:
     data = demonstrated()
     (dimension,) = label_dimensions(data, 2)
     assert combinations_html(plots(data, (0, ">", 6.0)), data.features, dimension) == ""
+
+
+def test_a_report_counts_what_was_seen_and_says_how_the_picture_is_read() -> None:
+    data = demonstrated()
+    rules = mine_rules(data, supp_min=0.01, conf_min=0.95)
+    counts = tally(rules, data)
+    seen = demonstrations_part(rules, data, counts)
+    assert "the state of the task, 2 numbers listed below" in seen.sentences[0]
+    assert [line.name for line in seen.features] == ["position (m)", "speed (m/s)"]
+    part = rules_part(rules, data, counts, in_order(rules, 9), None)
+    assert "two features together, as “position plus 2 s of speed”" in part.introduction[-1]
+    plain = data.deriving([])
+    rules = mine_rules(plain, supp_min=0.01, conf_min=0.95)
+    part = rules_part(rules, plain, tally(rules, plain), in_order(rules, 9), None)
+    assert "two features together" not in " ".join(part.introduction)
+
+
+def test_tables_of_states_hold_the_combinations_that_a_rule_asks_about_and_no_others() -> None:
+    data = demonstrated()
+    other = DerivedFeature(Combination(((1, 1.0), (0, -0.3))))
+    data = data.deriving([*data.derived, other])
+    state = data.observations[0]
+    names = ["position", "speed", "position plus 2 s of speed"]
+    one = rule((2, ">", 6.0))
+    rows = state_rows(state, data.features, data.features, [one])
+    assert [name for name, _, _ in rows] == names
+    rows = state_rows(state, data.features, data.features, [rule((0, ">", 6.0))])
+    assert [name for name, _, _ in rows] == names[:2]
+    (tree,) = grow_policy_trees(data)
+    mined = next(
+        one
+        for one in mine_rules((tree,), supp_min=0.01, conf_min=0.95)
+        if {bounds.feature for bounds in one.bounds} == {2}
+    )
+    columns = example_columns(data, tree, mined, 3)
+    assert list(columns)[2:-2] == ["position plus 2 s of speed (m)", "position (m)", "speed (m/s)"]

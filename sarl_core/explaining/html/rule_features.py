@@ -69,9 +69,11 @@ def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> tuple[str, M
     said = list(map(tick_text, values))
     if feature.indicator is not None:
         values, said = [0.0, 1.0], ["no", "yes"]
+    # A combination is called by a phrase, which stands above the figure.
+    own_name = feature.name if feature.derived is None else ""
     drawn = plot(
         parts,
-        Axis(across, values, said, feature.unit or feature.name),
+        Axis(across, values, said, feature.unit or own_name),
         Axis(upwards, shares, [f"{100 * share:g} %" for share in shares]),
         label=_in_words(one, feature),
         height=132,

@@ -8,7 +8,8 @@ import numpy as np
 from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, observed_features
+from sarl_core.demonstrations.derived import Combination
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
@@ -123,7 +124,7 @@ def demonstrations_part(
             for row, feature in zip(
                 feature_rows(demonstrations), demonstrations.features, strict=True
             )
-            if feature.indicator is None
+            if feature.indicator is None and not isinstance(feature.derived, Combination)
         ),
         notes=demonstrations.notes,
     )
@@ -181,7 +182,8 @@ def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionSha
 def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
     who = f"The agent “{demonstrations.agent}”" if demonstrations.agent else "An expert"
     where = f" in {demonstrations.env_id}" if demonstrations.env_id else ""
-    width, shares = len(state_columns(demonstrations.features)), word_shares(demonstrations)
+    observed = observed_features(demonstrations.features)
+    width, shares = len(state_columns(observed)), word_shares(demonstrations)
     seen = [
         counted(count, noun)
         for count, noun in ((width - len(shares), "number"), (len(shares), "word"))

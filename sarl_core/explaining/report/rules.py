@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import Combination
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
@@ -138,11 +139,34 @@ def rules_part(
             groups.append(Group(action.name if len(rule_set.actions) > 1 else "", cards))
     lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
     return Rules(
-        introduction=_introduction(rule_set, tally, len(full), len(rest)),
+        introduction=(
+            *_introduction(rule_set, tally, len(full), len(rest)),
+            *_on_combinations(rule_set, full),
+        ),
         groups=tuple(groups),
         lines=lines,
         printed=_PRINTED_LINES,
         left_out=max(len(rest) - MOST_IN_TABLE, 0),
+    )
+
+
+def _on_combinations(rule_set: RuleSet, full: Sequence[int]) -> tuple[str, ...]:
+    """How the pictures of combinations are read, where a rule in full has one."""
+    features = rule_set.source.features
+    names = (
+        features[bounds.feature].name
+        for index in full
+        for bounds in rule_set.rules[index].bounds
+        if isinstance(features[bounds.feature].derived, Combination)
+    )
+    first = next(names, None)
+    if first is None:
+        return ()
+    return (
+        f"Some conditions are about two features together, as “{first}”. Each is drawn under its "
+        "rule: the two features are the axes, a point is a demonstrated state in the colour of "
+        "what the expert did there, and the condition holds in the shaded part, up to the line. "
+        "The rule's other conditions must hold as well; so there are points of other colours too.",
     )
 
 

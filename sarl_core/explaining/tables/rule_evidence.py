@@ -186,8 +186,9 @@ def example_columns(
         count: How many at most.
 
     Returns:
-        What the expert did, whether that is what the rule says, every feature, rounded for
-        display or in words, those of the rule first, and at last episode and step.
+        What the expert did, whether that is what the rule says, every feature that is observed or
+        that the rule asks about, rounded for display or in words, those of the rule first, and at
+        last episode and step.
     """
     rows = example_rows(tree, node_of(rule), count)
     dimension = tree.dimension
@@ -206,7 +207,11 @@ def example_columns(
     queried = [bounds.feature for bounds in rule.bounds]
     order = {feature: place for place, feature in reversed([*enumerate(queried)])}
     for column in sorted(
-        state_columns(demonstrations.features),
+        (
+            one
+            for one in state_columns(demonstrations.features)
+            if one.features[0].derived is None or one.places[0] in order
+        ),
         key=lambda one: min(order.get(at, len(queried)) for at in one.places),
     ):
         index = column.places[0]

@@ -52,7 +52,7 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
         (
             "near misses",
             f"{counted(audit.near_count, 'step')} ({share_text(audit.near_share)}{every}): one "
-            f"feature less than {NEAR:g} of its spread away from breaking a rule",
+            f"feature at most {NEAR:g} of its spread away from breaking a rule",
         ),
         ("freedom", f"{share_text(audit.freedom)} under a shield with these rules"),
     ]

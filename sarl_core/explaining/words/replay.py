@@ -63,7 +63,7 @@ class StepView:
         actions: One entry an action dimension.
         margin: Distance to the nearest threshold, inf where none was looked at, NaN where no
             rule was asked.
-        state: Name, value and unit of each feature.
+        state: Name, value and unit of each feature that is observed or asked about.
         outside: Whether the state lies outside the data of a rule that the agent's action
             breaks.
         invalid: Why no rule was asked, "" where they were.
@@ -136,7 +136,7 @@ def step_view(
         rule_set: The rules of the shield, or None.
 
     Returns:
-        The step; its state with what the rules derive from it.
+        The step; its state with what the rules in force derive from it.
     """
     views = []
     for index, dimension in enumerate(dimensions):
@@ -191,9 +191,11 @@ def state_rows(
         rules: Those in force.
 
     Returns:
-        Name, value and unit of each feature; the word of each column of words.
+        Name, value and unit of each feature, of the derived ones those that the rules ask about;
+        the word of each column of words.
     """
     values = state_values(state, known, rules)
+    queried = {bounds.feature for rule in rules for bounds in rule.bounds}
     return tuple(
         (
             column.title,
@@ -201,6 +203,7 @@ def state_rows(
             column.unit,
         )
         for column in state_columns(features)
+        if column.features[0].derived is None or column.places[0] in queried
     )
 
 

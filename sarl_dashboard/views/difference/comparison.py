@@ -25,7 +25,7 @@ from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.settings import notes_notice, switch
-from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
@@ -170,10 +170,12 @@ def _show_rules(compared: RuleSetComparison) -> None:
     frame = _rules_frame(compared, kinds)
     column = st.column_config
     action, action_width = action_column(disagreements.first.actions, "What the rule says")
+    high = row_height(disagreements.first, disagreements.second)
     st.dataframe(
         frame,
         hide_index=True,
-        height=table_height(len(frame), 9),
+        height=table_height(len(frame), 9, high),
+        row_height=high,
         key="rule_changes",
         alt="Rules that differ",
         column_config={

@@ -16,7 +16,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.settings import search_box, switch
-from sarl_dashboard.components.tables import action_column, table_height
+from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.edits import Base
 from sarl_dashboard.state.url import set_url_choice, url_choice
@@ -73,11 +73,13 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
         if selected and selected[0] < len(ids):
             set_url_choice("rule", ids[selected[0]])
 
+    high = row_height(rule_set)
     st.dataframe(
         _with_numbers(rows, verdicts),
         hide_index=True,
         column_config=_columns(rule_set),
-        height=table_height(len(order), TABLE_ROWS),
+        height=table_height(len(order), TABLE_ROWS, high),
+        row_height=high,
         key=key,
         on_select=pick,
         selection_mode="single-row",

@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_core.mining.language import threshold_text
 from sarl_core.mining.rules import Rule, Thresholds
-from sarl_dashboard.components.tables import column_config, table_height
+from sarl_dashboard.components.tables import column_config, row_height, table_height
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.views.rules.in_force import InForce
 from sarl_dashboard.views.rules.listing import Listed, listed_rules, matching
@@ -88,11 +88,13 @@ def walk(rules: list[Rule], row: int | None) -> None:
 def rule_rows(listed: Listed, places: list[int], in_force: InForce, row: int | None) -> None:
     """The table of the rules that match, the chosen one selected."""
     select_row(row)
+    high = row_height(in_force.rule_set)
     st.dataframe(
         listed.table if len(places) == len(listed.rules) else listed.table.take(places),
         hide_index=True,
         column_config=column_config(in_force.rule_set),
-        height=table_height(len(places), TABLE_ROWS),
+        height=table_height(len(places), TABLE_ROWS, high),
+        row_height=high,
         key="rule_table",
         on_select=lambda: pick(listed, places),
         selection_mode="single-row",

@@ -33,7 +33,7 @@ PLACE = Place[EpisodeBatch]("divider")
 MOST_EPISODES = 200
 
 Divided = tuple[tuple[Quantisation, ...], ...]
-Combination = tuple[int, Snapping]
+Setting = tuple[int, Snapping]
 
 
 @cached(show_spinner="Dividing the actions …")
@@ -105,7 +105,7 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
         return
     episodes = int(
         st.number_input(
-            "Episodes for each combination",
+            "Episodes for each setting",
             1,
             MOST_EPISODES,
             20,
@@ -141,8 +141,8 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
     watched(PLACE, returns)
 
 
-def unchanged_as(divider: int, snapping: Snapping) -> Combination:
-    """The combination that is run for this one: all that clip are the same."""
+def unchanged_as(divider: int, snapping: Snapping) -> Setting:
+    """The setting that is run for this one: all that clip are the same."""
     return (0, snapping) if snapping == "clip" else (divider, snapping)
 
 
@@ -178,7 +178,7 @@ class SnappedExpert:
 
 def snapped_rows(
     demonstrations: Demonstrations, env_id: EnvironmentOrId, divided: Divided
-) -> dict[Combination, Row]:
+) -> dict[Setting, Row]:
     """What is run, by divider and way to snap; the expert as it is first."""
     expert = agent_for("expert", None, env_id, FRESH_SEED)
     rows = {unchanged_as(0, "clip"): Row("expert as it is", env_id, FRESH_SEED, expert)}

@@ -9,7 +9,7 @@ import streamlit as st
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
-from sarl_dashboard.components.tables import column_config, frame, table_height
+from sarl_dashboard.components.tables import column_config, frame, row_height, table_height
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import largest_rules
 from sarl_dashboard.views.thresholds.display import Display
@@ -68,11 +68,13 @@ def show_rows(
     rules: Sequence[Rule], names: Sequence[str], rule_set: RuleSet, key: str, kind: str
 ) -> None:
     """Some rules as a table."""
+    high = row_height(rule_set)
     st.dataframe(
         frame(rules, rule_set, names),
         hide_index=True,
         column_config=column_config(rule_set),
-        height=table_height(len(rules), SEEN_ROWS),
+        height=table_height(len(rules), SEEN_ROWS, high),
+        row_height=high,
         key=key,
         alt=f"The {kind}rules with the most support",
     )
