@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.derived import Combination, DerivedFeature, Extension
+from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.errors import InputError, require
 from sarl_core.mining.combining.candidates import (
     Pair,
@@ -16,15 +17,13 @@ from sarl_core.mining.combining.candidates import (
     candidates,
     pairs_of_like_kind,
 )
+from sarl_core.mining.combining.gains import binned, gains
 from sarl_core.mining.labels import label_dimensions
-from sarl_core.mining.tree import fitted
 
 MOST_COMBINATIONS = 30
 _SAMPLED = 3_000  # steps that the quick tree is grown from, at most
-_CELLS = 1_500_000  # of steps and candidates, together; fewer steps of more candidates
-_FEWEST = 1_000
+_CELLS = 50_000_000  # of steps and candidates, together: 100 MB; fewer steps of more candidates
 _LEAVES = 64  # of the quick tree, the best first
-_AT_ONCE = 512  # candidates; of more, the best of each such part are looked at together
 
 
 def with_combinations(
@@ -69,17 +68,22 @@ def with_combinations(
             "that changes; mine without combinations"
         )
     # Evenly spaced, so that the same steps are taken every time, from all episodes.
-    count = min(len(demonstrations), max(_FEWEST, min(_SAMPLED, _CELLS // len(possible))))
+    count = min(len(demonstrations), _SAMPLED, _CELLS // len(possible))
     rows = np.linspace(0, len(demonstrations) - 1, count).astype(np.int64)
     base = demonstrations.observations[rows]
-    raw = np.ascontiguousarray(base[:, :d])
+    blocks = _blocks(base, d, possible)
     worth = np.zeros(len(possible))
     share = max(1, -(-most // len(demonstrations.action_dimensions)))
     for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
         labels = dimension.labels_of(demonstrations.action_columns[rows, index])
-        gains = _gains(base, raw, possible, labels)
-        best = np.argsort(-gains, kind="stable")[:share]
-        worth[best] = np.maximum(worth[best], gains[best])
+        present, labels = np.unique(labels, return_inverse=True)
+        # Intervals have an order, names have none.
+        targets = np.eye(len(present))
+        if dimension.is_interval:
+            targets = present[None].astype(np.float64)
+        helped = gains(blocks, labels, targets, leaves=_LEAVES)[base.shape[1] :]
+        best = np.argsort(-helped, kind="stable")[:share]
+        worth[best] = np.maximum(worth[best], helped[best])
     order = np.argsort(-worth, kind="stable")[:most]
     used = sorted(order[worth[order] > 0.0].tolist())
     combined = [DerivedFeature(possible[place]) for place in used]
@@ -143,36 +147,10 @@ def _pair(demonstrations: Demonstrations, pair: Pair | tuple[str, str]) -> Pair:
     return places[0], places[1]
 
 
-def _gains(
-    base: NDArray[np.float32],
-    raw: NDArray[np.float32],
-    possible: Sequence[Combination],
-    labels: NDArray[np.int64],
-) -> NDArray[np.float64]:
-    """How much each candidate helps a quick tree, (k,); 0 where it is not asked about."""
-    left = np.arange(len(possible))
-    while True:
-        parts = np.array_split(left, -(-len(left) // _AT_ONCE))
-        gains = np.zeros(len(possible))
-        for part in parts:
-            gains[part] = _quick(base, raw, [possible[place] for place in part.tolist()], labels)
-        if len(parts) == 1:
-            return gains
-        left = np.flatnonzero(gains)
-        if not len(left):
-            return gains
-
-
-def _quick(
-    base: NDArray[np.float32],
-    raw: NDArray[np.float32],
-    possible: Sequence[Combination],
-    labels: NDArray[np.int64],
-) -> NDArray[np.float64]:
-    """The same of a few, by the drop of impurity at the queries of one tree."""
-    from sklearn.tree import DecisionTreeClassifier
-
-    learner = DecisionTreeClassifier(criterion="gini", max_leaf_nodes=_LEAVES, random_state=0)
-    values = Extension(raw.shape[1], possible).many(raw)[:, raw.shape[1] :]
-    fitted(learner, np.concatenate([base, values], axis=1), labels)
-    return np.asarray(learner.feature_importances_[base.shape[1] :])
+def _blocks(
+    base: NDArray[np.float32], d: int, possible: Sequence[Combination]
+) -> list[NDArray[np.uint16]]:
+    """The features of steps, of which d are observed, and behind them all candidates, in bins."""
+    raw = np.asfortranarray(base[:, :d])  # a feature lies in one piece
+    with np.errstate(over="ignore"):
+        return binned(chain(base.T, (one.values(raw).astype(np.float32) for one in possible)))
