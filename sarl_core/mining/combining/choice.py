@@ -21,7 +21,7 @@ from sarl_core.mining.combining.gains import binned, gains
 from sarl_core.mining.labels import label_dimensions
 
 MOST_COMBINATIONS = 30
-_SAMPLED = 3_000  # steps that the quick tree is grown from, at most
+_SAMPLED = 5_000  # steps that the quick tree is grown from, at most
 _CELLS = 50_000_000  # of steps and candidates, together: 100 MB; fewer steps of more candidates
 _LEAVES = 64  # of the quick tree, the best first
 
