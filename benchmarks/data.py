@@ -17,6 +17,7 @@ from sarl_core import (
     mine_rules,
 )
 from sarl_core.agents.mlp_policy import MlpPolicy
+from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.rollouts.trial import make_agent
 
 if TYPE_CHECKING:
@@ -52,6 +53,18 @@ def large_tree() -> tuple[PolicyTree, ...]:
 def rules() -> RuleSet:
     """The unfiltered rules: the most there can be, so the longest walk."""
     return mine_rules(trees(), supp_min=0.0, conf_min=1.0)
+
+
+@lru_cache
+def combined() -> Demonstrations:
+    """The shipped steps, with combinations of two features."""
+    return with_combinations(demonstrations())
+
+
+@lru_cache
+def combined_rules() -> RuleSet:
+    """The unfiltered rules over these."""
+    return mine_rules(combined(), supp_min=0.0, conf_min=1.0)
 
 
 @lru_cache

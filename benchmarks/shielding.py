@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks import data
 from benchmarks.measure import Row, duration, side_by_side
-from sarl_core import Shield, ShieldedEnv
+from sarl_core import RuleSet, Shield, ShieldedEnv
 from sarl_core.mining.envelope import with_boxes
 
 
@@ -34,7 +34,13 @@ class Still(gymnasium.Env[Any, Any]):
 
 def decision(quick: bool) -> Iterable[Row]:
     """One decision with its record, against one prediction of the same policy."""
-    rules = with_boxes(data.rules(), data.demonstrations())
+    plain = with_boxes(data.rules(), data.demonstrations())
+    yield _decision(quick, "one shield decision, with its record", plain, reach=0.03)
+    combined = with_boxes(data.combined_rules(), data.combined())
+    yield _decision(quick, "the same, with combinations of two features", combined, reach=0.04)
+
+
+def _decision(quick: bool, what: str, rules: RuleSet, *, reach: float) -> Row:
     model, shield = data.same_in_sb3(), Shield(rules)
     states = data.demonstrations().observations[:: 15 if quick else 5]
     actions = np.random.default_rng(0).integers(0, 4, len(states))
@@ -61,12 +67,12 @@ def decision(quick: bool) -> Iterable[Row]:
     shielded_took, predict_took = side_by_side(with_shield, predict, repeats=repeats)
     bare_took, _ = side_by_side(without, predict, repeats=1)
     one, other = (shielded_took - bare_took) / len(states), predict_took / len(states)
-    yield Row(
-        "one shield decision, with its record",
+    return Row(
+        what,
         "one Stable-Baselines3 predict",
         "share",
         one / other,
-        0.03,
+        reach,
         f"{duration(one)} against {duration(other)}; {len(rules):,} rules",
     )
 
