@@ -55,6 +55,17 @@ def test_a_link_says_which_features_are_combined() -> None:
     assert app.query_params["combine"] == "every"
 
 
+def test_features_are_chosen_one_after_the_other() -> None:
+    app = open_page("thresholds", data="cartpole", combine="every")
+    app.multiselect(key="_combined_features").set_value([2]).run()
+    assert app.query_params["combine"] == "every"
+    assert app.multiselect(key="_combined_features").value == [2]
+    assert "Until there is a second one, all are combined." in texts(app)
+    app.multiselect(key="_combined_features").set_value([2, 3]).run()
+    assert app.query_params["combine"] == "2,3"
+    assert "Until there is a second one" not in texts(app)
+
+
 def test_a_link_that_means_nothing_combines_nothing() -> None:
     for text in ("some", "2", "1,x", "-1,2"):
         app = open_page("thresholds", data="cartpole", combine=text)

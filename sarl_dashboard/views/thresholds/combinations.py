@@ -10,6 +10,8 @@ from sarl_dashboard.state.combining import CombinationChoice
 from sarl_dashboard.state.data import data_parts, uncombined_parts
 from sarl_dashboard.text import escaped, in_full
 
+_FEATURES = "_combined_features"
+
 
 def combinations_choice() -> None:
     """The switch; where it is on, the features that may be combined, and what came of it."""
@@ -33,16 +35,21 @@ def combinations_choice() -> None:
         possible = combining.combinable(observed.mined)
         names = [feature.name for feature in observed.mined.features]
         some = [index for index in choice.features if index in possible]
-        st.session_state["_combined_features"] = some
+        # The first of several is no choice yet, and waits in its box for the second.
+        waiting = [index for index in st.session_state.get(_FEATURES, ()) if index in possible]
+        waits = not some and len(waiting) == 1
+        st.session_state[_FEATURES] = waiting if waits else some
         with st.popover("Features to combine", icon=":material/join:"):
             st.multiselect(
                 "Features to combine",
                 possible,
-                key="_combined_features",
+                key=_FEATURES,
                 format_func=lambda index: escaped(names[index]),
                 placeholder="all that are numbers",
                 on_change=_choose_features,
             )
+            if waits:
+                st.caption("Until there is a second one, all are combined.")
         count = len(parts.mined.derived) - len(observed.mined.derived)
         if count:
             st.caption(
@@ -62,4 +69,4 @@ def _switch() -> None:
 
 def _choose_features() -> None:
     compact_set.choose(False)
-    combining.choose(CombinationChoice(True, tuple(st.session_state["_combined_features"])))
+    combining.choose(CombinationChoice(True, tuple(st.session_state[_FEATURES])))
