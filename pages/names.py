@@ -1,4 +1,4 @@
-"""Names: what features, units, actions and labels are called, everywhere."""
+"""Names: what features, units, actions and labels are called, and formulas on the features."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from sarl_dashboard.components.downloads import as_file, download
 from sarl_dashboard.state import given_names
 from sarl_dashboard.state.data import all_demonstrations, raw_demonstrations, require_demonstrations
 from sarl_dashboard.text import file_name, in_full
-from sarl_dashboard.views.names import (
+from sarl_dashboard.views.names.formulas import formula_editor, show_formulas
+from sarl_dashboard.views.names.tables import (
     ACTIONS,
     FEATURES,
     LABELS,
@@ -22,9 +23,10 @@ from sarl_dashboard.views.names import (
 
 st.title("Names")
 st.caption(
-    "What features, units, actions and labels are called, in every sentence, axis and export. The "
-    "rules stay the same. Names are kept while this page is open in your browser; the Parquet file "
-    "takes them along."
+    "What features, units, actions and labels are called, in every sentence, axis and export, and "
+    "what is worked out from the features. Another name changes no rule; a formula is one more "
+    "feature that rules may ask about. Both are kept while this page is open in your browser; the "
+    "Parquet file takes them along."
 )
 require_demonstrations()
 raw = raw_demonstrations()
@@ -51,13 +53,20 @@ with right:
         st.caption("The labels are intervals of these actions, named by their bounds.")
 named = all_demonstrations()
 assert named is not None
+st.subheader("Formulas")
+st.caption(
+    "A formula makes one feature of several: a distance over a speed is the time that is left, a "
+    "difference of speeds is how fast a gap closes. Rules are then mined with it, on every page."
+)
+formula_editor(raw, named)
+show_formulas(raw, named)
 with st.container(horizontal=True):
     download(
         "Download as Parquet",
         partial(as_file, named),
         f"{file_name(named.env_id)}.parquet",
         key="names_parquet",
-        meaning="All steps with the names in force; upload it to go on with them",
+        meaning="All steps with the names and formulas in force; upload it to go on with them",
     )
     st.button(
         "Back to the original names",

@@ -22,6 +22,7 @@ import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.environments.formulas import Formula
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.memory_cache import BoundedCache
@@ -46,6 +47,8 @@ HASH_FUNCS: HashFuncs = {
     PolicyTree: attrgetter("digest"),
     RuleSet: attrgetter("digest"),
     bytes: digest_of,
+    # What a text is read as may be nested deeper than Python likes to look.
+    Formula: attrgetter("text", "feature_names"),
 }
 """What stands in a key for a thing that is large or has no hash."""
 _PLAIN = (type(None), bool, int, str, Path)

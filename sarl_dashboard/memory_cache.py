@@ -12,10 +12,13 @@ from typing import Generic, NamedTuple, TypeVar, cast
 import numpy as np
 import pandas as pd
 
+from sarl_core.environments.formulas import Formula
+
 Value = TypeVar("Value")
 
 MOST_BYTES = 64 * 2**20
 _LEAST = 1_000  # bytes that an entry takes, whatever is in it
+_BYTES_PER_SIGN = 80  # of a formula
 _LOOKED_AT = 64  # of a long sequence: what its entries take follows from so many
 
 
@@ -124,6 +127,8 @@ def _size(value: object, visited: set[int]) -> int:
         return sys.getsizeof(value)
     if isinstance(value, memoryview):
         return value.nbytes
+    if isinstance(value, Formula):  # which may be nested deeper than Python likes to look
+        return _BYTES_PER_SIGN * len(value.text)
     if isinstance(value, dict):
         return (
             sys.getsizeof(value)

@@ -32,7 +32,7 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
     """Features that alone give an action, count the steps, or hold the next state.
 
     Args:
-        demonstrations: N pairs.
+        demonstrations: N pairs; what was observed counts, and nothing that is derived from it.
 
     Returns:
         One sentence each; () where there are too few pairs to tell.
@@ -40,9 +40,9 @@ def find_giveaways(demonstrations: Demonstrations) -> list[str]:
     if len(demonstrations) < _LEAST_ROWS:
         return []
     together = np.diff(demonstrations.episodes) == 0
-    names = [feature.name for feature in demonstrations.features]
+    names = [feature.name for feature in demonstrations.observed]
     sentences = []
-    for name, values in zip(names, demonstrations.observations.T, strict=True):
+    for name, values in zip(names, demonstrations.raw_observations.T, strict=True):
         if values.min() == values.max():
             continue
         moves = _clockwork(values, together)

@@ -414,12 +414,15 @@ def feature_spreads(observations: NDArray[np.float32]) -> Floats:
     """What a change of each feature is measured in: its interquartile range.
 
     Args:
-        observations: Shape (N, d).
+        observations: Shape (N, d); the infinite values of a formula do not count.
 
     Returns:
         Shape (d,), above 0: the range where half of the values are the same, as those of a
         contact are, and 1 where all are.
     """
+    if not np.isfinite(observations).all():
+        columns = (column[np.isfinite(column), None] for column in observations.T)
+        return np.array([feature_spreads(one)[0] if len(one) else 1.0 for one in columns])
     low, high = np.quantile(observations.astype(np.float64), [0.25, 0.75], axis=0)
     wide = observations.max(axis=0).astype(np.float64) - observations.min(axis=0)
     spread = np.where(high > low, high - low, wide)
@@ -436,7 +439,8 @@ def after(values: NDArray[Any]) -> States:
         Likewise; inf where there is none, -inf for -inf.
     """
     near = _float32(values)
-    beyond = np.where(near > values, near, np.nextafter(near, _UP))
+    with np.errstate(over="ignore"):  # the largest number stands for infinity in a box
+        beyond = np.where(near > values, near, np.nextafter(near, _UP))
     return np.asarray(np.where(np.isneginf(values), _DOWN, beyond), dtype=np.float32)
 
 

@@ -7,6 +7,7 @@ import contextlib
 import streamlit as st
 from streamlit.errors import StreamlitAPIException
 
+from sarl_core.environments.formulas import Formula
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.components.hold_out import parting_lines
@@ -79,6 +80,9 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         ]
         whole = all_demonstrations()
         lines += parting_lines(whole) if whole is not None else []
+        formulas = sum(isinstance(one.definition, Formula) for one in demonstrations.derived)
+        if formulas:
+            lines.append(f"**{counted(formulas, 'formula')}** among the features")
         # On pages that do not ask for it the choice keeps its place in the URL by this.
         if combining.chosen().on:
             lines.append("**Combinations** of two features on")

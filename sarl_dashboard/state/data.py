@@ -15,7 +15,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
-from sarl_dashboard.state import combining, given_names, hold_out
+from sarl_dashboard.state import combining, formulas, given_names, hold_out
 from sarl_dashboard.state.hold_out import Parts
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import refuse
@@ -96,9 +96,10 @@ def raw_demonstrations() -> Demonstrations | None:
         st.stop()
 
 
-# The way of the data: as it was read (`raw_demonstrations`), under the names given to it
-# (`all_demonstrations`), less what is left out, less what is held out (`hold_out`), with
-# combinations of its features (`combining`). What rules are mined from is what remains.
+# The way of the data: as it was read (`raw_demonstrations`), with a visitor's `formulas` and under
+# the names given to it (`all_demonstrations`), less what is left out, less what is held out
+# (`hold_out`), with combinations of its features (`combining`). What rules are mined from is what
+# remains.
 
 
 def all_demonstrations() -> Demonstrations | None:
@@ -112,7 +113,9 @@ def data_key() -> str:
     raw, choice = raw_demonstrations(), hold_out.chosen()
     drawn = (choice.share, choice.seed) if choice.share else ()
     combinations = combining.chosen()
-    derived = (combinations,) if combinations.on else ()
+    derived: tuple[object, ...] = (combinations,) if combinations.on else ()
+    if raw is not None and (written := formulas.values_key(raw)) is not None:
+        derived += (written,)
     return repr(("" if raw is None else raw.digest, choice.left_out, drawn, *derived))
 
 

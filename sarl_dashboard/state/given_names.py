@@ -13,6 +13,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
 from sarl_core.errors import InputError
 from sarl_dashboard.cache import cached
+from sarl_dashboard.state import formulas
 
 
 def _given() -> dict[str, Names]:
@@ -24,16 +25,16 @@ def _drafts() -> dict[str, Names]:
 
 
 def named(raw: Demonstrations) -> Demonstrations:
-    """Demonstrations under the names that were given to them.
+    """Demonstrations with what a visitor derives, under the names that were given to them.
 
     Args:
         raw: As they were read.
 
     Returns:
-        The same object where nothing was renamed.
+        The same object where nothing was derived or renamed.
     """
-    names = _given().get(raw.digest)
-    return raw if names is None else _renamed(raw, names)
+    names, ready = _given().get(raw.digest), formulas.deriving(raw)
+    return ready if names is None else _renamed(ready, names)
 
 
 def given_names(raw: Demonstrations | None) -> Names | None:
@@ -49,7 +50,7 @@ def draft(raw: Demonstrations) -> Names:
 def problem(raw: Demonstrations) -> str:
     """Why what stands in the tables is not in force; "" where it is."""
     try:
-        _renamed(raw, tidy(draft(raw)))
+        _renamed(formulas.deriving(raw), tidy(draft(raw)))
     except InputError as error:
         return str(error)
     return ""
@@ -73,5 +74,5 @@ def reset(raw: Demonstrations) -> None:
 
 
 @cached()
-def _renamed(raw: Demonstrations, names: Names) -> Demonstrations:
-    return renamed(raw, names)
+def _renamed(ready: Demonstrations, names: Names) -> Demonstrations:
+    return renamed(ready, names)

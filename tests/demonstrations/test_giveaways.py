@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, with_formulas
 from sarl_core.demonstrations.formats import load_demonstrations, read_demonstrations
 from sarl_core.demonstrations.warnings import find_warnings
 from tests.bad_inputs import csv_bytes, npz_bytes, parquet_bytes
@@ -218,3 +218,16 @@ def test_labels_with_large_codes_are_labels_by_those_names() -> None:
         *[f"{s},{a}" for s, a in zip(SPEED, codes, strict=True)], header="obs_x,action"
     )
     assert read_demonstrations(content, "d.csv").label_names == (("100", "205", "90000"),)
+
+
+def test_nothing_is_said_of_what_is_derived() -> None:
+    plain = Demonstrations(
+        np.stack([LABELS + RNG.uniform(-0.4, 0.4, N), SPEED], axis=1),
+        LABELS,
+        EPISODES,
+        feature_names=("lever", "speed"),
+    )
+    far = with_formulas(plain, ["copy = lever * 2", "far = 1 / max(speed - 15, 0)"])
+    before = [one for one in find_warnings(plain) if "lever" in one]
+    assert before
+    assert [one for one in find_warnings(far) if "alone gives" in one] == before

@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from sarl_core import Demonstrations
+from sarl_core.demonstrations.dataset import Feature
+from sarl_core.explaining.figures.demonstrations import feature_figure
 from sarl_core.explaining.figures.distributions import (
     episode_series,
     feature_rows,
@@ -46,6 +48,17 @@ def test_a_few_values_have_a_bin_each() -> None:
     assert histogram.values is not None
     assert histogram.values.tolist() == [0.0, 1.0, 5.0]
     assert histogram.counts.tolist() == [[1, 0, 1], [1, 1, 0]]
+
+
+def test_infinite_values_are_counted_beside_the_bins() -> None:
+    values = np.array([*np.linspace(0, 1, 50), np.inf, -np.inf, np.inf], dtype=np.float32)
+    histogram = histogram_by_label(values, np.arange(53) % 2, 2)
+    assert np.isfinite(histogram.edges).all()
+    assert (histogram.counts.sum(), histogram.infinite, histogram.total) == (50, 3, 53)
+    nothing = histogram_by_label(np.full(4, np.inf), np.zeros(4, dtype=np.int64), 1)
+    assert (nothing.counts.sum(), nothing.infinite) == (0, 4)
+    figure = feature_figure(Feature("far"), nothing, LabelledDimension("action", ("go",)))
+    assert len(figure.data) == 1
 
 
 def test_no_bin_crosses_the_edge_of_an_interval() -> None:

@@ -180,6 +180,10 @@ def test_the_float32_numbers_beside_any_number():
 def test_a_feature_is_measured_by_the_middle_half_of_its_values():
     values = np.array([[0, 5, 0], [1, 5, 0], [2, 5, 0], [3, 5, 0], [4, 5, 7]], dtype=np.float32)
     assert feature_spreads(values).tolist() == [2.0, 1.0, 7.0]
+    infinite = np.full((2, 3), np.inf, dtype=np.float32)
+    assert feature_spreads(np.concatenate([values, infinite])).tolist() == [2.0, 1.0, 7.0]
+    assert feature_spreads(infinite).tolist() == [1.0, 1.0, 1.0]
+    assert after(np.array([np.finfo(np.float32).max])).tolist() == [np.inf]
 
 
 def test_a_state_that_is_none_is_refused():

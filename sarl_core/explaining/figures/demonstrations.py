@@ -37,7 +37,7 @@ def feature_figure(
         Stacked bars.
     """
     figure = go.Figure()
-    total = max(int(histogram.counts.sum()), 1)
+    total = max(histogram.total, 1)
     texts = _bin_texts(histogram, feature)
     positions: Any = histogram.centres
     widths: Any = np.diff(histogram.edges)

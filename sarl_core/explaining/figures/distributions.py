@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.mining.labels import LabelledDimension
 
 _FEW_VALUES = 12
@@ -25,11 +25,18 @@ class Histogram:
         edges: Of B bins, ascending, (B + 1,).
         counts: Pairs of each label in each bin, (labels, B).
         values: The values themselves where there are only a few, one a bin; else None.
+        infinite: Pairs whose value is infinite, as that of a formula may be: they are in no bin.
     """
 
     edges: NDArray[np.float64]
     counts: NDArray[np.int64]
     values: NDArray[np.float64] | None = None
+    infinite: int = 0
+
+    @property
+    def total(self) -> int:
+        """All pairs, infinite values included."""
+        return int(self.counts.sum()) + self.infinite
 
     @property
     def centres(self) -> NDArray[np.float64]:
@@ -91,15 +98,25 @@ def feature_rows(demonstrations: Demonstrations) -> tuple[FeatureRow, ...]:
     Returns:
         d rows.
     """
-    observations = demonstrations.observations
-    low, high = observations.min(axis=0), observations.max(axis=0)
-    medians = [float(np.median(observations[:, index])) for index in range(observations.shape[1])]
-    return tuple(
-        FeatureRow(
-            feature.name, feature.unit, float(low[index]), medians[index], float(high[index])
-        )
-        for index, feature in enumerate(demonstrations.features)
-    )
+    return tuple(map(feature_row, demonstrations.features, demonstrations.observations.T))
+
+
+def feature_row(feature: Feature, values: NDArray[np.float32]) -> FeatureRow:
+    """One feature in numbers.
+
+    Args:
+        feature: What it is.
+        values: Shape (N,), N >= 1; those of a formula may be infinite.
+
+    Returns:
+        The row.
+    """
+    # Of an infinite and a negatively infinite value none is the middle: then the lower one is.
+    with np.errstate(invalid="ignore"):
+        median = float(np.median(values))
+    if np.isnan(median):
+        median = -np.inf
+    return FeatureRow(feature.name, feature.unit, float(values.min()), median, float(values.max()))
 
 
 def histogram_by_label(
@@ -112,14 +129,22 @@ def histogram_by_label(
     """Count values in equal bins, each label on its own.
 
     Args:
-        values: Shape (N,), N >= 1, finite.
+        values: Shape (N,), N >= 1, no NaN.
         labels: Label of each, (N,), from 0 to n_labels - 1.
         n_labels: Number of labels.
         bins: Number of bins; fewer where only a few values occur.
 
     Returns:
-        Counts that sum to N.
+        Counts that sum to N with the infinite ones; no bin where all are infinite.
     """
+    finite = np.isfinite(values)
+    if not finite.all():
+        infinite = int((~finite).sum())
+        if infinite == len(values):
+            none = np.zeros((n_labels, 0), dtype=np.int64)
+            return Histogram(np.zeros(1), none, infinite=infinite)
+        counted = histogram_by_label(values[finite], labels[finite], n_labels, bins=bins)
+        return replace(counted, infinite=infinite)
     few = _few_values(values)
     if few is not None:
         index = np.searchsorted(few, values)

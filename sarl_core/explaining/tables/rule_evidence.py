@@ -136,7 +136,8 @@ def _edges(
     values: NDArray[np.float32], at_rule: NDArray[np.float32], bounds: Bounds, bins: int
 ) -> NDArray[np.float64]:
     step = max(1, len(values) // 50_000)  # a sample is enough to find where the tails begin
-    low, high = np.quantile(values[::step], [_TAIL, 1 - _TAIL])
+    sample, at_rule = (some[np.isfinite(some)] for some in (values[::step], at_rule))
+    low, high = np.quantile(sample, [_TAIL, 1 - _TAIL]) if len(sample) else (0.0, 0.0)
     low, high = at_rule.min(initial=low), at_rule.max(initial=high)
     inside = [edge for edge in (bounds.low, bounds.high) if np.isfinite(edge)]
     low, high = min(low, *inside), max(high, *inside)
@@ -148,6 +149,7 @@ def _edges(
 def _shares(values: NDArray[np.float32], edges: NDArray[np.float64]) -> NDArray[np.float64]:
     bins = len(edges) - 1
     scaled = (values.astype(np.float64) - edges[0]) * (bins / (edges[-1] - edges[0]))
+    # What lies beyond the edges, as the infinite values of a formula, counts in the last bin.
     index = np.clip(scaled, 0, bins - 1).astype(np.int64)
     return np.bincount(index, minlength=bins) / max(len(values), 1)
 
@@ -169,8 +171,8 @@ def example_rows(tree: PolicyTree, node: int, count: int = 10) -> NDArray[np.int
 
 
 def _decimals(values: NDArray[np.float64]) -> int:
-    """So many decimals that the largest of some values has four significant digits."""
-    largest = float(np.abs(values).max(initial=0.0))
+    """So many decimals that the largest finite one of some values has four significant digits."""
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     return min(max(3 - math.floor(math.log10(largest)), 0), 12) if largest > 0 else 0
 
 

@@ -2,49 +2,21 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
 import streamlit as st
 
 from sarl_core.decimals import decimal_on_scale
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.explaining.colours import label_colour
-from sarl_core.explaining.figures.demonstrations import feature_figure
-from sarl_core.explaining.figures.distributions import FeatureRow, histogram_by_label
-from sarl_core.explaining.html.step_card import legend
+from sarl_core.explaining.figures.distributions import FeatureRow
 from sarl_core.explaining.words.states import word_shares
-from sarl_core.mining.labels import LabelledDimension, label_dimensions
-from sarl_core.mining.language import label_text, share_text
-from sarl_dashboard.cache import cached
-from sarl_dashboard.components.chart import chart
-from sarl_dashboard.text import escaped
+from sarl_core.mining.labels import label_dimensions
+from sarl_core.mining.language import share_text
+from sarl_dashboard.components.distributions import (
+    distributions,
+    show_distribution,
+    show_legend,
+)
 
 AT_FIRST, MOST = 12, 48  # figures
-
-
-@cached(show_spinner="Counting …")
-def feature_figures(
-    demonstrations: Demonstrations, divider: int, by: int, features: tuple[int, ...]
-) -> tuple[go.Figure, ...]:
-    """A figure for each of some features, coloured by the labels of one action dimension."""
-    dimension = label_dimensions(demonstrations, divider)[by]
-    labels = dimension.labels_of(demonstrations.action_columns[:, by])
-    return tuple(
-        feature_figure(
-            demonstrations.features[index],
-            histogram_by_label(demonstrations.observations[:, index], labels, dimension.n_labels),
-            dimension,
-        )
-        for index in features
-    )
-
-
-def show_legend(dimension: LabelledDimension) -> None:
-    """The colours of the labels."""
-    entries = [
-        (label_text(label, dimension), label_colour(label))
-        for label in range(min(dimension.n_labels, 24))
-    ]
-    st.html(legend(entries, before=f"{dimension.name}:"))
 
 
 def show_features(
@@ -83,15 +55,11 @@ def show_features(
     show_legend(dimensions[by])
     if not features:
         st.caption("Choose a feature above to see how it is distributed.")
-    figures = feature_figures(demonstrations, divider, by, tuple(features))
+    pictures = distributions(demonstrations, divider, by, tuple(features))
     with st.grid(4, min_column_width=220, gap="small") as grid:
-        for index, figure in zip(features, figures, strict=True):
+        for index, picture in zip(features, pictures, strict=True):
             with grid.cell():
-                unit = rows[index].unit
-                st.markdown(
-                    f"**{escaped(names[index])}**" + (f" :gray[{escaped(unit)}]" if unit else "")
-                )
-                chart(figure, f"feature_{index}", f"Distribution of {names[index]}, by action")
+                show_distribution(picture, f"feature_{index}")
     numbers = [
         row
         for row, feature in zip(rows, demonstrations.features, strict=True)
