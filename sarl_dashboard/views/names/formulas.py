@@ -33,7 +33,7 @@ _MOST_SIGNS = 1_000  # that can be typed: with its name, more than a formula may
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class TriedFormula:
     """A formula as it was typed, read and tried.
 
     Attributes:
@@ -57,7 +57,7 @@ def _read(
     text: str,
     place: int | None,
     divider: int,
-) -> Draft:
+) -> TriedFormula:
     """Read a formula under the names in force, and try it on every step.
 
     Args:
@@ -78,10 +78,10 @@ def _read(
         if names is not None:
             ready = renamed(ready, names)
     except InputError as error:
-        return Draft(None, str(error))
+        return TriedFormula(None, str(error))
     index = len(own.features) + (len(derived) if place is None else place)
     dimension = label_dimensions(ready, divider)[0]
-    return Draft(
+    return TriedFormula(
         feature,
         warnings=tuple(unit_warnings([*ready.observed, ready.features[index]])),
         distribution=distribution_of(ready, index, dimension, 0),
@@ -99,7 +99,7 @@ def _place_key(raw: Demonstrations) -> str:
     return f"_formula_place_{raw.digest[:8]}"
 
 
-def _draft(raw: Demonstrations) -> Draft:
+def _draft(raw: Demonstrations) -> TriedFormula:
     return _read(
         raw,
         given_names.given_names(raw),
