@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from urllib.parse import parse_qs
 
@@ -72,6 +73,11 @@ def test_what_if_has_a_slider_for_each_number_that_was_observed_and_no_other(
         "pole angular velocity (rad/s)",
     ]
     before = html(app)
+    assert "Worked out from it" in texts(app)
+    for number in (-0.04, 0.07):
+        app.slider(key="x2").set_value(number).run()
+        (value,) = re.findall('<td>lean</td><td class="n">(.*?)</td>', html(app))
+        assert float(value) == pytest.approx(abs(app.slider(key="x2").value), rel=1e-3)
     for take in ("a demonstrated state", "a random covered state", "a random uncovered state"):
         app.selectbox(key="take").set_value(take).run()
         assert not app.exception, (take, app.exception)

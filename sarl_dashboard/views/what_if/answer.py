@@ -26,6 +26,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.neighbourhood import DecisionChange, FeatureLine, decision_changes
 from sarl_dashboard.components.tree_picture import PathInTree, show_tree
+from sarl_dashboard.views.what_if.derived import derived_values
 from sarl_dashboard.views.what_if.proposal import proposal
 from sarl_dashboard.views.what_if.rules import RulesOnTrees
 from sarl_dashboard.views.what_if.situation import Situation
@@ -58,6 +59,7 @@ def question_and_answer(situation: Situation) -> None:
         action = proposal(situation.rules.rule_set.actions)
         st.markdown("**The state**")
         state = sliders(situation)
+        derived_values(situation, state, action)
     answer(Question(situation, state, action), right)
 
 
