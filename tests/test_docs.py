@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import sarl_core
-from sarl_core import load_demonstrations, mine_rules
+from sarl_core import load_demonstrations, mine_rules, with_combinations
 
 from .examples import ROOT, run
 
@@ -105,11 +105,20 @@ def test_every_key_of_a_rule_file_stands_in_its_page(tmp_path):
             assert f"`{key}`" in told, key
 
 
-def test_a_sentence_that_the_guide_quotes_is_one_of_the_product():
-    page = (DOCS / "guides" / "explaining.md").read_text(encoding="utf-8")
-    (quoted,) = re.findall(r"^> (.+)$", page, flags=re.MULTILINE)
+@pytest.mark.parametrize(
+    ("page", "confidence", "pairs"),
+    [
+        ("guides/explaining.md", 0.9, []),
+        ("guides/two_features.md", 0.95, [("cart velocity", "pole angular velocity")]),
+        ("how_to/combinations.md", 0.95, None),
+    ],
+)
+def test_a_sentence_that_the_guide_quotes_is_one_of_the_product(page, confidence, pairs):
+    (quoted,) = re.findall(r"^> (.+)$", (DOCS / page).read_text("utf-8"), flags=re.MULTILINE)
     demonstrations = load_demonstrations(ROOT / "data/demonstrations/cartpole.parquet")
-    assert quoted in mine_rules(demonstrations, supp_min=0.005, conf_min=0.9).to_text()
+    if pairs != []:
+        demonstrations = with_combinations(demonstrations, pairs=pairs)
+    assert quoted in mine_rules(demonstrations, supp_min=0.005, conf_min=confidence).to_text()
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):

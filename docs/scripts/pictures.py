@@ -12,10 +12,12 @@ import subprocess
 import sys
 import tempfile
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Browser, Page, Playwright, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, Playwright, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -31,6 +33,7 @@ SCREENS = {
     "evidence.png": ("evidence?holdout=0.4", "light", "judged by rules mined without it"),
     "what_if.png": ("what_if?data=cartpole&confidence=0.9", "light", "The least change that"),
 }
+TOGETHER = "data=cartpole&combine=1,3"  # the cart's velocity and the pole's
 
 
 def sarl(*arguments: str, folder: Path = ROOT) -> None:
@@ -116,6 +119,63 @@ def crane() -> None:
 
 def screenshots() -> None:
     """Every screen of `SCREENS`."""
+    with dashboard() as (browser, address):
+        for name, (path, scheme, words) in SCREENS.items():
+            with window(browser, scheme) as page:
+                page.goto(f"{address}/{path}")
+                page.get_by_text(words).first.wait_for(timeout=300_000)
+                page.wait_for_timeout(SETTLED)
+                page.screenshot(path=PICTURES / name)
+
+
+def combinations() -> None:
+    """A combination of Cart Pole's largest rule, and where features are chosen."""
+    with dashboard() as (browser, address):
+        for scheme, ending in (("light", ""), ("dark", "_dark")):
+            with window(browser, scheme, height=3000) as page:
+                page.goto(f"{address}/rules?{TOGETHER}")
+                top = page.get_by_text("What it asks of two features together")
+                bottom = page.locator(".sarl-features").nth(1)
+                bottom.wait_for(timeout=300_000)
+                page.wait_for_timeout(SETTLED)
+                picture = PICTURES / f"combination{ending}.png"
+                _part(page, top, bottom, picture, width=350)
+                page.goto(f"{address}/thresholds?{TOGETHER}")
+                page.get_by_text("judged by rules mined without it").first.wait_for(timeout=300_000)
+                page.get_by_role("button", name="Features to combine").click()
+                page.wait_for_timeout(SETTLED)
+                top = page.locator(".st-key-combining")
+                bottom = page.get_by_test_id("stPopoverBody")
+                picture = PICTURES / f"combinations_switch{ending}.png"
+                _part(page, top, bottom, picture, width=760)
+
+
+def _part(page: Page, top: Locator, bottom: Locator, picture: Path, *, width: int) -> None:
+    """A picture of a page from one thing down to another one, in few colours."""
+    first, last = top.bounding_box(), bottom.bounding_box()
+    assert first is not None
+    assert last is not None
+    x, y = first["x"] - 12, first["y"] - 12
+    height = last["y"] + last["height"] + 12 - y
+    page.screenshot(path=picture, clip={"x": x, "y": y, "width": width, "height": height})
+    with Image.open(picture) as shot:
+        shot.convert("RGB").quantize(64).save(picture, optimize=True)
+
+
+@contextmanager
+def window(browser: Browser, scheme: str, height: int = HEIGHT) -> Iterator[Page]:
+    """A window of a browser in light or dark."""
+    context = browser.new_context(
+        viewport={"width": WIDTH, "height": height},
+        color_scheme="dark" if scheme == "dark" else "light",
+    )
+    yield context.new_page()
+    context.close()
+
+
+@contextmanager
+def dashboard() -> Iterator[tuple[Browser, str]]:
+    """A browser, and the address of a dashboard that runs as long."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -129,16 +189,7 @@ def screenshots() -> None:
         with sync_playwright() as playwright:
             browser = _chromium(playwright)
             _wait(f"http://127.0.0.1:{port}/_stcore/health", browser.new_page())
-            for name, (path, scheme, words) in SCREENS.items():
-                context = browser.new_context(
-                    viewport={"width": WIDTH, "height": HEIGHT}, color_scheme=scheme
-                )
-                page = context.new_page()
-                page.goto(f"http://127.0.0.1:{port}/{path}")
-                page.get_by_text(words).first.wait_for(timeout=300_000)
-                page.wait_for_timeout(SETTLED)
-                page.screenshot(path=PICTURES / name)
-                context.close()
+            yield browser, f"http://127.0.0.1:{port}"
             browser.close()
     finally:
         server.terminate()
@@ -167,3 +218,4 @@ if __name__ == "__main__":
     walker()
     crane()
     screenshots()
+    combinations()
