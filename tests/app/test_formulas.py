@@ -11,6 +11,7 @@ from sarl_core import load_demonstrations, mine_rules, save_demonstrations, with
 from sarl_core.demonstrations.names import names_of, renamed
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 from tests.app.test_demonstrations_page import upload
+from tests.app.test_edit_page import draft
 from tests.app.test_names_page import type_into
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
@@ -221,3 +222,40 @@ def open_rules(app: AppTest) -> AppTest:
     app.switch_page("rules.py").run()
     assert not app.exception
     return app
+
+
+def test_a_rule_by_hand_asks_about_a_formula() -> None:
+    app = added(open_page("names", data="cartpole"), TIME)
+    app.switch_page("edit.py").run()
+    place = app.selectbox(key=draft(app, "feature_0"))
+    assert place.options[-1] == "time to the edge (s)"
+    place.set_value(4)
+    app.selectbox(key=draft(app, "sign_0")).select("above")
+    app.number_input(key=draft(app, "at_0")).set_value(1.0)
+    app.selectbox(key=draft(app, "action")).set_value(1).run()
+    assert "If the time to the edge is above 1 s, then push right." in texts(app)
+    app.button(key=draft(app, "save")).click().run()
+    assert not app.exception
+    made = with_formulas(load_demonstrations(CART), [TIME])
+    applies = made.observations[:, 4] > 1.0
+    assert 0 < applies.sum() < len(made)
+    decides = dict(
+        zip(app.dataframe[0].value["Kind"], app.dataframe[0].value["Decides"], strict=True)
+    )
+    assert decides["manual"] == applies.sum()
+    # It belongs to the rules with this formula, whatever the formula is called.
+    app.switch_page("names.py").run()
+    app.button(key="formula_change_0").click().run()
+    typed(app, TIME.replace("time to the edge", "time left"))
+    app.button(key="formula_take").click().run()
+    app.switch_page("edit.py").run()
+    assert "time left > 1 s" in " ".join(app.dataframe[0].value["When"])
+    app.switch_page("names.py").run()
+    app.button(key="formula_remove_0").click().run()
+    app.switch_page("edit.py").run()
+    assert not app.exception
+    assert "manual" not in list(app.dataframe[0].value["Kind"])
+    app.switch_page("names.py").run()
+    added(app, TIME)
+    app.switch_page("edit.py").run()
+    assert "manual" in list(app.dataframe[0].value["Kind"])
