@@ -8,8 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sarl_core import grow_policy_trees, mine_rules
+from sarl_core import Demonstrations, grow_policy_trees, mine_rules
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.explaining.colours import faded, label_colour
 from sarl_core.explaining.html.what_if_bars import lines_html, stretches
 from sarl_core.explaining.words.what_if import (
@@ -24,6 +25,7 @@ from sarl_core.explaining.words.what_if import (
 )
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
@@ -291,3 +293,35 @@ def test_intervals_of_another_number_are_of_another_tree(two_torques):
     state = two_torques.observations[0]
     assert node_of_way(None, state, here, tree, leaves=False) is not None
     assert node_of_way(None, state, there, tree, leaves=False) is None
+
+
+def test_a_rule_that_lacks_a_combination_is_said_once_for_each_of_its_two_features() -> None:
+    states = np.random.default_rng(0).normal(size=(800, 3)).astype(np.float32)
+    later = states[:, 0] + 0.5 * states[:, 1]
+    made = Demonstrations(
+        states,
+        ((later > 0.3) & (states[:, 2] > 0.2)).astype(np.int64),
+        np.repeat(np.arange(8), 100),
+        feature_names=("gap", "speed", "lead"),
+        feature_units=("m", "m/s", "m"),
+        label_names=(("go", "brake"),),
+    ).deriving([DerivedFeature(Combination(((0, 1.0), (1, 0.5))))])
+    rules = mine_rules(made, supp_min=0.01, conf_min=0.95)
+    features = rules.source.features
+    near = Neighbourhood(Shield(rules))
+    beyond = "gap plus 0.5 s of speed > 0.302 m and lead "
+    for lead, lacking in ((0.0, f"{beyond}≤ 0.2 m"), (1.0, f"{beyond}> 0.2 m")):
+        state = np.array([0.0, 0.0, lead], dtype=np.float32)
+        misses = near.near_misses(state, np.ones(3))
+        (rule,) = {miss.rule for miss in misses}
+        assert conditions_text(rules[rule], rules) == lacking
+        assert [near_miss_text(miss.changes, features) for miss in misses] == [
+            "gap were 0.302 m more",
+            "speed were 0.604 m/s more",
+        ]
+        for miss in misses:
+            moved = state.copy()
+            for one in miss.changes:
+                moved[one.feature] = one.after
+            assert Shield(rules).decide(moved, 0).rules == (miss.rule,)
+            assert miss.in_force
