@@ -105,6 +105,24 @@ class DerivedFeature:
     unit: str = ""
 
 
+def formula_text(derived: DerivedFeature) -> str:
+    """A formula as a person writes it, with its name and unit.
+
+    Args:
+        derived: A formula, no combination.
+
+    Returns:
+        As "time to collision [s] = gap / (own_speed - lead_speed)".
+    """
+    unit = f" [{derived.unit}]" if derived.unit else ""
+    return f"{derived.name}{unit} = {derived.definition}"
+
+
+def formula_texts(derived: Sequence[DerivedFeature]) -> tuple[str, ...]:
+    """The formulas among derived features, as `formula_text`."""
+    return tuple(formula_text(one) for one in derived if isinstance(one.definition, Formula))
+
+
 class _Called(Protocol):
     @property
     def name(self) -> str: ...

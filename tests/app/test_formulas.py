@@ -69,6 +69,7 @@ def test_a_formula_is_mined_with_on_every_page_and_is_removed() -> None:
     assert "time to the edge" in " ".join(app.dataframe[0].value["When"])
     app.switch_page("demonstrations.py").run()
     assert metrics(app)["Features"] == "5"
+    assert codes(app) == [TIME]
 
     app.switch_page("names.py").run()
     app.button(key="formula_remove_0").click().run()

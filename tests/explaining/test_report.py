@@ -16,6 +16,7 @@ from sarl_core import (
     RuleSet,
     load_demonstrations,
     mine_rules,
+    with_formulas,
 )
 from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.provenance import mining_command
@@ -400,3 +401,19 @@ def test_what_rules_are_worth_elsewhere_stands_below_what_they_are_here(
     # Rules that were changed cannot be mined again without an episode.
     some = dataclasses.replace(rules, rules=rules.rules[1:])
     assert "mined without it" not in Page(make_report(some, cart, **PLAIN).html).text
+
+
+def test_formulas_are_listed_and_an_infinite_value_is_said_in_words():
+    formulas = [
+        "time & all [s] = cart_position / max(abs(cart_velocity), 0.1)",
+        "far = 1 / max(abs(pole_angle) - 0.05, 0)",
+    ]
+    made = with_formulas(
+        load_demonstrations(DATA / "demonstrations" / "cartpole.parquet"), formulas
+    )
+    rules = mine_rules(made, supp_min=0.05, conf_min=0.9)
+    text = Page(make_report(rules, made, **PLAIN).html).text
+    assert "by formulas that a person wrote:" in text
+    for formula in formulas:
+        assert formula in text
+    assert re.search(r"far [\d.]+ infinite infinite", text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from markupsafe import Markup
 
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations, observed_features
-from sarl_core.demonstrations.derived import Combination
+from sarl_core.demonstrations.derived import Combination, formula_texts
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
@@ -83,6 +84,7 @@ class DemonstrationsPart:
         returns: SVG of the return of every episode; "" without rewards.
         returns_text: What is at its edges, in words.
         features: What the expert saw.
+        formulas: What a person derived of it, as it was written.
         notes: On how the data was read.
     """
 
@@ -91,6 +93,7 @@ class DemonstrationsPart:
     returns: Markup
     returns_text: str
     features: tuple[FeatureSummary, ...]
+    formulas: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -126,6 +129,7 @@ def demonstrations_part(
             )
             if feature.indicator is None and not isinstance(feature.derived, Combination)
         ),
+        formulas=formula_texts(demonstrations.derived),
         notes=demonstrations.notes,
     )
 
@@ -138,10 +142,13 @@ def within(value: float, row: FeatureRow) -> str:
         row: The feature in numbers.
 
     Returns:
-        Three digits, more where the range is narrow for those; "0" for what is nothing beside it.
+        Three digits, more where the range is narrow for those; "0" for what is nothing beside it;
+        words for what is infinite, as a formula may be.
     """
+    if math.isinf(value):
+        return "infinite" if value > 0 else "negatively infinite"
     width = row.high - row.low
-    if abs(value) <= 1e-4 * width:
+    if math.isfinite(width) and abs(value) <= 1e-4 * width:
         return "0"
     return decimal_text(decimal_on_scale(value, row.low, row.high))
 

@@ -9,6 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import formula_texts
 from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.environment import Environment
@@ -168,12 +169,7 @@ def _derived_options(
     combined = [one.definition for one in derived[len(formulas) :]]
     if given.derived[:before] != read.derived or any(isinstance(o, Formula) for o in combined):
         return None
-    options: dict[str, object] = {
-        "--feature": [
-            f"{one.name}{f' [{one.unit}]' if one.unit else ''} = {one.definition}"
-            for one in formulas
-        ]
-    }
+    options: dict[str, object] = {"--feature": list(formula_texts(formulas))}
     if not combined:
         return options
     base = read.deriving([*read.derived, *formulas])

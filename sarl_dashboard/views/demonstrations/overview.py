@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
+from sarl_core.demonstrations.derived import formula_texts
 from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.explaining.figures.distributions import FeatureRow, feature_rows
 from sarl_dashboard.cache import cached
@@ -73,6 +74,11 @@ def show_overview(demonstrations: Demonstrations, contents: Contents) -> None:
         f"fingerprint `{demonstrations.digest[:12]}`",
     ]
     st.caption(" · ".join(part for part in parts if part))
+    formulas = formula_texts(demonstrations.derived)
+    if formulas:
+        with st.container(key="formulas", gap="xsmall"):
+            st.caption("Worked out from the features, by formulas (the page Names changes them):")
+            st.code("\n".join(formulas), language=None, wrap_lines=True)
     remarks = contents.warnings  # the notes on reading among them
     if remarks:
         with st.container(border=True, gap="xsmall"):

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations, derived_over, formula_feature
-from sarl_core.demonstrations.derived import DerivedFeature
+from sarl_core.demonstrations.derived import DerivedFeature, formula_text
 from sarl_core.demonstrations.formula_units import unit_warnings
 from sarl_core.demonstrations.names import Names, names_of, renamed
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError
 from sarl_core.explaining.figures.distributions import FeatureRow
+from sarl_core.explaining.report.demonstrations import within
 from sarl_core.mining.labels import label_dimensions
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.distributions import (
@@ -234,13 +234,12 @@ def _show_formula(
     for warning in unit_warnings([*named.observed, feature]):
         st.caption(f":material/straighten: {in_full(warning)}")
     with st.container(horizontal=True):
-        unit = f" [{one.unit}]" if one.unit else ""
         st.button(
             "Change",
             icon=":material/edit:",
             key=f"formula_change_{place}",
             on_click=_write,
-            args=(raw, f"{one.name}{unit} = {one.definition}", place),
+            args=(raw, formula_text(one), place),
         )
         st.button(
             "Remove",
@@ -253,14 +252,5 @@ def _show_formula(
 
 def _numbers(row: FeatureRow) -> str:
     """A feature in three numbers."""
-    parts = [
-        f"{word} {_number(value, row)}"
-        for word, value in (("Least", row.low), ("median", row.median), ("largest", row.high))
-    ]
-    return ", ".join(parts)
-
-
-def _number(value: float, row: FeatureRow) -> str:
-    if abs(value) == float("inf"):
-        return "infinite" if value > 0 else "negatively infinite"
-    return decimal_text(decimal_on_scale(value, row.low, row.high))
+    low, median, high = (within(value, row) for value in (row.low, row.median, row.high))
+    return f"Least {low}, median {median}, largest {high}"
