@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import json
+import shlex
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from sarl_core.improving.gaps import gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Thresholds
+from sarl_dashboard.views.improve.order import command_for
 from tests.app.screens import errors, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data"
@@ -166,6 +169,31 @@ def test_a_run_is_what_the_library_gives_and_goes_on_from_there(expected: Aggreg
     app.switch_page("demonstrations.py").run()
     assert not app.exception
     assert metrics(app)["Steps"] == f"{len(expected.demonstrations):,}"
+
+
+def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    commands: list[list[str]] = []
+
+    def noted(*arguments: Any) -> str:
+        command = command_for(*arguments)
+        commands.append(shlex.split(command))
+        return command
+
+    monkeypatch.setattr("sarl_dashboard.views.improve.order.command_for", noted)
+    small = {**SMALL, "rounds": "1"}
+    app = run(open_page("improve", data="cartpole", combine="2,3", **small))
+    assert not errors(app)
+    expected = aggregate(CARTPOLE, replace(PLAN, rounds=1, combined=((2, 3),)))
+    assert expected.reported is not None
+    assert metrics(app)["Mean return"] == f"{expected.reported.statistics.mean:,.1f}"
+    assert metrics(app)["Rules"] == str(len(expected.rule_set))
+    assert commands[-1][-4:-2] == ["--combine", "pole angle, pole angular velocity"]
+    open_page("improve", data="cartpole", combine="every", **small)
+    assert commands[-1][-3:] == ["--combine", "--out", "rules.json"]
+    open_page("improve", data="cartpole", **small)
+    assert "--combine" not in commands[-1]
 
 
 def test_an_own_expert_and_rules_cut_at_thresholds() -> None:

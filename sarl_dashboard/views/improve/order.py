@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import in_order_of
@@ -11,13 +12,21 @@ from sarl_core.environments.environment import EnvironmentOrId, as_environment
 from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.budgeted_trees import MIN_RULES
+from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.choices import check_choice
 from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.improving import ImprovementOrder
+from sarl_dashboard.state import combining
 from sarl_dashboard.state.agents import agent_for, has_expert, own_agents
-from sarl_dashboard.state.data import SHIPPED_SETS, chosen_dataset, data_parts, upload_name
+from sarl_dashboard.state.data import (
+    SHIPPED_SETS,
+    chosen_dataset,
+    data_parts,
+    uncombined_demonstrations,
+    upload_name,
+)
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.mined import grown_trees, mined_rules
 from sarl_dashboard.state.rule_files import OWN_FILE
@@ -59,6 +68,7 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
     if choices.cut == AT_THRESHOLDS:
         in_force = chosen_thresholds()
         thresholds = Thresholds(in_force.support, in_force.confidence)
+    start, combined = uncombined_start(demonstrations, env_id)
     plan = Plan(
         choices.max_rules,
         rounds=choices.rounds,
@@ -69,10 +79,33 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
         validation=choices.validation,
         seed=choices.seed,
         choose=choices.choose,
+        combined=combined,
     )
     check_choice(plan.choose, env_id)
-    command = command_for(choices, demonstrations, env_id, thresholds)
-    return ImprovementOrder(demonstrations, env_id, plan, expert, None, command)
+    command = command_for(choices, start, env_id, thresholds, combined)
+    return ImprovementOrder(start, env_id, plan, expert, None, command)
+
+
+def uncombined_start(
+    demonstrations: Demonstrations, env_id: EnvironmentOrId
+) -> tuple[Demonstrations, tuple[Pair, ...]]:
+    """What is begun with: every round chooses its combinations anew, from what is known by then.
+
+    Args:
+        demonstrations: In the environment's order.
+        env_id: Environment.
+
+    Returns:
+        The demonstrations without combinations, and the pairs of which there may be some.
+    """
+    plain = uncombined_demonstrations()
+    pairs = () if plain is None else combining.pairs(plain)
+    if plain is None or not pairs:
+        return demonstrations, ()
+    start = in_order_of(plain, describe_environment(env_id)).demonstrations
+    places = {feature.name: place for place, feature in enumerate(start.features)}
+    moved = [sorted(places[plain.features[place].name] for place in pair) for pair in pairs]
+    return start, tuple((first, second) for first, second in sorted(moved))
 
 
 def gaps_order(
@@ -97,6 +130,7 @@ def command_for(
     demonstrations: Demonstrations,
     env_id: EnvironmentOrId,
     thresholds: Thresholds | None,
+    combined: Sequence[Pair] = (),
 ) -> str:
     """The same on the command line, for the card."""
     name = chosen_dataset()
@@ -124,4 +158,10 @@ def command_for(
     ):
         if value is not None and value != usual:
             words += [option, str(value)]
+    names = [feature.name for feature in demonstrations.features]
+    if combined and not combining.chosen().features:
+        words.append("--combine")
+    else:
+        for first, second in combined:
+            words += ["--combine", f"{names[first]}, {names[second]}"]
     return shlex.join([*words, "--out", "rules.json"])
