@@ -20,10 +20,11 @@ from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
+from sarl_core.improving.candidate import Candidate, Trial
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as label_scores_of
-from sarl_core.improving.refinement import generation_cost, generation_seed, refine
+from sarl_core.improving.refinement import GENERATIONS, Refinement, refinement_cost
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
@@ -43,7 +44,6 @@ from sarl_core.shielding.shield import Shield
 
 _FIRST_VALIDATION = 16
 _FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
-_MARKS = 8  # points on the way of a refinement from which the best is chosen
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,9 @@ class _Run:
     ) -> None:
         self.plan, self.env_id, self.jobs, self.executor = plan, env_id, jobs, executor
         self.agent, self.expert = agent, expert
-        self.answers = Answers(env_id, expert, start, pairs=plan.combined, divider=plan.divider)
+        self.answers = Answers(
+            env_id, expert, start, pairs=plan.combined, divider=plan.divider, seed=plan.seed
+        )
         self.rounds: list[AggregationRound] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
         self.choice: _Choice | None = None
@@ -275,11 +277,12 @@ class _Run:
 
     def planned_units(self) -> int:
         plan = self.plan
-        refined = plan.generations * generation_cost() + (
-            planned_episodes(_MARKS + 1, _first_validation(plan), plan.validation)
-            if plan.generations
-            else 0
-        )
+        refined = 0
+        if plan.generations:
+            marks = -(-plan.generations // GENERATIONS)
+            refined = refinement_cost(plan.generations) + planned_episodes(
+                marks + 1, _first_validation(plan), plan.validation
+            )
         return (
             plan.rounds * plan.episodes
             + planned_episodes(plan.rounds, _first_validation(plan), plan.validation)
@@ -393,9 +396,10 @@ class _Run:
         """The best candidate, and its mean return over all episodes that it was given."""
         tried = successive_halving(
             len(candidates),
-            lambda index, first, count: scores(
-                self.shielded(candidates[index], first, count, clock), self.plan.choose
-            ),
+            lambda left, first, count: [
+                scores(self.shielded(candidates[one], first, count, clock), self.plan.choose)
+                for one in left
+            ],
             seed=seed,
             first=_first_validation(self.plan),
             most=self.plan.validation,
@@ -403,40 +407,47 @@ class _Run:
         return tried.best, float(tried.means[tried.best])
 
     def refine(self, clock: _Clock) -> None:
-        """Move thresholds and labels of the best rules, and keep what is better."""
-        start = self.choice
+        """Change shape and thresholds of the best rules, and keep what is better."""
+        start, plan = self.choice, self.plan
         assert start is not None
-        if not self.plan.generations:
+        if not plan.generations:
             return
-        first = generation_seed(self.plan.seed, 1)
-
-        def better(trees: tuple[PolicyTree, ...]) -> None:
-            # By the episodes of the search only: for who stops before the second validation.
-            self.choice = _Choice(start.index, trees, refined=True)
-            self.seeds = self.seeds._replace(refinement=first)
-
-        marks = refine(
-            self.env_id,
+        pairs, first = self.pairs(start), self.seed(seeds.REFINEMENT)
+        search = Refinement(
             start.trees,
-            self.pairs(start),
-            agent=self.agent,
-            projection=self.plan.projection,
-            generations=self.plan.generations,
-            marks=_MARKS,
-            max_steps=self.plan.max_steps,
-            choose=self.plan.choose,
-            seed=self.plan.seed,
+            pairs,
+            Trial(
+                self.env_id,
+                self.agent,
+                projection=plan.projection,
+                divider=plan.divider,
+                choose=plan.choose,
+                max_steps=plan.max_steps,
+            ),
+            expert=self.expert,
+            combined=plan.combined,
+            max_rules=plan.max_rules,
+            first=first,
+            seed=plan.seed,
             jobs=self.jobs,
             executor=self.executor,
-            progress=clock.of(),
-            better=better,
         )
+
+        def moved(candidate: Candidate) -> _Choice:
+            return _Choice(start.index, candidate.trees(pairs, plan.divider), refined=True)
+
+        def better(candidate: Candidate) -> None:
+            # By the episodes of the search only: for who stops before the second validation.
+            self.choice = moved(candidate)
+            self.seeds = self.seeds._replace(refinement=first)
+
+        marks = search.run(plan.generations, progress=clock.of(), better=better)
         self.seeds = self.seeds._replace(refinement=first)
-        candidates = [start.trees, *marks]
+        choices = [start, *map(moved, marks)]
         # On other episodes than those of the rounds: the first candidate was chosen by them.
         second = self.seed(seeds.SECOND_VALIDATION)
-        index, mean = self.best_of([self.rules(one) for one in candidates], second, clock)
-        self.choice = _Choice(start.index, candidates[index], mean, refined=index > 0)
+        index, mean = self.best_of([self.rules(one.trees) for one in choices], second, clock)
+        self.choice = replace(choices[index], mean=mean)
         self.seeds = self.seeds._replace(second_validation=second)
 
     def report(self, clock: _Clock) -> None:

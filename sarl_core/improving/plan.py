@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from sarl_core.errors import InputError, quoted
-from sarl_core.improving.refinement import EPISODES
+from sarl_core.improving.refinement import refinement_seeds
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.rules import Thresholds
@@ -15,12 +15,11 @@ from sarl_core.rollouts.seeds import (
     MOST_EPISODES_A_ROUND,
     MOST_ROUNDS,
     MOST_VALIDATION,
-    REFINEMENT,
-    REPORT,
+    SEEDS_A_RUN,
 )
 from sarl_core.shielding.projection import Projection
 
-_MOST_GENERATIONS = (REPORT - REFINEMENT) // EPISODES - 1
+_MOST_GENERATIONS = 10 * (SEEDS_A_RUN // refinement_seeds(10))
 
 
 @dataclass(frozen=True)

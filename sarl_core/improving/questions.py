@@ -26,6 +26,9 @@ _PAIRS_A_ROUND = 25_000
 # Rules learn from what was shown at first and from where the latest rules led: what earlier ones
 # got into, the present ones may never meet.
 _ROUNDS_USED = 12
+# What imitates best is often not what acts best, above all of few rules: each round is offered
+# another half of the pairs, and which were good ones is seen from how it does.
+_FEWEST_HALVED = 4
 # A label with less than 2 % is one the expert does not want; how much less says nothing.
 _LEAST_LOG_PROBABILITY = -4.0
 
@@ -151,6 +154,7 @@ class Answers:
         *,
         pairs: Sequence[Pair] = (),
         divider: int = 2,
+        seed: int = 0,
     ) -> None:
         """Ask about the states that were demonstrated.
 
@@ -160,6 +164,7 @@ class Answers:
             start: What was shown so far; the expert answers anew. What it derives stays derived.
             pairs: Features that are combined, as `with_combinations` takes them; () for none.
             divider: Number of intervals of continuous dimensions.
+            seed: Another one offers other pairs in each round.
 
         Raises:
             InputError: If the expert does not always do the same in the same state, or the
@@ -167,7 +172,8 @@ class Answers:
         """
         start = in_order_of(start, describe_environment(env_id)).demonstrations
         self._env_id, self._expert = env_id, expert
-        self._derived, self._combined, self._divider = start.derived, pairs, divider
+        self._derived, self._combined = start.derived, pairs
+        self._divider, self._seed = divider, seed
         observations = start.raw_observations
         self._observations = [observations]
         self._actions: list[Actions] = [ask(expert, observations, start.episodes)]
@@ -219,4 +225,13 @@ class Answers:
         ).deriving(self._derived if derived is None else derived)
         if derived is not None or not self._combined:
             return pairs
-        return with_combinations(pairs, pairs=self._combined, divider=self._divider)
+        return with_combinations(pairs, pairs=self._offered(rounds), divider=self._divider)
+
+    def _offered(self, rounds: int) -> Sequence[Pair]:
+        """The pairs of features that may be combined after so many rounds."""
+        if not rounds or len(self._combined) < _FEWEST_HALVED:
+            return self._combined
+        generator = np.random.default_rng((self._seed, rounds))
+        count = (len(self._combined) + 1) // 2
+        chosen = generator.choice(len(self._combined), count, replace=False)
+        return [self._combined[place] for place in np.sort(chosen).tolist()]

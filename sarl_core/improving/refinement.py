@@ -1,331 +1,223 @@
-"""Moving the thresholds, ratios and labels of a few rules to where they achieve more.
+"""Making a few rules achieve more: their shape, then their thresholds, in turns.
 
-A tree that imitates its expert is not yet the best tree of its size. An evolution strategy
-(Salimans et al. 2017) shakes all of them at once, in pairs of opposite directions and on the same
-episodes, and follows those that bring more return. The queries' features, of combinations the two
-that are combined, and their order stay.
+A tree that imitates its expert is not yet the best tree of its size. First its neighbours in shape
+are tried, of which the best stays; then thresholds, ratios and intervals are moved; and so on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.derived import Combination, DerivedFeature
-from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
-from sarl_core.mining.combining.candidates import rounded_ratio
-from sarl_core.mining.combining.queries import over_queried, with_ratios
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
-from sarl_core.processes import executor_of, run_each
+from sarl_core.demonstrations.derived import DerivedFeature
+from sarl_core.improving.candidate import Candidate, Trial
+from sarl_core.improving.movement import POPULATION, Parameters, evolution_strategy, ranks
+from sarl_core.improving.questions import answered, ask, scores
+from sarl_core.improving.shapes import MetStates, neighbours
+from sarl_core.improving.successive_halving import planned_episodes, successive_halving
+from sarl_core.mining.budgeted_trees import leaf_rules
+from sarl_core.mining.combining.candidates import Pair, candidates
+from sarl_core.mining.tree import PolicyTree, count_tree
+from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.choices import Choice, mean_score, scores
-from sarl_core.rollouts.episodes import LOST, rollout
-from sarl_core.rollouts.seeds import REFINEMENT, of_run
-from sarl_core.shielding.projection import Projection
+from sarl_core.rollouts.choices import mean_score
+from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.shield import Shield
 
-PAIRS = 12  # of opposite directions a generation
-EPISODES = 16  # for each direction, the same for all of a generation
+GENERATIONS = 10  # between two changes of the shape
+EPISODES = 16  # for each neighbour, the same for all of a generation
+MET_EPISODES = 32  # in which it is seen where the rules lead
+NEIGHBOURS = 63  # in shape
+SHAPE_EPISODES = 128  # for the best of them
 
-_SHAKE = 0.15  # in units of half the spread of a feature where it is asked about
-_STEP = 0.15  # of a generation, in units of the shake
-_MEMORY = (0.9, 0.99)  # of the step's direction and of its size (Adam)
-_SPREAD = (0.1, 0.9)  # quantiles
-_LEAST_SHARE = 0.02  # a label that is shown less often is no alternative
-_FEW = 2_000  # rows that tell a shield nothing but that its rules exist
+_MET_STATES = 10_000
+_PAIRS = 20  # of features that new queries may combine, others each time
 
 
-@dataclass(frozen=True)
-class _Candidate:
-    """Trees to try, one an action dimension, and what they derive."""
+def refinement_cost(generations: int) -> int:
+    """Most episodes of a refinement."""
+    turns = -(-generations // GENERATIONS)
+    shape = MET_EPISODES + planned_episodes(NEIGHBOURS + 1, EPISODES, SHAPE_EPISODES)
+    return turns * shape + generations * POPULATION * EPISODES
 
-    structures: tuple[TreeStructure, ...]
-    derived: tuple[DerivedFeature, ...]
 
-    def trees(self, pairs: Demonstrations, divider: int) -> tuple[PolicyTree, ...]:
-        """The trees with what these pairs say of them."""
-        known = pairs if pairs.derived == self.derived else pairs.deriving(self.derived)
-        return tuple(
-            count_tree(structure, known, index, divider=divider)
-            for index, structure in enumerate(self.structures)
+def refinement_seeds(generations: int) -> int:
+    """Most seeds of a refinement: all that are compared play the same episodes."""
+    turns = -(-generations // GENERATIONS)
+    return turns * (MET_EPISODES + SHAPE_EPISODES) + generations * EPISODES
+
+
+class Refinement:
+    """A search around one rule set."""
+
+    def __init__(
+        self,
+        trees: Sequence[PolicyTree],
+        pairs: Demonstrations,
+        trial: Trial,
+        *,
+        expert: Agent,
+        combined: Sequence[Pair] = (),
+        max_rules: int,
+        first: int,
+        seed: int = 0,
+        jobs: int = 1,
+        executor: Executor | None = None,
+    ) -> None:
+        """Begin a search.
+
+        Args:
+            trees: Where it begins, one an action dimension; every leaf is a rule.
+            pairs: What they were grown from.
+            trial: How candidates are tried.
+            expert: Who is asked about the states that they lead to.
+            combined: Pairs of features of which new queries may ask about combinations.
+            max_rules: Most leaves of each tree.
+            first: Seed of the first episode.
+            seed: Another one gives another way.
+            jobs: Processes; changes the speed, never the result.
+            executor: Whose processes they are; this machine's where not given.
+        """
+        self.here = Candidate.of_trees(trees)
+        self._start = pairs
+        self._trial, self._expert = trial, expert
+        self._combined, self._max_rules = combined, max_rules
+        self._next, self._generator = first, np.random.default_rng(seed)
+        self._workers = executor_of(jobs, executor)
+
+    def run(
+        self,
+        generations: int,
+        *,
+        progress: Progress | None = None,
+        better: Callable[[Candidate], None] | None = None,
+    ) -> list[Candidate]:
+        """Search.
+
+        Args:
+            generations: In how many steps thresholds are moved, in all.
+            progress: Called with (episodes done, in all); returning False stops.
+            better: Called with where the search has come to whenever the neighbours there
+                achieved more than those anywhere before, the start included; so that something
+                is there when the way is not gone to its end.
+
+        Returns:
+            Where it stood after each turn of shape and thresholds. Which is best is not known:
+            choose by episodes.
+
+        Raises:
+            WorkError: If a process ended in the middle of its work.
+            CancelledError: If `progress` returned False.
+        """
+        total, done = refinement_cost(generations), 0
+        most: tuple[float, ...] = ()
+        marks = []
+        for turn in range(0, generations, GENERATIONS):
+            met = self._met()
+            self._shape(met)
+            done += refinement_cost(1) - POPULATION * EPISODES
+            report(progress, done, total)
+            pairs = met.pairs.deriving(self.here.derived)
+            parameters = Parameters.of(self.here.trees(pairs, self._trial.divider), pairs)
+            strategy = evolution_strategy(parameters.count, int(self._generator.integers(2**31)))
+            for _ in range(min(GENERATIONS, generations - turn)):
+                points = strategy.ask()
+                moved = [parameters.candidate(point) for point in points]
+                means = np.array([mean_score(one) for one in self._scores(moved, pairs)])
+                if (mean := mean_score(means)) > most:
+                    if most and better is not None:
+                        better(self.here)
+                    most = mean
+                strategy.tell(points, -ranks(means))  # which follows the least
+                self.here = parameters.candidate(strategy.mean)
+                done += POPULATION * EPISODES
+                report(progress, done, total)
+            marks.append(self.here)
+        return marks
+
+    def _take(self, episodes: int) -> int:
+        """Seed of episodes that are used for nothing else."""
+        self._next += episodes
+        return self._next - episodes
+
+    def _scores(self, tried: Sequence[Candidate], pairs: Demonstrations) -> list[np.ndarray]:
+        return self._trial.scores(
+            tried, pairs, seed=self._take(EPISODES), episodes=EPISODES, workers=self._workers
         )
 
-
-@dataclass(frozen=True)
-class _CombinedQuery:
-    """A query about a combination, and how its line is turned.
-
-    Attributes:
-        node: Of the query.
-        ratio: From which it starts.
-        scale: What the ratio changes by, so that values change by their spread.
-        centre: Value of the second feature around which the line turns.
-    """
-
-    node: int
-    ratio: float
-    scale: float
-    centre: float
-
-
-@dataclass(frozen=True)
-class _Parameters:
-    """What is moved: thresholds and ratios in units of their spread, a score a label at leaves."""
-
-    trees: tuple[PolicyTree, ...]
-    spreads: tuple[NDArray[np.float64], ...]
-    lines: tuple[tuple[_CombinedQuery, ...], ...]
-    derived: tuple[DerivedFeature, ...]
-    observed: int
-
-    @classmethod
-    def of(cls, trees: Sequence[PolicyTree], pairs: Demonstrations) -> _Parameters:
-        """What may be moved in trees that were grown from these pairs."""
-        spreads = tuple(_spread(tree, pairs) for tree in trees)
-        lines = tuple(
-            _lines(tree, pairs, spread) for tree, spread in zip(trees, spreads, strict=True)
+    def _met(self) -> MetStates:
+        """Where the rules lead now, and what the expert says there."""
+        seed = self._take(MET_EPISODES)
+        rules = leaf_rules(self.here.trees(self._start, self._trial.divider))
+        played = rollout(
+            self._trial.env_id,
+            self._trial.agent,
+            shield=Shield(rules, projection=self._trial.projection),
+            episodes=MET_EPISODES,
+            seed=seed,
+            keep_steps=True,
+            max_steps=self._trial.max_steps,
+            executor=self._workers,
         )
-        return cls(tuple(trees), spreads, lines, pairs.derived, len(pairs.observed))
+        table = played.steps
+        assert table is not None
+        wanted = ask(self._expert, table.observation, table.episode)
+        rows = np.arange(len(table))
+        if len(rows) > _MET_STATES:
+            rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
+        pairs = answered(
+            self._trial.env_id,
+            self._expert,
+            table.observation[rows],
+            wanted[rows],
+            table.episode[rows],
+            table.step[rows],
+        )
+        offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
+        # What the trees ask about stands first, where they look for it.
+        derived = dict.fromkeys([*self.here.derived, *offered])
+        pairs = pairs.deriving(list(derived))
+        return MetStates(pairs, scores(self._expert, pairs.raw_observations))
 
-    def start(self) -> NDArray[np.float64]:
-        parts = []
-        for tree, lines in zip(self.trees, self.lines, strict=True):
-            leaves = tree.feature == LEAF
-            shares = tree.counts[leaves] / np.maximum(tree.samples[leaves], 1)[:, None]
-            likely = np.log(np.maximum(shares, _LEAST_SHARE))
-            # What the leaf says is ahead, if only by nothing.
-            labels = tree.label[leaves][:, None]
-            best = likely.max(axis=1, keepdims=True)
-            np.put_along_axis(likely, labels, best, axis=1)
-            parts += [np.zeros(int((~leaves).sum()) + len(lines)), (likely - best).reshape(-1)]
-        return np.concatenate(parts)
+    def _some_pairs(self) -> list[Pair]:
+        """Pairs of features that the next queries may combine."""
+        if len(self._combined) <= _PAIRS:
+            return list(self._combined)
+        chosen = self._generator.choice(len(self._combined), _PAIRS, replace=False)
+        return [self._combined[place] for place in np.sort(chosen).tolist()]
 
-    def candidate(self, values: NDArray[np.float64]) -> _Candidate:
-        structures = []
-        derived: list[DerivedFeature] = list(self.derived)
-        at = 0
-        for tree, spread, lines in zip(self.trees, self.spreads, self.lines, strict=True):
-            leaves = tree.feature == LEAF
-            inner, labels = ~leaves, tree.dimension.n_labels
-            threshold, label = tree.threshold.copy(), tree.label.copy()
-            threshold[inner] += values[at : at + inner.sum()] * spread[inner]
-            at += int(inner.sum())
-            ratios = {}
-            for line, turn in zip(lines, values[at : at + len(lines)].tolist(), strict=True):
-                ratio = rounded_ratio(line.ratio + turn * line.scale)
-                if ratio:  # of 0 the query would ask about one feature
-                    ratios[line.node] = ratio
-                    threshold[line.node] += (ratio - line.ratio) * line.centre
-            at += len(lines)
-            count = int(leaves.sum()) * labels
-            label[leaves] = values[at : at + count].reshape(-1, labels).argmax(axis=1)
-            at += count
-            structure, derived = with_ratios(
-                TreeStructure(
-                    tree.feature, threshold, tree.children_left, tree.children_right, label
-                ),
-                derived,
-                ratios,
-                observed=self.observed,
-            )
-            structures.append(without_idle_queries(structure))
-        used, definitions = over_queried(structures, derived, observed=self.observed)
-        return _Candidate(tuple(used), definitions)
-
-
-def refine(
-    env_id: EnvironmentOrId,
-    trees: Sequence[PolicyTree],
-    pairs: Demonstrations,
-    *,
-    agent: Agent,
-    projection: Projection = "centre",
-    generations: int,
-    marks: int,
-    max_steps: int | None = None,
-    choose: Choice = "return",
-    seed: int = 0,
-    jobs: int = 1,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    better: Callable[[tuple[PolicyTree, ...]], None] | None = None,
-) -> list[tuple[PolicyTree, ...]]:
-    """Search around trees for better ones of the same shape.
-
-    What combinations count their second feature for is moved too, to ratios of two digits.
-
-    Args:
-        env_id: The environment.
-        trees: One an action dimension; every leaf is a rule.
-        pairs: What they were grown from.
-        agent: Who is shielded.
-        projection: How the shield replaces a continuous action.
-        generations: How many steps to go.
-        marks: How many points on the way to give back.
-        max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
-        choose: What comes first where two directions are compared.
-        seed: Another one gives another way.
-        jobs: Processes; changes the speed, never the result.
-        executor: Whose processes they are; this machine's where not given.
-        progress: Called with (episodes done, in all); returning False stops.
-        better: Called with the trees of a point on the way whenever the episodes around it
-            brought more than those around any point before, the start included; so that
-            something is there when the way is not gone to its end.
-
-    Returns:
-        The trees at `marks` points, the last at the end of the way. Which is best is not known:
-        choose by episodes.
-
-    Raises:
-        WorkError: If a process ended in the middle of its work.
-        CancelledError: If `progress` returned False.
-    """
-    parameters = _Parameters.of(trees, pairs)
-    few = pairs_of(pairs, _FEW)
-    generator = np.random.default_rng(seed)
-    here = parameters.start()
-    momentum, size = np.zeros_like(here), np.zeros_like(here)
-    candidates = []
-    stops = {round(generations * (number + 1) / marks) for number in range(marks)}
-    total = generations * generation_cost()
-    most: tuple[float, ...] = ()
-
-    def trees_at(point: NDArray[np.float64]) -> tuple[PolicyTree, ...]:
-        return parameters.candidate(point).trees(pairs, trees[0].divider)
-
-    workers = executor_of(jobs, executor)
-    for number in range(1, generations + 1):
-        directions = generator.normal(size=(PAIRS, len(here)))
-        first = generation_seed(seed, number)
-        shaken = [
-            parameters.candidate(here + side * _SHAKE * direction)
-            for direction in directions
-            for side in (1, -1)
+    def _shape(self, met: MetStates) -> None:
+        """Go to the best of the neighbours in shape, if it is better."""
+        trees = [
+            count_tree(structure, met.pairs, index, divider=self._trial.divider)
+            for index, structure in enumerate(self.here.structures)
         ]
-        means = run_each(
-            _mean_scores,
-            [
-                (
-                    env_id,
-                    candidate,
-                    few,
-                    trees[0].divider,
-                    agent,
-                    projection,
-                    first,
-                    max_steps,
-                    choose,
-                )
-                for candidate in shaken
-            ],
-            lost=LOST,
-            executor=workers,
+        tried = [
+            self.here,
+            *neighbours(
+                trees,
+                met,
+                max_rules=self._max_rules,
+                count=NEIGHBOURS,
+                generator=self._generator,
+            ),
+        ]
+        first = self._take(SHAPE_EPISODES)
+        chosen = successive_halving(
+            len(tried),
+            lambda left, seed, count: self._trial.scores(
+                [tried[place] for place in left],
+                met.pairs,
+                seed=seed,
+                episodes=count,
+                workers=self._workers,
+            ),
+            seed=first,
+            first=EPISODES,
+            most=SHAPE_EPISODES,
         )
-        if (mean := mean_score(np.array(means))) > most:
-            most = mean
-            if better is not None and number > 1:
-                better(trees_at(here))
-        ranks = _ranks(np.array(means))
-        slope = (ranks[0::2] - ranks[1::2]) @ directions / PAIRS
-        momentum = _MEMORY[0] * momentum + (1 - _MEMORY[0]) * slope
-        size = _MEMORY[1] * size + (1 - _MEMORY[1]) * slope**2
-        steady = momentum / (1 - _MEMORY[0] ** number)
-        scale = np.sqrt(size / (1 - _MEMORY[1] ** number)) + 1e-12
-        here = here + _STEP * _SHAKE * steady / scale
-        report(progress, number * generation_cost(), total)
-        if number in stops:
-            candidates.append(trees_at(here))
-    return candidates
-
-
-def generation_cost() -> int:
-    """Episodes of one generation."""
-    return 2 * PAIRS * EPISODES
-
-
-def generation_seed(seed: int, number: int) -> int:
-    """First seed of the episodes of one generation.
-
-    Args:
-        seed: Of the run.
-        number: Of the generation, counted from 1.
-    """
-    return of_run(REFINEMENT, seed) + number * EPISODES
-
-
-def pairs_of(pairs: Demonstrations, most: int) -> Demonstrations:
-    """The first pairs, whole episodes, at least `most` of them where there are as many."""
-    ends = np.cumsum(pairs.episode_lengths)
-    return pairs.select(np.arange(1 + int(np.searchsorted(ends, min(most, len(pairs))))))
-
-
-def _ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places from -0.5, the least, to 0.5, by the first column, of equals by the next, (n, K)."""
-    # Equal means share theirs, so that nothing is followed where all do as well as can be.
-    ladder = np.empty(len(means))
-    ladder[np.lexsort(means.T[::-1])] = np.linspace(-0.5, 0.5, len(means))
-    _, group, size = np.unique(means, axis=0, return_inverse=True, return_counts=True)
-    group = group.reshape(-1)
-    shared: NDArray[np.float64] = (np.bincount(group, weights=ladder) / size)[group]
-    return shared
-
-
-def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
-    """Half the spread of the asked feature among the pairs that reach each inner node, (n,)."""
-    spread = np.zeros(tree.n_nodes)
-    for node in np.flatnonzero(tree.feature != LEAF).tolist():
-        values = pairs.observations[tree.rows(node), tree.feature[node]]
-        if len(values):
-            low, high = np.quantile(values, _SPREAD)
-            spread[node] = 0.5 * float(high - low)
-    return spread
-
-
-def _lines(
-    tree: PolicyTree, pairs: Demonstrations, spread: NDArray[np.float64]
-) -> tuple[_CombinedQuery, ...]:
-    """The queries of a tree about combinations."""
-    lines = []
-    observed = len(pairs.observed)
-    for node in np.flatnonzero(tree.feature >= observed).tolist():
-        queried = pairs.derived[int(tree.feature[node]) - observed].definition
-        values = pairs.observations[tree.rows(node)]
-        if not isinstance(queried, Combination) or not len(values):
-            continue
-        second = values[:, queried.features[1]]
-        low, high = np.quantile(second, _SPREAD)
-        if high > low:
-            scale = spread[node] / (0.5 * float(high - low))
-            lines.append(_CombinedQuery(node, queried.ratio, scale, float(np.median(second))))
-    return tuple(lines)
-
-
-def _mean_scores(
-    env_id: EnvironmentOrId,
-    candidate: _Candidate,
-    few: Demonstrations,
-    divider: int,
-    agent: Agent,
-    projection: Projection,
-    seed: int,
-    max_steps: int | None,
-    choose: Choice,
-) -> tuple[float, ...]:
-    shield = Shield(leaf_rules(candidate.trees(few, divider)), projection=projection)
-    played = rollout(
-        env_id,
-        agent,
-        shield=shield,
-        episodes=EPISODES,
-        seed=seed,
-        keep_steps=False,
-        max_steps=max_steps,
-    )
-    return mean_score(scores(played, choose))
+        self.here = tried[chosen.best]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sarl_core.rollouts.choices import mean_score
 
-Score = Callable[[int, int, int], NDArray[np.float64]]
-"""Called with (candidate, first seed, how many); gives the return of each episode, (E,), or of
-each what counts, the most important first and the return last, (E, K)."""
+Score = Callable[[Sequence[int], int, int], Sequence[NDArray[np.float64]]]
+"""Called with (candidates, first seed, how many); gives for each candidate the return of each
+episode, (E,), or of each what counts, the most important first and the return last, (E, K)."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,6 @@ def successive_halving(
     seed: int,
     first: int = 16,
     most: int = 256,
-    finished: Callable[[int], None] | None = None,
 ) -> Selection:
     """Give all a few episodes, the better half twice as many, and so on.
 
@@ -70,7 +69,6 @@ def successive_halving(
         seed: Of the first episode.
         first: Episodes of the first turn.
         most: Most episodes a candidate is given; the last one left gets them all.
-        finished: Called with the number of episodes after each call of `score`; may raise.
 
     Returns:
         The selection. The winner's mean is too good by what luck it was chosen for: report it on
@@ -85,11 +83,8 @@ def successive_halving(
     given = 0
     while given < most:
         new = min(max(first, given), most - given)
-        for candidate in left:
-            scores = score(candidate, seed + given, new)
+        for candidate, scores in zip(left, score(left, seed + given, new), strict=True):
             scored[candidate].append(scores.reshape(len(scores), -1))
-            if finished is not None:
-                finished(new)
         given += new
         ranked = sorted(left, key=means, reverse=True)  # of equals, the first stays first
         left = ranked[: max(1, (len(ranked) + 1) // 2)]

@@ -9,7 +9,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
-from sarl_core.improving.refinement import generation_cost
+from sarl_core.improving.refinement import GENERATIONS, refinement_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_dashboard.components.settings import environment_choice
@@ -137,9 +137,9 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     0,
                     MOST,
                     0,
-                    "Afterwards the rules' numbers and actions are moved to where they achieve "
-                    "more, so many times. "
-                    f"Each step takes {generation_cost()} episodes. 0: not at all.",
+                    "Afterwards the rules' queries, numbers and actions are changed to where they "
+                    f"achieve more, so many times. {GENERATIONS} steps take "
+                    f"{refinement_cost(GENERATIONS):,} episodes. 0: not at all.",
                 )
             seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
             if not demonstrations.is_discrete:
