@@ -140,7 +140,7 @@ def aggregate(
             thresholds=_thresholds(support, confidence),
             divider=divider,
             projection=projection,
-            generations=refine,
+            turns=refine,
             validation=validation,
             report=report,
             seed=seed,

@@ -24,7 +24,7 @@ from sarl_core.improving.candidate import Candidate, Trial
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as label_scores_of
-from sarl_core.improving.refinement import GENERATIONS, Refinement, refinement_cost
+from sarl_core.improving.refinement import Refinement, refinement_cost
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
@@ -278,10 +278,9 @@ class _Run:
     def planned_units(self) -> int:
         plan = self.plan
         refined = 0
-        if plan.generations:
-            marks = -(-plan.generations // GENERATIONS)
-            refined = refinement_cost(plan.generations) + planned_episodes(
-                marks + 1, _first_validation(plan), plan.validation
+        if plan.turns:
+            refined = refinement_cost(plan.turns) + planned_episodes(
+                plan.turns + 1, _first_validation(plan), plan.validation
             )
         return (
             plan.rounds * plan.episodes
@@ -410,7 +409,7 @@ class _Run:
         """Change shape and thresholds of the best rules, and keep what is better."""
         start, plan = self.choice, self.plan
         assert start is not None
-        if not plan.generations:
+        if not plan.turns:
             return
         pairs, first = self.pairs(start), self.seed(seeds.REFINEMENT)
         search = Refinement(
@@ -441,7 +440,7 @@ class _Run:
             self.choice = moved(candidate)
             self.seeds = self.seeds._replace(refinement=first)
 
-        marks = search.run(plan.generations, progress=clock.of(), better=better)
+        marks = search.run(plan.turns, progress=clock.of(), better=better)
         self.seeds = self.seeds._replace(refinement=first)
         choices = [start, *map(moved, marks)]
         # On other episodes than those of the rounds: the first candidate was chosen by them.

@@ -126,7 +126,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
         **({"combined": _combined(aggregation)} if plan.combined else {}),
         "episodes_a_round": plan.episodes,
-        "generations": plan.generations,
+        "turns": plan.turns,
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,
         "refined": aggregation.refined,

@@ -116,16 +116,42 @@ class Parameters:
         return Candidate.of(structures, derived, observed=self.observed)
 
 
-def evolution_strategy(count: int, seed: int) -> Any:
-    """A search from 0 in so many dimensions, `ask`ed for points and `tell`ed what to follow.
+class Movement:
+    """A search around trees for better ones of the same shape."""
 
-    Args:
-        count: Dimensions, 1 or more.
-        seed: Another one gives another way.
+    def __init__(self, trees: Sequence[PolicyTree], pairs: Demonstrations, *, seed: int) -> None:
+        """Begin where the trees are.
 
-    Returns:
-        A `cma.CMAEvolutionStrategy` that follows the least.
-    """
+        Args:
+            trees: One an action dimension, counted over `pairs`.
+            pairs: That say how widely features are spread.
+            seed: Another one gives another way.
+        """
+        self._parameters = Parameters.of(trees, pairs)
+        self.count = self._parameters.count
+        self.here = self._parameters.candidate(np.zeros(self.count))
+        self._strategy = _evolution_strategy(self.count, seed) if self.count else None
+        self._points: list[NDArray[np.float64]] = []
+
+    def ask(self) -> list[Candidate]:
+        """`POPULATION` neighbours of where it has come to."""
+        assert self._strategy is not None
+        self._points = self._strategy.ask()
+        return [self._parameters.candidate(point) for point in self._points]
+
+    def tell(self, means: NDArray[np.float64]) -> None:
+        """Take a step.
+
+        Args:
+            means: What the neighbours have achieved, (POPULATION, K), as `mean_score` gives it.
+        """
+        assert self._strategy is not None
+        self._strategy.tell(self._points, -ranks(means))  # which follows the least
+        self.here = self._parameters.candidate(self._strategy.mean)
+
+
+def _evolution_strategy(count: int, seed: int) -> Any:
+    """A search from 0 in so many dimensions."""
     import cma
 
     generator = np.random.default_rng(seed)

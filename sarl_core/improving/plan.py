@@ -19,7 +19,7 @@ from sarl_core.rollouts.seeds import (
 )
 from sarl_core.shielding.projection import Projection
 
-_MOST_GENERATIONS = 10 * (SEEDS_A_RUN // refinement_seeds(10))
+_MOST_TURNS = SEEDS_A_RUN // refinement_seeds(1)
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Plan:
         thresholds: Cut the trees there; None makes every leaf a rule.
         divider: Number of intervals of continuous dimensions.
         projection: How the shield replaces a continuous action.
-        generations: Of the refinement that follows; 0 for none.
+        turns: Of the refinement that follows; 0 for none.
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
@@ -50,7 +50,7 @@ class Plan:
     thresholds: Thresholds | None = None
     divider: int = 2
     projection: Projection = "centre"
-    generations: int = 0
+    turns: int = 0
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -72,7 +72,7 @@ class Plan:
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),
             ("number of episodes a round", self.episodes, 1, MOST_EPISODES_A_ROUND),
-            ("number of generations", self.generations, 0, _MOST_GENERATIONS),
+            ("number of turns", self.turns, 0, _MOST_TURNS),
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),

@@ -10,12 +10,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.improving.candidate import Candidate, Trial
-from sarl_core.improving.movement import POPULATION, Parameters, evolution_strategy, ranks
+from sarl_core.improving.movement import POPULATION, Movement
 from sarl_core.improving.questions import answered, ask, scores
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
@@ -28,27 +29,32 @@ from sarl_core.rollouts.choices import mean_score
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.shield import Shield
 
-GENERATIONS = 10  # between two changes of the shape
 EPISODES = 16  # for each neighbour, the same for all of a generation
-MET_EPISODES = 32  # in which it is seen where the rules lead
-NEIGHBOURS = 63  # in shape
-SHAPE_EPISODES = 128  # for the best of them
 
+_MET_EPISODES = 32  # in which it is seen where the rules lead
 _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
+_NEIGHBOURS = 60  # in shape
+_SHAPE_EPISODES = 64  # for the best of them
+_SHAPES = 3  # that are moved: which has most in it is not seen before
+_EARLY = 4  # generations for each of them
+_LATE = 8  # further ones for the best
+_COMPARED_EPISODES = 128  # by which it is the best
+GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
 
 
-def refinement_cost(generations: int) -> int:
+def refinement_cost(turns: int) -> int:
     """Most episodes of a refinement."""
-    turns = -(-generations // GENERATIONS)
-    shape = MET_EPISODES + planned_episodes(NEIGHBOURS + 1, EPISODES, SHAPE_EPISODES)
-    return turns * shape + generations * POPULATION * EPISODES
+    shapes = planned_episodes(_NEIGHBOURS + 2, EPISODES, _SHAPE_EPISODES)
+    compared = planned_episodes(_SHAPES + 1, EPISODES, _COMPARED_EPISODES)
+    moved = GENERATIONS * POPULATION * EPISODES
+    return turns * (_MET_EPISODES + shapes + moved + compared)
 
 
-def refinement_seeds(generations: int) -> int:
+def refinement_seeds(turns: int) -> int:
     """Most seeds of a refinement: all that are compared play the same episodes."""
-    turns = -(-generations // GENERATIONS)
-    return turns * (MET_EPISODES + SHAPE_EPISODES) + generations * EPISODES
+    compared = _MET_EPISODES + _SHAPE_EPISODES + _COMPARED_EPISODES
+    return turns * (compared + GENERATIONS * EPISODES)
 
 
 class Refinement:
@@ -83,7 +89,10 @@ class Refinement:
             executor: Whose processes they are; this machine's where not given.
         """
         self.here = Candidate.of_trees(trees)
+        self._compared = self.here
         self._start = pairs
+        self._progress: Progress | None = None
+        self._done = self._total = 0
         self._trial, self._expert = trial, expert
         self._combined, self._max_rules = combined, max_rules
         self._next, self._generator = first, np.random.default_rng(seed)
@@ -91,7 +100,7 @@ class Refinement:
 
     def run(
         self,
-        generations: int,
+        turns: int,
         *,
         progress: Progress | None = None,
         better: Callable[[Candidate], None] | None = None,
@@ -99,70 +108,55 @@ class Refinement:
         """Search.
 
         Args:
-            generations: In how many steps thresholds are moved, in all.
+            turns: How often the shape is changed, and thresholds are moved.
             progress: Called with (episodes done, in all); returning False stops.
-            better: Called with where the search has come to whenever the neighbours there
-                achieved more than those anywhere before, the start included; so that something
-                is there when the way is not gone to its end.
+            better: Called with what a turn has come to, so that something is there when the
+                way is not gone to its end.
 
         Returns:
-            Where it stood after each turn of shape and thresholds. Which is best is not known:
-            choose by episodes.
+            Where it stood after each turn. Which is best is not known: choose by episodes.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
             CancelledError: If `progress` returned False.
         """
-        total, done = refinement_cost(generations), 0
-        most: tuple[float, ...] = ()
+        self._progress, self._total = progress, refinement_cost(turns)
         marks = []
-        for turn in range(0, generations, GENERATIONS):
-            met = self._met()
-            self._shape(met)
-            done += refinement_cost(1) - POPULATION * EPISODES
-            report(progress, done, total)
-            pairs = met.pairs.deriving(self.here.derived)
-            parameters = Parameters.of(self.here.trees(pairs, self._trial.divider), pairs)
-            strategy = evolution_strategy(parameters.count, int(self._generator.integers(2**31)))
-            for _ in range(min(GENERATIONS, generations - turn)):
-                points = strategy.ask()
-                moved = [parameters.candidate(point) for point in points]
-                means = np.array([mean_score(one) for one in self._scores(moved, pairs)])
-                if (mean := mean_score(means)) > most:
-                    if most and better is not None:
-                        better(self.here)
-                    most = mean
-                strategy.tell(points, -ranks(means))  # which follows the least
-                self.here = parameters.candidate(strategy.mean)
-                done += POPULATION * EPISODES
-                report(progress, done, total)
+        for turn in range(1, turns + 1):
+            self._turn()
+            self._tell(refinement_cost(turn) - self._done)  # some had fewer neighbours
             marks.append(self.here)
+            if better is not None:
+                better(self.here)
         return marks
 
-    def _take(self, episodes: int) -> int:
-        """Seed of episodes that are used for nothing else."""
-        self._next += episodes
-        return self._next - episodes
-
-    def _scores(self, tried: Sequence[Candidate], pairs: Demonstrations) -> list[np.ndarray]:
-        return self._trial.scores(
-            tried, pairs, seed=self._take(EPISODES), episodes=EPISODES, workers=self._workers
-        )
+    def _turn(self) -> None:
+        """Change the shape, if that is better, and move the thresholds."""
+        met = self._met()
+        moving = [self._movement(shape, met) for shape in self._shapes(met)]
+        for one in moving:
+            self._move(one, _EARLY, met)
+        compared = [self.here, *(one.here for one in moving)]
+        best = self._ranking(compared, met, _COMPARED_EPISODES)[0]
+        self._compared = compared[best]
+        one = moving[best - 1] if best else self._movement(self.here, met)
+        self._move(one, _LATE, met)
+        self.here = one.here
 
     def _met(self) -> MetStates:
         """Where the rules lead now, and what the expert says there."""
-        seed = self._take(MET_EPISODES)
         rules = leaf_rules(self.here.trees(self._start, self._trial.divider))
         played = rollout(
             self._trial.env_id,
             self._trial.agent,
             shield=Shield(rules, projection=self._trial.projection),
-            episodes=MET_EPISODES,
-            seed=seed,
+            episodes=_MET_EPISODES,
+            seed=self._take(_MET_EPISODES),
             keep_steps=True,
             max_steps=self._trial.max_steps,
             executor=self._workers,
         )
+        self._tell(_MET_EPISODES)
         table = played.steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
@@ -179,8 +173,7 @@ class Refinement:
         )
         offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
         # What the trees ask about stands first, where they look for it.
-        derived = dict.fromkeys([*self.here.derived, *offered])
-        pairs = pairs.deriving(list(derived))
+        pairs = pairs.deriving(list(dict.fromkeys([*self.here.derived, *offered])))
         return MetStates(pairs, scores(self._expert, pairs.raw_observations))
 
     def _some_pairs(self) -> list[Pair]:
@@ -190,34 +183,63 @@ class Refinement:
         chosen = self._generator.choice(len(self._combined), _PAIRS, replace=False)
         return [self._combined[place] for place in np.sort(chosen).tolist()]
 
-    def _shape(self, met: MetStates) -> None:
-        """Go to the best of the neighbours in shape, if it is better."""
+    def _shapes(self, met: MetStates) -> list[Candidate]:
+        """The likeliest shapes: what there is, and its neighbours."""
         trees = [
             count_tree(structure, met.pairs, index, divider=self._trial.divider)
             for index, structure in enumerate(self.here.structures)
         ]
-        tried = [
-            self.here,
-            *neighbours(
-                trees,
-                met,
-                max_rules=self._max_rules,
-                count=NEIGHBOURS,
-                generator=self._generator,
-            ),
-        ]
-        first = self._take(SHAPE_EPISODES)
-        chosen = successive_halving(
-            len(tried),
-            lambda left, seed, count: self._trial.scores(
-                [tried[place] for place in left],
-                met.pairs,
-                seed=seed,
-                episodes=count,
-                workers=self._workers,
-            ),
-            seed=first,
-            first=EPISODES,
-            most=SHAPE_EPISODES,
+        others = neighbours(
+            trees,
+            met,
+            max_rules=self._max_rules,
+            count=_NEIGHBOURS,
+            generator=self._generator,
         )
-        self.here = tried[chosen.best]
+        # What was best before it was moved further on, too: it may have been led astray.
+        before = [self._compared] if self._compared is not self.here else []
+        tried = [self.here, *before, *others]
+        return [tried[one] for one in self._ranking(tried, met, _SHAPE_EPISODES)[:_SHAPES]]
+
+    def _ranking(self, tried: Sequence[Candidate], met: MetStates, episodes: int) -> Sequence[int]:
+        """Candidates by what they achieve, the best first."""
+
+        def achieved(left: Sequence[int], seed: int, count: int) -> list[NDArray[np.float64]]:
+            return self._scores([tried[place] for place in left], met, seed=seed, episodes=count)
+
+        first = self._take(episodes)
+        return successive_halving(
+            len(tried), achieved, seed=first, first=EPISODES, most=episodes
+        ).ranking
+
+    def _movement(self, candidate: Candidate, met: MetStates) -> Movement:
+        pairs = met.pairs.deriving(candidate.derived)
+        trees = candidate.trees(pairs, self._trial.divider)
+        return Movement(trees, pairs, seed=int(self._generator.integers(2**31)))
+
+    def _move(self, movement: Movement, generations: int, met: MetStates) -> None:
+        """Move thresholds in the direction that brings more."""
+        for _ in range(generations if movement.count else 0):
+            achieved = self._scores(
+                movement.ask(), met, seed=self._take(EPISODES), episodes=EPISODES
+            )
+            movement.tell(np.array([mean_score(one) for one in achieved]))
+
+    def _scores(
+        self, tried: Sequence[Candidate], met: MetStates, *, seed: int, episodes: int
+    ) -> list[NDArray[np.float64]]:
+        """What each candidate achieves in the same episodes."""
+        achieved = self._trial.scores(
+            tried, met.pairs, seed=seed, episodes=episodes, workers=self._workers
+        )
+        self._tell(len(tried) * episodes)
+        return achieved
+
+    def _take(self, episodes: int) -> int:
+        """Seed of episodes that are used for nothing else."""
+        self._next += episodes
+        return self._next - episodes
+
+    def _tell(self, episodes: int) -> None:
+        self._done += episodes
+        report(self._progress, self._done, self._total)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,9 @@ from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
 _FEWEST = 20  # states of a leaf that a query may be looked for in
 _LEAST = 5  # of them on either side
 _THRESHOLDS = 60  # of each feature that are looked at
-_QUERIES_A_LEAF = 2  # of different features, so that the other leaves have their turn
+_AT_ONCE = 2  # queries of a leaf before the other leaves have their turn
 _OFFERED = 0.6  # of the features to each leaf, so that not the same ones are always first
 _MERGED = 6  # trees with a query less in which new ones are looked for
-_NEW_QUERIES = 8  # in each of them
 _FURTHER = 2  # neighbouring intervals that a leaf may say instead
 
 
@@ -97,7 +96,8 @@ def neighbours(
                 return
             both = [*structures[:index], changed, *structures[index + 1 :]]
             candidate = Candidate.of(both, met.pairs.derived, observed=observed)
-            if (key := _key(candidate.structures)) not in known:
+            asks = any(len(one.feature) > 1 for one in candidate.structures)
+            if asks and (key := _key(candidate.structures)) not in known:
                 known.add(key)
                 result.append(candidate)
                 most -= 1
@@ -114,7 +114,12 @@ def _key(structures: Sequence[TreeStructure]) -> tuple[bytes, ...]:
     return tuple(
         np.asarray(values).tobytes()
         for one in structures
-        for values in (one.feature, one.threshold, one.label)
+        # What is said at queries is never heard.
+        for values in (
+            one.feature,
+            one.threshold,
+            np.where(one.feature == LEAF, np.asarray(one.label), LEAF),
+        )
     )
 
 
@@ -178,10 +183,12 @@ def _with_another_query(
         for index, structure in enumerate(structures)
         if (structure.feature == LEAF).sum() < max_rules
     ]
+    ways = []
     for index, structure in room + less:
         queries = _queries(structure, trees[index].dimension, index, met, generator)
-        for query in sorted(queries, key=lambda query: -query.gain)[:_NEW_QUERIES]:
-            yield index, _split(structure, query)
+        ways.append([(index, _split(structure, query)) for query in queries])
+    for abreast in zip_longest(*ways):
+        yield from (one for one in abreast if one is not None)
 
 
 def _merged(structure: TreeStructure, node: int, child: int) -> TreeStructure:
@@ -222,12 +229,13 @@ def _queries(
     index: int,
     met: MetStates,
     generator: np.random.Generator,
-) -> Iterator[_Query]:
-    """For each leaf the best queries of different features, of a half of all that there are."""
+) -> list[_Query]:
+    """The best queries of different features, the very best of each leaf first."""
     pairs = met.pairs
     wishes = _wishes(met, dimension, index)
     kinds = [feature.derived for feature in pairs.features]
     reached = structure.apply(pairs.observations)
+    result: list[tuple[int, _Query]] = []
     for leaf in np.unique(reached).tolist():
         rows = np.flatnonzero(reached == leaf)
         if len(rows) < _FEWEST:
@@ -245,7 +253,8 @@ def _queries(
             # Of a pair of features only the best ratio.
             kind = derived.features if isinstance(derived, Combination) else query.feature
             of_kind.setdefault(kind, query)
-        yield from list(of_kind.values())[:_QUERIES_A_LEAF]
+        result += [(place // _AT_ONCE, query) for place, query in enumerate(of_kind.values())]
+    return [query for _, query in sorted(result, key=lambda one: (one[0], -one[1].gain))]
 
 
 def _wishes(met: MetStates, dimension: LabelledDimension, index: int) -> NDArray[np.float64]:

@@ -20,14 +20,19 @@ class Selection:
     """How the best candidate was found.
 
     Attributes:
-        best: Its index.
+        ranking: All of them, the best first; who left early stands behind who stayed.
         means: Mean return of each candidate over the episodes it was given, (K,).
         episodes: How many each was given, (K,) int64.
     """
 
-    best: int
+    ranking: tuple[int, ...]
     means: NDArray[np.float64]
     episodes: NDArray[np.int64]
+
+    @property
+    def best(self) -> int:
+        """Index of the best one."""
+        return self.ranking[0]
 
 
 def planned_episodes(candidates: int, first: int, most: int) -> int:
@@ -79,7 +84,7 @@ def successive_halving(
     def means(candidate: int) -> tuple[float, ...]:
         return mean_score(np.concatenate(scored[candidate]))
 
-    left: Sequence[int] = range(candidates)
+    left, behind = list(range(candidates)), list[int]()
     given = 0
     while given < most:
         new = min(max(first, given), most - given)
@@ -87,9 +92,10 @@ def successive_halving(
             scored[candidate].append(scores.reshape(len(scores), -1))
         given += new
         ranked = sorted(left, key=means, reverse=True)  # of equals, the first stays first
-        left = ranked[: max(1, (len(ranked) + 1) // 2)]
+        stay = max(1, (len(ranked) + 1) // 2)
+        left, behind = ranked[:stay], ranked[stay:] + behind
     return Selection(
-        best=left[0],
+        ranking=(*left, *behind),
         means=np.array([means(candidate)[-1] for candidate in range(candidates)]),
         episodes=np.array([sum(map(len, one)) for one in scored], dtype=np.int64),
     )

@@ -193,7 +193,7 @@ class _ImprovementRun:
             return f"Round {finished + 1} of {plan.rounds}: the rules act, the expert answers"
         if self.job.done > self.job.total - plan.report:
             return "The best rules on fresh episodes"
-        if plan.generations:
+        if plan.turns:
             return "Choosing the best round and refining its rules"
         return "Choosing the best round on other episodes"
 

@@ -75,7 +75,7 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
         episodes=choices.episodes,
         thresholds=thresholds,
         divider=choices.divider,
-        generations=choices.refinement,
+        turns=choices.refinement,
         validation=choices.validation,
         seed=choices.seed,
         choose=choices.choose,

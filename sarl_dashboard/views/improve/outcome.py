@@ -72,7 +72,7 @@ def show_report(outcome: Outcome, improved: Aggregation) -> None:
     """What the best rules achieve, in plain words."""
     rules = improved.rule_set
     size = size_text([len(rules.of_dimension(index)) for index in range(len(rules.actions))])
-    steps = counted(improved.plan.generations, "step")
+    steps = counted(improved.plan.turns, "turn")
     refined = f", refined in {steps}" if improved.refined else ""
     if improved.reported is None:
         st.markdown(

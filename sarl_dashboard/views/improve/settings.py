@@ -9,7 +9,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
-from sarl_core.improving.refinement import GENERATIONS, refinement_cost
+from sarl_core.improving.refinement import refinement_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_dashboard.components.settings import environment_choice
@@ -132,14 +132,14 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     "is reported on other episodes.",
                 )
                 refinement = number(
-                    "Refinement steps",
+                    "Refinement turns",
                     "refine",
                     0,
                     MOST,
                     0,
                     "Afterwards the rules' queries, numbers and actions are changed to where they "
-                    f"achieve more, so many times. {GENERATIONS} steps take "
-                    f"{refinement_cost(GENERATIONS):,} episodes. 0: not at all.",
+                    f"achieve more, so many times. Each turn takes up to "
+                    f"{refinement_cost(1):,} episodes. 0: not at all.",
                 )
             seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
             if not demonstrations.is_discrete:

@@ -80,7 +80,7 @@ class ShippedCard(Struct):
     rules_per_dimension: list[Count]
     chosen_round: Count
     refined: bool
-    generations: Count
+    turns: Count
     reported: Reported | None
 
 
@@ -109,7 +109,7 @@ def show_card(document: dict[str, Any]) -> None:
 def card_sentence(card: ShippedCard) -> str:
     """What the rules of a card achieve, for Markdown."""
     size = size_text(card.rules_per_dimension)
-    afterwards = f", refined in {counted(card.generations, 'step')} afterwards" * card.refined
+    afterwards = f", refined in {counted(card.turns, 'turn')} afterwards" * card.refined
     origin = f"They are those of round {card.chosen_round}{afterwards}."
     reported = card.reported
     if reported is None:
