@@ -280,7 +280,7 @@ class _Run:
         refined = 0
         if plan.turns:
             refined = refinement_cost(plan.turns) + planned_episodes(
-                plan.turns + 1, _first_validation(plan), plan.validation
+                2 * plan.turns + 1, _first_validation(plan), plan.validation
             )
         return (
             plan.rounds * plan.episodes

@@ -36,7 +36,7 @@ _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
 _NEIGHBOURS = 60  # in shape
 _SHAPE_EPISODES = 64  # for the best of them
-_SHAPES = 3  # that are moved: which has most in it is not seen before
+_SHAPES = 4  # that are moved: which has most in it is not seen before
 _EARLY = 4  # generations for each of them
 _LATE = 8  # further ones for the best
 _COMPARED_EPISODES = 128  # by which it is the best
@@ -45,8 +45,8 @@ GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
 
 def refinement_cost(turns: int) -> int:
     """Most episodes of a refinement."""
-    shapes = planned_episodes(_NEIGHBOURS + 2, EPISODES, _SHAPE_EPISODES)
-    compared = planned_episodes(_SHAPES + 1, EPISODES, _COMPARED_EPISODES)
+    shapes = planned_episodes(_NEIGHBOURS, EPISODES, _SHAPE_EPISODES)
+    compared = planned_episodes(_SHAPES + 2, EPISODES, _COMPARED_EPISODES)
     moved = GENERATIONS * POPULATION * EPISODES
     return turns * (_MET_EPISODES + shapes + moved + compared)
 
@@ -110,11 +110,12 @@ class Refinement:
         Args:
             turns: How often the shape is changed, and thresholds are moved.
             progress: Called with (episodes done, in all); returning False stops.
-            better: Called with what a turn has come to, so that something is there when the
-                way is not gone to its end.
+            better: Called with what achieved more than what was there before, in the same
+                episodes; so that something is there when the way is not gone to its end.
 
         Returns:
-            Where it stood after each turn. Which is best is not known: choose by episodes.
+            Two for each turn, what was best in it and where its thresholds were moved then.
+            Which is best of all is not known: choose by episodes.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
@@ -123,11 +124,12 @@ class Refinement:
         self._progress, self._total = progress, refinement_cost(turns)
         marks = []
         for turn in range(1, turns + 1):
+            before = self.here
             self._turn()
             self._tell(refinement_cost(turn) - self._done)  # some had fewer neighbours
-            marks.append(self.here)
-            if better is not None:
-                better(self.here)
+            marks += [self._compared, self.here]
+            if better is not None and self._compared is not before:
+                better(self._compared)
         return marks
 
     def _turn(self) -> None:
@@ -136,10 +138,13 @@ class Refinement:
         moving = [self._movement(shape, met) for shape in self._shapes(met)]
         for one in moving:
             self._move(one, _EARLY, met)
-        compared = [self.here, *(one.here for one in moving)]
+        # What was best before it was moved further on, too: it may have been led astray.
+        unmoved = [self.here] if self._compared is self.here else [self.here, self._compared]
+        compared = [*unmoved, *(one.here for one in moving)]
         best = self._ranking(compared, met, _COMPARED_EPISODES)[0]
         self._compared = compared[best]
-        one = moving[best - 1] if best else self._movement(self.here, met)
+        place = best - len(unmoved)
+        one = moving[place] if place >= 0 else self._movement(self._compared, met)
         self._move(one, _LATE, met)
         self.here = one.here
 
@@ -184,7 +189,7 @@ class Refinement:
         return [self._combined[place] for place in np.sort(chosen).tolist()]
 
     def _shapes(self, met: MetStates) -> list[Candidate]:
-        """The likeliest shapes: what there is, and its neighbours."""
+        """The likeliest neighbours in shape."""
         trees = [
             count_tree(structure, met.pairs, index, divider=self._trial.divider)
             for index, structure in enumerate(self.here.structures)
@@ -196,10 +201,9 @@ class Refinement:
             count=_NEIGHBOURS,
             generator=self._generator,
         )
-        # What was best before it was moved further on, too: it may have been led astray.
-        before = [self._compared] if self._compared is not self.here else []
-        tried = [self.here, *before, *others]
-        return [tried[one] for one in self._ranking(tried, met, _SHAPE_EPISODES)[:_SHAPES]]
+        if not others:
+            return []
+        return [others[one] for one in self._ranking(others, met, _SHAPE_EPISODES)[:_SHAPES]]
 
     def _ranking(self, tried: Sequence[Candidate], met: MetStates, episodes: int) -> Sequence[int]:
         """Candidates by what they achieve, the best first."""

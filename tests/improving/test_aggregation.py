@@ -14,7 +14,6 @@ from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
-from sarl_core.improving.refinement import _ranks, refine
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
@@ -117,42 +116,6 @@ def test_progress_counts_up_to_the_end(cart, small):
     assert len({total for _, total in told}) == 1
 
 
-def test_refinement_follows_the_returns(cart):
-    """Thresholds made wrong on purpose are moved back to where they serve."""
-    trees = grow_budgeted_trees(cart, max_rules=2)
-    rules = leaf_rules(trees)
-    before = mean_return(rules)
-    marks = refine(
-        CART,
-        trees,
-        cart,
-        agent=make_agent("novice", CART),
-        generations=4,
-        marks=2,
-        seed=0,
-    )
-    assert len(marks) == 2
-    assert [len(one) for one in marks] == [1, 1]
-    moved = marks[-1][0]
-    assert moved.feature.tolist() == trees[0].feature.tolist()
-    assert moved.threshold[0] != trees[0].threshold[0]
-    assert mean_return(leaf_rules(marks[-1])) > before - 5
-
-
-def test_where_all_do_alike_nothing_is_followed():
-    assert _ranks(np.array([[3.0], [1.0], [2.0]])).tolist() == [0.5, -0.5, 0.0]
-    assert np.allclose(_ranks(np.full((6, 1), 500.0)), 0.0)
-    tied = _ranks(np.array([[1.0], [7.0], [7.0], [0.0]]))
-    assert tied[1] == tied[2] > tied[0] > tied[3]
-    # Failures before returns.
-    both = _ranks(np.array([[-0.5, 9.0], [0.0, 1.0], [0.0, 2.0]]))
-    assert both.tolist() == [-0.5, 0.0, 0.5]
-
-
-def mean_return(rules: RuleSet) -> float:
-    return float(rollout(CART, "novice", shield=Shield(rules), episodes=32, seed=77).returns.mean())
-
-
 def test_the_card_says_how_the_rules_came_about(found, tmp_path):
     written, card = save_aggregation(found, tmp_path / "rules.json", command="typed so")
     assert written == tmp_path / "rules.json"
@@ -173,8 +136,8 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"rounds": 1_001}, "the number of rounds is 1,001; give 1,000 or fewer"),
         ({"episodes": 10_001}, "the number of episodes a round is 10,001; give 10,000 or fewer"),
         ({"validation": 500_001}, "validation episodes is 500,001; give 500,000 or fewer"),
-        ({"generations": 10**6}, "the number of generations is 1,000,000; give"),
-        ({"generations": -1}, "the number of generations is -1"),
+        ({"turns": 10**6}, "the number of turns is 1,000,000; give"),
+        ({"turns": -1}, "the number of turns is -1"),
         ({"seed": -1}, "the seed is -1"),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 
 from sarl_core import RuleSet, WorkError, load_demonstrations
 from sarl_core.agents.agent import EXPERT_FOLDER
-from sarl_core.improving import aggregation, refinement
+from sarl_core.improving import aggregation, candidate, movement, refinement
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
@@ -20,7 +20,7 @@ from sarl_core.mining.envelope import with_boxes
 from sarl_core.progress import CancelledError
 
 PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=32, report=8)
-REFINED = Plan(max_rules=4, rounds=1, episodes=4, validation=4, report=3, generations=2, seed=3)
+REFINED = Plan(max_rules=4, rounds=1, episodes=4, validation=4, report=3, turns=1, seed=3)
 SEEDS = ("rounds", "validation", "refinement", "second_validation", "report")
 
 
@@ -38,8 +38,20 @@ def finished(cart):
 @pytest.fixture
 def small_search(monkeypatch):
     """A refinement of few episodes."""
-    monkeypatch.setattr(refinement, "PAIRS", 2)
-    monkeypatch.setattr(refinement, "EPISODES", 3)
+    monkeypatch.setattr(movement, "POPULATION", 4)
+    for name, number in {
+        "POPULATION": 4,
+        "EPISODES": 2,
+        "_MET_EPISODES": 3,
+        "_NEIGHBOURS": 3,
+        "_SHAPE_EPISODES": 3,
+        "_SHAPES": 2,
+        "_EARLY": 1,
+        "_LATE": 1,
+        "_COMPARED_EPISODES": 4,
+        "GENERATIONS": 3,
+    }.items():
+        monkeypatch.setattr(refinement, name, number)
 
 
 @pytest.fixture
@@ -57,7 +69,7 @@ def calls(monkeypatch):
 
         monkeypatch.setattr(module, "rollout", recorded)
 
-    for module in (aggregation, refinement):
+    for module in (aggregation, refinement, candidate):
         spy(module)
     return found
 
@@ -77,12 +89,12 @@ def stop_in(monkeypatch, part):
 @pytest.mark.parametrize("seed", [0, 3])
 def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatch, seed):
     monkeypatch.setattr(aggregation, "_FIRST_VALIDATION", 2)
-    plan = Plan(4, rounds=2, episodes=3, validation=5, generations=2, report=5, seed=seed)
+    plan = Plan(4, rounds=2, episodes=3, validation=5, turns=1, report=5, seed=seed)
     found = aggregate(cart, plan)
-    searched = [index for index, (module, *_) in enumerate(calls) if module is refinement]
+    searched = [index for index, (module, *_) in enumerate(calls) if module is not aggregation]
     *others, (_, _, report) = calls
     parts = {
-        "rounds": [seeds for _, keeps, seeds in others if keeps],
+        "rounds": [seeds for module, keeps, seeds in others if keeps and module is aggregation],
         "validation": [s for _, keeps, s in others[: searched[0]] if not keeps],
         "refinement": [calls[index][2] for index in searched],
         "second_validation": [s for _, _, s in others[searched[-1] + 1 :]],
@@ -91,9 +103,9 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     used = {name: {one for part in ranges for one in part} for name, ranges in parts.items()}
     assert sum(map(len, used.values())) == len(set.union(*used.values()))
     assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
-    # None of the rounds shares an episode with another, nor any step of the search.
+    # None of the rounds shares an episode with another, nor any part of the search.
     assert len(used["rounds"]) == 2 * 3
-    assert len(used["refinement"]) == 2 * 3
+    assert len(used["refinement"]) == refinement.refinement_seeds(1) == 3 + 3 + 4 + 3 * 2
     assert len(used["report"]) == 5
     # And the record says where each begins.
     assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}
@@ -157,58 +169,50 @@ def test_ctrl_c_in_the_report_keeps_the_refinement(cart, small_search, monkeypat
     assert card["seeds"] == {
         "rounds": 23_000_000,
         "validation": 33_000_000,
-        "refinement": 43_000_003,  # three episodes a generation, counted from 1
+        "refinement": 43_000_000,
         "second_validation": 33_500_000,
         "report": None,
     }
 
 
-def returning(monkeypatch, means):
-    """Let the generations of a search bring these means, whatever is played."""
-    asked = []
+def stopped_after(monkeypatch, turns):
+    """Ctrl-C in a search, after so many turns of it."""
+    whole = refinement.Refinement._turn
+    done = []
 
-    def mean_scores(*arguments):
-        asked.append(arguments)
-        generation = (len(asked) - 1) // (2 * refinement.PAIRS)
-        if generation == len(means):
+    def interrupted(search):
+        if len(done) == turns:
             raise KeyboardInterrupt
-        return (means[generation],)
+        whole(search)
+        done.append(search._compared)
 
-    monkeypatch.setattr(refinement, "_mean_scores", mean_scores)
+    monkeypatch.setattr(refinement.Refinement, "_turn", interrupted)
+    return done
 
 
 def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     cart, small_search, monkeypatch, tmp_path
 ):
-    points = []
-    better = refinement.refine
-
-    def watched(*arguments, **named):
-        told = named["better"]
-        named["better"] = lambda trees: (points.append(trees), told(trees))
-        return better(*arguments, **named)
-
-    monkeypatch.setattr(aggregation, "refine", watched)
-    returning(monkeypatch, [100.0, 90.0, 130.0, 120.0])
-    stopped = aggregate(cart, replace(REFINED, generations=8))
-    assert len(points) == 1  # the third generation was better than the first, no other
+    points = stopped_after(monkeypatch, 2)
+    stopped = aggregate(cart, replace(REFINED, turns=8))
     assert stopped.refined
-    assert stopped.rule_set == with_boxes(leaf_rules(points[0]), stopped.demonstrations)
+    best = points[-1].trees(stopped.demonstrations, 2)
+    assert stopped.rule_set == with_boxes(leaf_rules(best), stopped.demonstrations)
     assert all(rule.box for rule in stopped.rule_set.rules if rule.samples)
     assert stopped.validation_mean is None
     card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
     assert card["refined"]
     assert card["seeds"]["validation"] == 33_000_000
-    assert card["seeds"]["refinement"] == 43_000_003
+    assert card["seeds"]["refinement"] == 43_000_000
     assert card["seeds"]["second_validation"] is card["seeds"]["report"] is None
     assert "then by those of a refinement that was not finished" in card["chosen_by"]
 
 
-def test_stopped_in_a_refinement_that_brought_nothing_the_choice_stands(
+def test_stopped_in_a_refinement_before_anything_came_of_it_the_choice_stands(
     cart, small_search, monkeypatch
 ):
-    returning(monkeypatch, [100.0, 90.0])
-    stopped = aggregate(cart, replace(REFINED, generations=8))
+    stopped_after(monkeypatch, 0)
+    stopped = aggregate(cart, replace(REFINED, turns=8))
     assert not stopped.refined
     assert stopped.validation_mean is not None
     assert stopped.seeds.validation == 33_000_000

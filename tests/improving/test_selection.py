@@ -8,19 +8,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
-from sarl_core.progress import CancelledError
 
 
 def noisy(means, spread=1.0):
     """Candidates whose episode of a seed is always the same."""
 
-    def score(candidate, first, count):
+    def score(candidates, first, count):
         assert count > 0
-        draws = [
-            np.random.default_rng([candidate, seed]).normal()
-            for seed in range(first, first + count)
+        return [
+            means[candidate]
+            + spread
+            * np.array(
+                [
+                    np.random.default_rng([candidate, seed]).normal()
+                    for seed in range(first, first + count)
+                ]
+            )
+            for candidate in candidates
         ]
-        return means[candidate] + spread * np.array(draws)
 
     return score
 
@@ -38,14 +43,12 @@ def test_the_best_of_many_is_found_although_single_episodes_deceive():
 @given(st.integers(1, 30), st.integers(1, 20), st.integers(1, 90))
 def test_the_plan_is_what_is_run(candidates, first, most):
     calls = []
-    found = successive_halving(
-        candidates,
-        lambda candidate, seed, count: np.full(count, float(candidate)),
-        seed=5,
-        first=first,
-        most=most,
-        finished=calls.append,
-    )
+
+    def score(left, seed, count):
+        calls.append(len(left) * count)
+        return [np.full(count, float(candidate)) for candidate in left]
+
+    found = successive_halving(candidates, score, seed=5, first=first, most=most)
     assert sum(calls) == planned_episodes(candidates, first, most)
     assert found.best == candidates - 1
     assert found.episodes[found.best] == most
@@ -55,30 +58,36 @@ def test_the_plan_is_what_is_run(candidates, first, most):
 def test_all_are_given_the_same_seeds_and_none_twice():
     seen: dict[int, list[int]] = {}
 
-    def score(candidate, first, count):
-        seen.setdefault(candidate, []).extend(range(first, first + count))
-        return np.zeros(count)
+    def score(candidates, first, count):
+        for candidate in candidates:
+            seen.setdefault(candidate, []).extend(range(first, first + count))
+        return [np.zeros(count) for _ in candidates]
 
     successive_halving(5, score, seed=100, first=4, most=32)
     for seeds in seen.values():
         assert seeds == list(range(100, 100 + len(seeds)))
 
 
-def test_it_can_be_stopped():
-    def finished(_):
-        raise CancelledError("stopped")
-
-    with pytest.raises(CancelledError):
-        successive_halving(3, noisy([0, 1, 2]), seed=0, finished=finished)
+def test_who_stayed_longer_stands_before_who_left():
+    found = successive_halving(7, noisy([3.0, 9, 1, 7, 0, 5, 2], 0.0), seed=0, first=2, most=8)
+    assert found.ranking == (1, 3, 5, 0, 6, 2, 4)
+    assert found.episodes[list(found.ranking)].tolist() == [8, 8, 4, 4, 2, 2, 2]
 
 
 def test_failures_come_first_and_the_return_second():
     """Of those that fail least often the one with the highest return, whatever others bring."""
     failing, returns = [0.5, 0.0, 0.0, 0.1], [900.0, 1.0, 2.0, 50.0]
 
-    def score(candidate, first, count):
-        fails = np.arange(first, first + count) % 10 < 10 * failing[candidate]
-        return np.column_stack([-fails.astype(float), np.full(count, returns[candidate])])
+    def score(candidates, first, count):
+        return [
+            np.column_stack(
+                [
+                    -(np.arange(first, first + count) % 10 < 10 * failing[one]).astype(float),
+                    np.full(count, returns[one]),
+                ]
+            )
+            for one in candidates
+        ]
 
     found = successive_halving(4, score, seed=0, first=10, most=40)
     assert found.best == 2

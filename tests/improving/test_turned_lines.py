@@ -9,8 +9,8 @@ import numpy as np
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.improving.aggregation import aggregate
+from sarl_core.improving.movement import Parameters
 from sarl_core.improving.plan import Plan
-from sarl_core.improving.refinement import _Parameters
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.combining.queries import trees_over_used
@@ -50,8 +50,8 @@ def test_trees_over_what_they_ask_about_send_every_state_where_it_went() -> None
 
 def test_nothing_moved_is_the_tree_itself() -> None:
     pairs, trees = grown()
-    parameters = _Parameters.of(trees, pairs)
-    (again,) = parameters.candidate(parameters.start()).trees(pairs, 2)
+    parameters = Parameters.of(trees, pairs)
+    (again,) = parameters.candidate(np.zeros(parameters.count)).trees(pairs, 2)
     np.testing.assert_array_equal(again.threshold, trees[0].threshold)
     np.testing.assert_array_equal(again.feature, trees[0].feature)
     np.testing.assert_array_equal(again.label, trees[0].label)
@@ -59,9 +59,9 @@ def test_nothing_moved_is_the_tree_itself() -> None:
 
 def test_a_line_turns_around_the_middle_of_what_reaches_it() -> None:
     pairs, trees = grown()
-    parameters = _Parameters.of(trees, pairs)
+    parameters = Parameters.of(trees, pairs)
     line = parameters.lines[0][0]
-    values = parameters.start()
+    values = np.zeros(parameters.count)
     queries = int((trees[0].feature != LEAF).sum())
     values[queries] = 0.3  # the first ratio stands behind the thresholds
     moved = parameters.candidate(values)
@@ -80,7 +80,7 @@ def test_a_refined_run_derives_what_its_rules_ask_about_and_nothing_else() -> No
         max_rules=8,
         rounds=1,
         episodes=2,
-        generations=1,
+        turns=1,
         validation=2,
         report=2,
         combined=((2, 3), (1, 3)),

@@ -1,0 +1,157 @@
+"""Shapes and thresholds are changed to where rules achieve more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, load_demonstrations
+from sarl_core.improving.candidate import Candidate, Trial
+from sarl_core.improving.movement import POPULATION, Movement, ranks
+from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
+from sarl_core.improving.shapes import MetStates, neighbours
+from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.combining.candidates import pairs_of_like_kind
+from sarl_core.mining.tree import LEAF, PolicyTree
+from sarl_core.progress import CancelledError
+from sarl_core.rollouts.choices import mean_score
+from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.trial import make_agent
+from sarl_core.shielding.shield import Shield
+
+CART = "CartPole-v1"
+DATA = Path(__file__).parents[2] / "data" / "demonstrations"
+CARTPOLE = load_demonstrations(DATA / "cartpole.parquet").select(range(4))
+PENDULUM = load_demonstrations(DATA / "pendulum.parquet").select(range(8))
+TRIAL = Trial(CART, make_agent("novice", CART), "centre", 2, "return", None)
+
+
+def neighbours_of(
+    pairs: Demonstrations, rules: int, *, most: int | None = None, divider: int = 2, seed: int = 0
+) -> tuple[tuple[PolicyTree, ...], list[Candidate]]:
+    trees = grow_budgeted_trees(pairs, max_rules=rules, divider=divider)
+    return trees, neighbours(
+        trees,
+        MetStates(pairs, None),
+        max_rules=most or rules,
+        count=60,
+        generator=np.random.default_rng(seed),
+    )
+
+
+@pytest.mark.parametrize(("pairs", "divider"), [(CARTPOLE, 2), (PENDULUM, 16)])
+def test_neighbours_differ_from_each_other_in_one_query_or_label(
+    pairs: Demonstrations, divider: int
+) -> None:
+    (tree,), others = neighbours_of(pairs, 6, divider=divider)
+    said = [tree, *(one.trees(pairs, divider)[0] for one in others)]
+    answers = {one.label[one.apply(pairs.observations)].tobytes() for one in said}
+    assert len(others) > 20
+    assert len(answers) > len(others) / 2  # the others differ where nobody was
+    sizes = {int((one.feature == LEAF).sum()) for one in said[1:]}
+    assert max(sizes) <= 6
+    assert min(sizes) < 6
+    queries = {(int(f), float(t)) for f, t in zip(tree.feature, tree.threshold, strict=True)}
+    for one in said[1:]:
+        own = zip(one.feature.tolist(), one.threshold.tolist(), strict=True)
+        assert len({query for query in own if query not in queries}) <= 1
+
+
+def test_where_there_is_room_a_tree_may_grow() -> None:
+    _, others = neighbours_of(CARTPOLE, 3, most=4)
+    sizes = [int((one.structures[0].feature == LEAF).sum()) for one in others]
+    assert 4 in sizes
+    assert max(sizes) == 4
+
+
+def test_the_first_new_query_meets_the_wishes_best() -> None:
+    """In the place of a single query, the one that scikit-learn finds on the same states."""
+    (tree,), others = neighbours_of(CARTPOLE, 2, seed=3)
+    right = [
+        leaf_rules(one.trees(CARTPOLE, 2)).fidelity
+        for one in others
+        if len(one.structures[0].feature) == 3
+    ]
+    # Of a sixtieth of the borders; scikit-learn looks at all of them, and by Gini.
+    assert max(right) >= leaf_rules([tree]).fidelity - 0.02
+
+
+def test_thresholds_go_to_where_they_bring_more() -> None:
+    """Thresholds made wrong on purpose are moved back to where they serve."""
+    trees = grow_budgeted_trees(CARTPOLE, max_rules=2)
+    before = mean_return(leaf_rules(trees))
+    movement = Movement(trees, CARTPOLE, seed=0)
+    assert movement.count == 1
+    for number in range(4):
+        tried = movement.ask()
+        assert len(tried) == POPULATION
+        achieved = TRIAL.scores(tried, CARTPOLE, seed=number * 8, episodes=8, workers=None)
+        movement.tell(np.array([mean_score(one) for one in achieved]))
+    (moved,) = movement.here.trees(CARTPOLE, 2)
+    assert moved.feature.tolist() == trees[0].feature.tolist()
+    assert moved.threshold[0] != trees[0].threshold[0]
+    assert mean_return(leaf_rules([moved])) > before - 5
+
+
+def test_leaves_of_amounts_move_by_intervals() -> None:
+    trees = grow_budgeted_trees(PENDULUM, max_rules=4, divider=16)
+    movement = Movement(trees, PENDULUM, seed=0)
+    assert movement.count == 3 + 4
+    labels = {
+        tuple(one.structures[0].label[one.structures[0].feature == LEAF].tolist())
+        for one in movement.ask()
+    }
+    assert len(labels) > 5
+    assert all(0 <= label < 16 for one in labels for label in one)
+
+
+def test_where_all_do_alike_nothing_is_followed() -> None:
+    assert ranks(np.array([[3.0], [1.0], [2.0]])).tolist() == [0.5, -0.5, 0.0]
+    assert np.allclose(ranks(np.full((6, 1), 500.0)), 0.0)
+    tied = ranks(np.array([[1.0], [7.0], [7.0], [0.0]]))
+    assert tied[1] == tied[2] > tied[0] > tied[3]
+    # Failures before returns.
+    both = ranks(np.array([[-0.5, 9.0], [0.0, 1.0], [0.0, 2.0]]))
+    assert both.tolist() == [-0.5, 0.0, 0.5]
+
+
+def mean_return(rules) -> float:
+    return float(rollout(CART, "novice", shield=Shield(rules), episodes=32, seed=77).returns.mean())
+
+
+def search(**named) -> Refinement:
+    trees = grow_budgeted_trees(CARTPOLE, max_rules=2)
+    return Refinement(
+        trees,
+        CARTPOLE,
+        TRIAL,
+        expert=make_agent("expert", CART),
+        combined=pairs_of_like_kind(CARTPOLE),
+        max_rules=2,
+        first=1_000,
+        **named,
+    )
+
+
+@pytest.mark.slow
+def test_two_rules_over_two_features_balance_the_pole() -> None:
+    """What CART asks about first is another pair; what achieves more is found."""
+    ticks: list[tuple[int, int]] = []
+    last = search().run(1, progress=lambda done, total: ticks.append((done, total)) or True)[-1]
+    assert ticks[-1] == (refinement_cost(1), refinement_cost(1))
+    assert ticks == sorted(ticks)
+    (derived,) = last.derived
+    assert derived.definition.features == (2, 3)  # angle and angular velocity
+    pairs = CARTPOLE.deriving(last.derived)
+    assert mean_return(leaf_rules(last.trees(pairs, 2))) > 480
+
+
+def test_it_can_be_stopped() -> None:
+    with pytest.raises(CancelledError):
+        search().run(1, progress=lambda done, total: done < 200)
+
+
+def test_the_seeds_of_a_turn_are_counted() -> None:
+    assert refinement_seeds(3) == 3 * refinement_seeds(1) > 0
