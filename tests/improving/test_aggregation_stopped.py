@@ -11,7 +11,7 @@ import pytest
 
 from sarl_core import RuleSet, WorkError, load_demonstrations
 from sarl_core.agents.agent import EXPERT_FOLDER
-from sarl_core.improving import aggregation, candidate, movement, refinement
+from sarl_core.improving import aggregation, candidate, refinement
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
@@ -33,25 +33,6 @@ def cart():
 @pytest.fixture(scope="module")
 def finished(cart):
     return aggregate(cart, PLAN)
-
-
-@pytest.fixture
-def small_search(monkeypatch):
-    """A refinement of few episodes."""
-    monkeypatch.setattr(movement, "POPULATION", 4)
-    for name, number in {
-        "POPULATION": 4,
-        "EPISODES": 2,
-        "_MET_EPISODES": 3,
-        "_NEIGHBOURS": 3,
-        "_SHAPE_EPISODES": 3,
-        "_SHAPES": 2,
-        "_EARLY": 1,
-        "_LATE": 1,
-        "_COMPARED_EPISODES": 4,
-        "GENERATIONS": 3,
-    }.items():
-        monkeypatch.setattr(refinement, name, number)
 
 
 @pytest.fixture

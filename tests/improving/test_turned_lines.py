@@ -75,7 +75,9 @@ def test_a_line_turns_around_the_middle_of_what_reaches_it() -> None:
     np.testing.assert_allclose(border, before, rtol=1e-9, atol=1e-12)
 
 
-def test_a_refined_run_derives_what_its_rules_ask_about_and_nothing_else() -> None:
+def test_a_refined_run_derives_what_its_rules_ask_about_and_nothing_else(
+    small_search: None,
+) -> None:
     plan = Plan(
         max_rules=8,
         rounds=1,
