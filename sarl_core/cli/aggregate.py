@@ -96,7 +96,8 @@ def aggregate(
         int,
         typer.Option(
             "--refine",
-            help="Steps of moving thresholds and actions to where they achieve more; 0 for none.",
+            help="Turns of changing queries and labels, and moving thresholds, to where they "
+            "achieve more; 0 for none.",
         ),
     ] = 0,
     validation: Annotated[

@@ -80,8 +80,9 @@ class ShippedCard(Struct):
     rules_per_dimension: list[Count]
     chosen_round: Count
     refined: bool
-    turns: Count
     reported: Reported | None
+    turns: Count = 0
+    generations: Count = 0  # of a search of thresholds alone, before there were turns
 
 
 def show_card(document: dict[str, Any]) -> None:
@@ -109,7 +110,8 @@ def show_card(document: dict[str, Any]) -> None:
 def card_sentence(card: ShippedCard) -> str:
     """What the rules of a card achieve, for Markdown."""
     size = size_text(card.rules_per_dimension)
-    afterwards = f", refined in {counted(card.turns, 'turn')} afterwards" * card.refined
+    effort = counted(card.turns, "turn") if card.turns else counted(card.generations, "step")
+    afterwards = f", refined in {effort} afterwards" * card.refined
     origin = f"They are those of round {card.chosen_round}{afterwards}."
     reported = card.reported
     if reported is None:
