@@ -20,7 +20,7 @@ from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
-from sarl_core.improving.candidate import Candidate, Trial
+from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as label_scores_of
@@ -415,7 +415,7 @@ class _Run:
         search = Refinement(
             start.trees,
             pairs,
-            Trial(
+            Evaluator(
                 self.env_id,
                 self.agent,
                 projection=plan.projection,

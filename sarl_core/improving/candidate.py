@@ -85,7 +85,7 @@ def structure_of(tree: PolicyTree) -> TreeStructure:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Evaluator:
     """How candidates are tried.
 
     Attributes:
@@ -134,28 +134,28 @@ class Trial:
 
 
 def episode_scores(
-    trial: Trial, candidate: Candidate, few: Demonstrations, seed: int, episodes: int
+    evaluator: Evaluator, candidate: Candidate, few: Demonstrations, seed: int, episodes: int
 ) -> NDArray[np.float64]:
     """What one candidate achieves, (E, c).
 
     Args:
-        trial: How it is tried.
+        evaluator: How it is tried.
         candidate: The trees.
         few: Pairs that rules can be counted over.
         seed: Of the first episode.
         episodes: How many.
     """
-    rules = leaf_rules(candidate.trees(few, trial.divider))
+    rules = leaf_rules(candidate.trees(few, evaluator.divider))
     played = rollout(
-        trial.env_id,
-        trial.agent,
-        shield=Shield(rules, projection=trial.projection),
+        evaluator.env_id,
+        evaluator.agent,
+        shield=Shield(rules, projection=evaluator.projection),
         episodes=episodes,
         seed=seed,
         keep_steps=False,
-        max_steps=trial.max_steps,
+        max_steps=evaluator.max_steps,
     )
-    return scores(played, trial.choose)
+    return scores(played, evaluator.choose)
 
 
 def _first_of(pairs: Demonstrations, most: int) -> Demonstrations:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
-from sarl_core.improving.candidate import Candidate, Trial
+from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement
 from sarl_core.improving.questions import answered, ask, scores
 from sarl_core.improving.shapes import MetStates, neighbours
@@ -64,7 +64,7 @@ class Refinement:
         self,
         trees: Sequence[PolicyTree],
         pairs: Demonstrations,
-        trial: Trial,
+        evaluator: Evaluator,
         *,
         expert: Agent,
         combined: Sequence[Pair] = (),
@@ -79,7 +79,7 @@ class Refinement:
         Args:
             trees: Where it begins, one an action dimension; every leaf is a rule.
             pairs: What they were grown from.
-            trial: How candidates are tried.
+            evaluator: How candidates are tried.
             expert: Who is asked about the states that they lead to.
             combined: Pairs of features of which new queries may ask about combinations.
             max_rules: Most leaves of each tree.
@@ -93,7 +93,7 @@ class Refinement:
         self._start = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
-        self._trial, self._expert = trial, expert
+        self._evaluator, self._expert = evaluator, expert
         self._combined, self._max_rules = combined, max_rules
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
@@ -150,15 +150,15 @@ class Refinement:
 
     def _met(self) -> MetStates:
         """Where the rules lead now, and what the expert says there."""
-        rules = leaf_rules(self.here.trees(self._start, self._trial.divider))
+        rules = leaf_rules(self.here.trees(self._start, self._evaluator.divider))
         played = rollout(
-            self._trial.env_id,
-            self._trial.agent,
-            shield=Shield(rules, projection=self._trial.projection),
+            self._evaluator.env_id,
+            self._evaluator.agent,
+            shield=Shield(rules, projection=self._evaluator.projection),
             episodes=_MET_EPISODES,
             seed=self._take(_MET_EPISODES),
             keep_steps=True,
-            max_steps=self._trial.max_steps,
+            max_steps=self._evaluator.max_steps,
             executor=self._workers,
         )
         self._tell(_MET_EPISODES)
@@ -169,7 +169,7 @@ class Refinement:
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
         pairs = answered(
-            self._trial.env_id,
+            self._evaluator.env_id,
             self._expert,
             table.observation[rows],
             wanted[rows],
@@ -191,7 +191,7 @@ class Refinement:
     def _shapes(self, met: MetStates) -> list[Candidate]:
         """The likeliest neighbours in shape."""
         trees = [
-            count_tree(structure, met.pairs, index, divider=self._trial.divider)
+            count_tree(structure, met.pairs, index, divider=self._evaluator.divider)
             for index, structure in enumerate(self.here.structures)
         ]
         others = neighbours(
@@ -218,7 +218,7 @@ class Refinement:
 
     def _movement(self, candidate: Candidate, met: MetStates) -> Movement:
         pairs = met.pairs.deriving(candidate.derived)
-        trees = candidate.trees(pairs, self._trial.divider)
+        trees = candidate.trees(pairs, self._evaluator.divider)
         return Movement(trees, pairs, seed=int(self._generator.integers(2**31)))
 
     def _move(self, movement: Movement, generations: int, met: MetStates) -> None:
@@ -233,7 +233,7 @@ class Refinement:
         self, tried: Sequence[Candidate], met: MetStates, *, seed: int, episodes: int
     ) -> list[NDArray[np.float64]]:
         """What each candidate achieves in the same episodes."""
-        achieved = self._trial.scores(
+        achieved = self._evaluator.scores(
             tried, met.pairs, seed=seed, episodes=episodes, workers=self._workers
         )
         self._tell(len(tried) * episodes)

@@ -44,7 +44,7 @@ class MetStates:
 
 
 @dataclass(frozen=True)
-class _Query:
+class _NewQuery:
     """A query in the place of a leaf.
 
     Attributes:
@@ -204,7 +204,7 @@ def _merged(structure: TreeStructure, node: int, child: int) -> TreeStructure:
     )
 
 
-def _split(structure: TreeStructure, query: _Query) -> TreeStructure:
+def _split(structure: TreeStructure, query: _NewQuery) -> TreeStructure:
     """The tree with a query in the place of a leaf."""
     n = len(structure.feature)
 
@@ -229,13 +229,13 @@ def _queries(
     index: int,
     met: MetStates,
     generator: np.random.Generator,
-) -> list[_Query]:
+) -> list[_NewQuery]:
     """The best queries of different features, the very best of each leaf first."""
     pairs = met.pairs
     wishes = _wishes(met, dimension, index)
     kinds = [feature.derived for feature in pairs.features]
     reached = structure.apply(pairs.observations)
-    result: list[tuple[int, _Query]] = []
+    result: list[tuple[int, _NewQuery]] = []
     for leaf in np.unique(reached).tolist():
         rows = np.flatnonzero(reached == leaf)
         if len(rows) < _FEWEST:
@@ -247,7 +247,7 @@ def _queries(
             for feature in offered
             if (query := _query(leaf, feature, values[:, feature], wanted, dimension))
         ]
-        of_kind: dict[object, _Query] = {}
+        of_kind: dict[object, _NewQuery] = {}
         for query in sorted(possible, key=lambda query: -query.gain):
             derived = kinds[query.feature]
             # Of a pair of features only the best ratio.
@@ -273,7 +273,7 @@ def _query(
     values: NDArray[np.float32],
     wishes: NDArray[np.float64],
     dimension: LabelledDimension,
-) -> _Query | None:
+) -> _NewQuery | None:
     """The border of one feature at which most wishes are met, if there is any."""
     order = np.argsort(values, kind="stable")
     ordered = values[order].astype(np.float64)
@@ -298,4 +298,4 @@ def _query(
         labels = dimension.labels_of(np.concatenate(means))
     else:
         labels = np.array([below[best].argmax(), above[best].argmax()])
-    return _Query(float(gains[best]), leaf, feature, border, int(labels[0]), int(labels[1]))
+    return _NewQuery(float(gains[best]), leaf, feature, border, int(labels[0]), int(labels[1]))

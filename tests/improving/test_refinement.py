@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, load_demonstrations
-from sarl_core.improving.candidate import Candidate, Trial
+from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement, ranks
 from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
 from sarl_core.improving.shapes import MetStates, neighbours
@@ -25,7 +25,7 @@ CART = "CartPole-v1"
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet").select(range(4))
 PENDULUM = load_demonstrations(DATA / "pendulum.parquet").select(range(8))
-TRIAL = Trial(CART, make_agent("novice", CART), "centre", 2, "return", None)
+TRIAL = Evaluator(CART, make_agent("novice", CART), "centre", 2, "return", None)
 
 
 def neighbours_of(
