@@ -146,6 +146,8 @@ class Movement:
             means: What the neighbours have achieved, (POPULATION, K), as `mean_score` gives it.
         """
         assert self._strategy is not None
+        if len(np.unique(means, axis=0)) == 1:
+            return  # where all do alike, the strategy would go anywhere
         self._strategy.tell(self._points, -ranks(means))  # which follows the least
         self.here = self._parameters.candidate(self._strategy.mean)
 

@@ -111,6 +111,11 @@ def test_where_all_do_alike_nothing_is_followed() -> None:
     assert np.allclose(ranks(np.full((6, 1), 500.0)), 0.0)
     tied = ranks(np.array([[1.0], [7.0], [7.0], [0.0]]))
     assert tied[1] == tied[2] > tied[0] > tied[3]
+    movement = Movement(grow_budgeted_trees(CARTPOLE, max_rules=4), CARTPOLE, seed=0)
+    before = movement.here.structures[0].threshold
+    movement.ask()
+    movement.tell(np.full((POPULATION, 1), 500.0))
+    np.testing.assert_array_equal(movement.here.structures[0].threshold, before)
     # Failures before returns.
     both = ranks(np.array([[-0.5, 9.0], [0.0, 1.0], [0.0, 2.0]]))
     assert both.tolist() == [-0.5, 0.0, 0.5]

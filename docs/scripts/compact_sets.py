@@ -1,0 +1,167 @@
+"""Makes the compact rule sets in data/rules, each over several seeds of which the median is shipped.
+
+Run from the top folder: ``python -m docs.scripts.compact_sets [--jobs N] [SET ...]``. What every
+seed achieved is added to data/rules/seeds.json as soon as it is known, and what is there is not
+run again; delete a set's entry to begin it anew. Single rule sets are made by the commands that
+their cards name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from sarl_core.demonstrations.formats import load_demonstrations
+from sarl_core.files import whole_file
+from sarl_core.improving.aggregation import Aggregation, aggregate
+from sarl_core.improving.aggregation_files import card_path, save_aggregation
+from sarl_core.improving.plan import Plan
+from sarl_core.mining.combining.candidates import pairs_by_name, pairs_of_like_kind
+
+FOLDER = Path(__file__).resolve().parents[2]
+RULES = FOLDER / "data" / "rules"
+SEEDS = RULES / "seeds.json"
+LEARNING_SEEDS = range(5)
+OPTIONS = {
+    "rounds": "rounds",
+    "episodes": "episodes",
+    "divider": "divider",
+    "turns": "refine",
+    "validation": "validation",
+    "report": "report-episodes",
+    "choose": "choose",
+    "seed": "seed",
+}
+SOLVED = 200.0  # a return from which a landing counts as one, where others report it
+
+
+@dataclass(frozen=True)
+class RuleSetPlan:
+    """How a rule set is made.
+
+    Attributes:
+        task: Name of its demonstrations.
+        plan: Of the aggregation.
+        combine: "every" two features; names of features; or "" for none.
+    """
+
+    task: str
+    plan: Plan
+    combine: str = ""
+
+
+_CARTPOLE = Plan(2, rounds=6, episodes=10, turns=3, validation=512, report=3_000, choose="failures")
+_LANDER = Plan(2, rounds=16, episodes=24, turns=6, validation=512, report=1_000, choose="failures")
+SETS = {
+    "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
+    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=4)),
+    "lunar_lander_combined": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=24), "every"),
+    "lunar_lander_few_combined": RuleSetPlan(
+        "lunar_lander", replace(_LANDER, max_rules=8), "every"
+    ),
+    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=12)),
+}
+
+
+def main() -> None:
+    """Make what is missing."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("sets", nargs="*", metavar="SET", help=", ".join(SETS))
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--work", type=Path, default=FOLDER / "out" / "rules")
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    for name in arguments.sets or SETS:
+        make(name, arguments.work, arguments.jobs)
+
+
+def make(name: str, work: Path, jobs: int) -> None:
+    """One rule set over all seeds, of which the median is copied to data/rules."""
+    for seed in LEARNING_SEEDS:
+        if any(one["seed"] == seed for one in _known().get(name, [])):
+            continue
+        one = SETS[name]
+        plan = replace(one.plan, seed=seed)
+        start = load_demonstrations(FOLDER / "data" / "demonstrations" / f"{one.task}.parquet")
+        if one.combine:
+            every = one.combine == "every"
+            pairs = pairs_of_like_kind(start) if every else pairs_by_name(start, [one.combine])
+            plan = replace(plan, combined=pairs)
+        aggregation = aggregate(start, plan, jobs=jobs)
+        if not aggregation.is_finished:
+            raise SystemExit(f"stopped; what was finished before is in {SEEDS}")
+        save_aggregation(aggregation, work / f"{name}_{seed}.json", command=command(name, plan))
+        _add(name, {"seed": seed, **achieved(aggregation)})
+    middle = median(_known()[name])
+    made = work / f"{name}_{middle['seed']}.json"
+    if not made.is_file():
+        raise SystemExit(f"{made} is gone; delete {name} from {SEEDS} and make it again")
+    for path in (made, card_path(made)):
+        target = RULES / path.name.replace(made.stem, name)
+        with whole_file(target) as unfinished:
+            unfinished.write_bytes(path.read_bytes())
+
+
+def command(name: str, plan: Plan) -> str:
+    """The command that makes one seed of a set."""
+    defaults = {field.name: field.default for field in fields(Plan)}
+    options = [
+        f"--{option} {getattr(plan, field)}"
+        for field, option in OPTIONS.items()
+        if getattr(plan, field) != defaults[field]
+    ]
+    if combine := SETS[name].combine:
+        options.insert(0, "--combine" if combine == "every" else f'--combine "{combine}"')
+    return (
+        f"python -m sarl_core aggregate data/demonstrations/{SETS[name].task}.parquet "
+        f"--out data/rules/{name}.json --max-rules {plan.max_rules} {' '.join(options)}"
+    )
+
+
+def achieved(aggregation: Aggregation) -> dict[str, Any]:
+    """What a set achieves in the episodes that nothing was chosen by."""
+    reported = aggregation.reported
+    assert reported is not None
+    returns = reported.returns
+    failures = reported.failures
+    rules = aggregation.rule_set
+    return {
+        "rules": max(len(rules.of_dimension(index)) for index in range(len(rules.actions))),
+        "episodes": len(returns),
+        "mean": round(float(returns.mean()), 2),
+        "std": round(float(returns.std(ddof=1)), 2),
+        "least": round(float(returns.min()), 2),
+        "solved": round(float((returns >= SOLVED).mean()), 4),
+        "failures": None if failures is None else failures.count,
+        "failure_low": None if failures is None else round(failures.low, 5),
+        "failure_high": None if failures is None else round(failures.high, 5),
+    }
+
+
+def median(seeds: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The seed in the middle, by failures and then by the return."""
+    ranked = sorted(seeds, key=lambda one: (one["failures"] or 0, -one["mean"]))
+    return ranked[len(ranked) // 2]
+
+
+def _known() -> dict[str, list[dict[str, Any]]]:
+    known: dict[str, list[dict[str, Any]]] = (
+        json.loads(SEEDS.read_text(encoding="utf-8")) if SEEDS.is_file() else {}
+    )
+    return known
+
+
+def _add(name: str, seed: dict[str, Any]) -> None:
+    known = _known()
+    known.setdefault(name, []).append(seed)
+    with whole_file(SEEDS) as unfinished:
+        unfinished.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+    print(name, seed, flush=True)
+
+
+if __name__ == "__main__":
+    main()
