@@ -1,4 +1,4 @@
-"""Makes the compact rule sets in data/rules, each over several seeds of which the median is shipped.
+"""Makes the compact rule sets in data/rules, each over five seeds; the median one is shipped.
 
 Run from the top folder: ``python -m docs.scripts.compact_sets [--jobs N] [SET ...]``. What every
 seed achieved is added to data/rules/seeds.json as soon as it is known, and what is there is not
