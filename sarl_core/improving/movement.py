@@ -24,6 +24,7 @@ from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
 POPULATION = 20  # neighbours a generation
 
 _SHAKE = 0.15  # at first, in units of half the spread of a feature where it is asked about
+_WIDER = 1.5  # times, where all neighbours do alike
 _MANY = 120  # numbers to move: of more, which move together takes longer to learn than there is
 _SPREAD = (0.1, 0.9)  # quantiles
 _INTERVALS = 8.0  # that a leaf's action moves by, where a threshold moves by half its spread
@@ -147,7 +148,10 @@ class Movement:
         """
         assert self._strategy is not None
         if len(np.unique(means, axis=0)) == 1:
-            return  # where all do alike, the strategy would go anywhere
+            # There is nothing to follow; further around there may be, and away from what does
+            # worse there is the middle of what does well.
+            self._strategy.sigma *= _WIDER
+            return
         self._strategy.tell(self._points, -ranks(means))  # which follows the least
         self.here = self._parameters.candidate(self._strategy.mean)
 
