@@ -85,7 +85,7 @@ def test_before_a_run_the_page_says_what_it_does() -> None:
 
 def test_the_shipped_rules_show_how_they_came_about(shipped: Path, expected: Aggregation) -> None:
     save_aggregation(expected, shipped / "cartpole_compact.json", command="make it --again")
-    point = {"rules": 4, "mean": 400.0, "iqm": 410.0, "iqm_low": 390.0, "iqm_high": 430.0}
+    point = {"rules": 4, "mean": 400.0, "std": 10.0}
     budgets = {"environments": {"CartPole-v1": [{**point, "episodes": 100}], "Other-v0": []}}
     (shipped / "budgets.json").write_text(json.dumps(budgets))
     app = open_page("improve", data="cartpole")
@@ -99,7 +99,7 @@ def test_the_shipped_rules_show_how_they_came_about(shipped: Path, expected: Agg
     assert table["Chosen"].tolist() == [one.number == expected.chosen for one in expected.rounds]
     rounds, by_number = specs(app)
     assert rounds["layout"]["yaxis4"]
-    assert by_number["data"][0]["name"].startswith("typical return")
+    assert by_number["data"][0]["name"].startswith("one feature a query")
 
 
 @pytest.mark.parametrize(

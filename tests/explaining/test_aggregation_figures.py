@@ -9,13 +9,12 @@ from sarl_core import InputError
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.figures.aggregation import (
     RoundPoint,
-    budget_figure,
-    budget_points,
     card_points,
     points_of,
     rounds_figure,
 )
 from sarl_core.explaining.figures.gaps import gap_figure, gap_histograms
+from sarl_core.explaining.rule_budgets import PublishedPoint, budget_figure, budget_points
 from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.improving.gaps import Gaps, join_gaps
 
@@ -120,26 +119,33 @@ def test_many_rounds_are_numbered_without_crowding():
 
 
 def budgets() -> dict[str, object]:
-    return {
-        "environments": {
-            "CartPole-v1": [
-                {"rules": n, "mean": m, "std": 1, "iqm": m + 1, "iqm_low": m - 2, "iqm_high": m + 5,
-                 "episodes": 100}
-                for n, m in ((8, 500.0), (2, 200.0), (4, 480.0))
-            ]
-        }
-    }  # fmt: skip
+    one = [{"rules": n, "mean": m, "std": 20.0, "episodes": 100, "failures": f,
+            "failure_low": f / 120, "failure_high": f / 80}
+           for n, m, f in ((8, 500.0, 0), (2, 200.0, 60), (4, 480.0, 4))]  # fmt: skip
+    two = [{**point, "mean": 500.0, "combined": True} for point in one[:1]]
+    return {"environments": {"CartPole-v1": [*one, *two], "Calm-v0": [
+        {"rules": 3, "mean": 1.0, "std": 0.0, "episodes": 1, "refined": True}]}}  # fmt: skip
 
 
-def test_return_stands_against_the_number_of_rules():
+def test_return_and_failures_stand_against_the_number_of_rules():
     points = budget_points(budgets(), "CartPole-v1")
-    assert [point.rules for point in points] == [2, 4, 8]
+    assert [point.rules for point in points] == [2, 4, 8, 8]
     assert budget_points(budgets(), "Elsewhere-v0") == ()
-    typical, mean = budget_figure(points).data
-    assert typical.y.tolist() == [201.0, 481.0, 501.0]
-    assert typical.error_y.array.tolist() == [4.0, 4.0, 4.0]
-    assert typical.error_y.arrayminus.tolist() == [3.0, 3.0, 3.0]
-    assert list(mean.y) == [200.0, 480.0, 500.0]
+    figure = budget_figure(points, published=[PublishedPoint(3, 500.0, "others")])
+    returns, failures, two, two_failures, published = figure.data
+    assert list(returns.y) == [200.0, 480.0, 500.0]
+    assert list(returns.error_y.array) == pytest.approx([3.92] * 3)  # 1.96 times 20 / sqrt(100)
+    assert list(failures.y) == [0.6, 0.04, 0.0]
+    assert list(failures.error_y.array) == pytest.approx([0.15, 0.01, 0.0])
+    assert list(failures.error_y.arrayminus) == pytest.approx([0.1, 0.04 - 4 / 120, 0.0])
+    assert two.marker.color == two_failures.marker.color != returns.marker.color
+    assert (list(published.x), list(published.y)) == ([3], [500.0])
+
+
+def test_where_no_failures_are_known_there_is_no_panel_of_them():
+    (alone,) = budget_figure(budget_points(budgets(), "Calm-v0")).data
+    assert (list(alone.x), list(alone.y)) == ([3], [1.0])
+    assert alone.mode == "markers"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Figures of an aggregation: what each round brought, and what a number of rules achieves."""
+"""The figure of an aggregation: what each round brought."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from sarl_core.mining.language import share_text
 _BLUE, _GREEN = LABEL_COLOURS[0], LABEL_COLOURS[2]
 _PANELS = ("Return", "Coverage", "Expert would do otherwise", "Rules")
 _PANEL_HEIGHTS = (0.43, 0.19, 0.19, 0.19)
-_ROUNDS_HEIGHT, _BUDGET_HEIGHT = 560, 300
+_ROUNDS_HEIGHT = 560
 
 
 @dataclass(frozen=True)
@@ -48,26 +48,6 @@ class RoundPoint:
     rules: Count
     pairs: Count
     failures: Count | None = None
-
-
-class BudgetPoint(Struct, frozen=True, rename={"low": "iqm_low", "high": "iqm_high"}):
-    """What the best rules of a number achieve.
-
-    Attributes:
-        rules: Most rules of an action dimension.
-        mean: Mean return.
-        iqm: Interquartile mean.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
-        episodes: How many it was measured on.
-    """
-
-    rules: Count
-    mean: Number
-    iqm: Number
-    low: Number
-    high: Number
-    episodes: Count
 
 
 def points_of(rounds: Sequence[AggregationRound]) -> tuple[RoundPoint, ...]:
@@ -116,33 +96,6 @@ def card_points(card: Mapping[str, Any]) -> tuple[RoundPoint, ...]:
 
 class _RoundsCard(Struct):
     rounds: Annotated[tuple[RoundPoint, ...], Meta(min_length=1)]
-
-
-def budget_points(document: Mapping[str, Any], env_id: str) -> tuple[BudgetPoint, ...]:
-    """What each number of rules achieves in an environment.
-
-    Args:
-        document: `environments` to lists of points.
-        env_id: Which one.
-
-    Returns:
-        By number of rules; () where the document does not have the environment.
-
-    Raises:
-        InputError: If the document is of another form.
-    """
-    try:
-        points = conformed(document, _Budgets).environments.get(env_id, ())
-    except MisfitError as error:
-        raise InputError(
-            f"the returns by number of rules are not of the expected form ({error}); write them "
-            "again"
-        ) from error
-    return tuple(sorted(points, key=lambda point: point.rules))
-
-
-class _Budgets(Struct):
-    environments: dict[str, tuple[BudgetPoint, ...]]
 
 
 def rounds_figure(
@@ -302,66 +255,3 @@ def _finish_rounds(figure: go.Figure, points: Sequence[RoundPoint], last: int) -
             yshift=2,
             showarrow=False,
         )
-
-
-def budget_figure(points: Sequence[BudgetPoint]) -> go.Figure:
-    """Return against the number of rules.
-
-    Args:
-        points: By number of rules, at least one.
-
-    Returns:
-        Rules to the right, by powers of two; the typical return with its 95 % interval, and the
-        mean as hollow points.
-    """
-    rules = [point.rules for point in points]
-    iqm = np.array([point.iqm for point in points])
-    figure = go.Figure()
-    figure.add_scatter(
-        x=rules,
-        y=iqm,
-        mode="lines+markers",
-        name="typical return (IQM, 95 % interval)",
-        line={"color": _BLUE, "width": 2.2},
-        marker={"color": _BLUE, "size": 8},
-        error_y={
-            "type": "data",
-            "symmetric": False,
-            "array": np.array([point.high for point in points]) - iqm,
-            "arrayminus": iqm - np.array([point.low for point in points]),
-            "thickness": 2,
-            "width": 4,
-        },
-        customdata=[[point.low, point.high, point.episodes] for point in points],
-        hovertemplate=(
-            "at most %{x} rules: <b>%{y:,.1f}</b><br>95 % interval %{customdata[0]:,.1f} to "
-            "%{customdata[1]:,.1f}<br>%{customdata[2]} episodes<extra></extra>"
-        ),
-    )
-    figure.add_scatter(
-        x=rules,
-        y=[point.mean for point in points],
-        mode="lines+markers",
-        name="mean return",
-        line={"color": _GREEN, "width": 1.6, "dash": "dot"},
-        marker={"color": _GREEN, "size": 8, "symbol": "circle-open", "line": {"width": 2}},
-        hovertemplate="at most %{x} rules: mean <b>%{y:,.1f}</b><extra></extra>",
-    )
-    figure.update_layout(
-        **figure_layout(_BUDGET_HEIGHT, margin={"r": 24}),
-        showlegend=True,
-        legend={"orientation": "h", "x": 0, "y": 1.02, "xanchor": "left", "yanchor": "bottom"},
-    )
-    figure.update_xaxes(
-        title={"text": "most rules of an action", "standoff": 2},
-        type="log",
-        tickvals=rules,
-        ticktext=[f"{count:,}" for count in rules],
-        range=[float(np.log10(min(rules))) - 0.12, float(np.log10(max(rules))) + 0.12],
-        fixedrange=True,
-        zeroline=False,
-    )
-    figure.update_yaxes(
-        title={"text": "return", "standoff": 4}, fixedrange=True, nticks=6, zeroline=False
-    )
-    return figure
