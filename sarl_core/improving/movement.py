@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.derived import Combination, DerivedFeature
+from sarl_core.demonstrations.derived import LARGEST_RATIO, Combination, DerivedFeature
 from sarl_core.improving.candidate import Candidate
 from sarl_core.mining.combining.candidates import rounded_ratio
 from sarl_core.mining.combining.queries import with_ratios
@@ -100,7 +100,8 @@ class Parameters:
             ratios = {}
             for line, turn in zip(lines, take(len(lines)).tolist(), strict=True):
                 ratio = rounded_ratio(line.ratio + turn * line.scale)
-                if ratio:  # of 0 the query would ask about one feature
+                # Of 0 the query would ask about one feature.
+                if 0.0 < abs(ratio) <= LARGEST_RATIO:
                     ratios[line.node] = ratio
                     threshold[line.node] += (ratio - line.ratio) * line.centre
             moved = np.rint(label[leaves] + take(len(leaves)) * _INTERVALS).astype(np.int64)
@@ -203,6 +204,7 @@ def _spread(tree: PolicyTree, pairs: Demonstrations) -> NDArray[np.float64]:
     spread = np.zeros(tree.n_nodes)
     for node in np.flatnonzero(tree.feature != LEAF).tolist():
         values = pairs.observations[tree.rows(node), tree.feature[node]]
+        values = values[np.isfinite(values)]  # a formula may be infinite
         if len(values):
             low, high = np.quantile(values, _SPREAD)
             spread[node] = 0.5 * float(high - low)

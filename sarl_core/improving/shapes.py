@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination
+from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.improving.candidate import Candidate, structure_of
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
@@ -276,7 +277,8 @@ def _query(
 ) -> _NewQuery | None:
     """The border of one feature at which most wishes are met, if there is any."""
     order = np.argsort(values, kind="stable")
-    ordered = values[order].astype(np.float64)
+    # A formula may be infinite; thresholds lie below the limit.
+    ordered = np.clip(values[order], -LARGEST, LARGEST).astype(np.float64)
     last = len(order) - _LEAST
     places = np.unique(np.linspace(_LEAST - 1, last - 1, min(_THRESHOLDS, last)).astype(np.int64))
     places = places[ordered[places] < ordered[places + 1]]

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, load_demonstrations
+from sarl_core.demonstrations.dataset import with_formulas
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement, ranks
 from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.candidates import pairs_of_like_kind
-from sarl_core.mining.tree import LEAF, PolicyTree
+from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.choices import mean_score
 from sarl_core.rollouts.episodes import rollout
@@ -104,6 +105,52 @@ def test_leaves_of_amounts_move_by_intervals() -> None:
     }
     assert len(labels) > 5
     assert all(0 <= label < 16 for one in labels for label in one)
+
+
+def test_thresholds_of_a_formula_stay_finite_where_it_is_infinite() -> None:
+    gap = np.repeat([-1.0, 1.0, 2.0], 20)
+    speed = np.repeat([0.0, 0.0, 1.0], 20)  # so that a third of the values is -inf, a third inf
+    pairs = with_formulas(
+        Demonstrations(
+            observations=np.column_stack([gap, speed + 0.01 * np.arange(60) * (speed > 0)]),
+            actions=np.repeat([1, 0, 1], 20),
+            episodes=np.zeros(60, dtype=np.int64),
+            feature_names=("gap", "speed"),
+        ),
+        ["time = gap / speed"],
+    )
+    leaf = count_tree(_asking(threshold=None), pairs, 0, divider=2)
+    for seed in range(4):
+        others = neighbours(
+            [leaf],
+            MetStates(pairs, None),
+            max_rules=2,
+            count=60,
+            generator=np.random.default_rng(seed),
+        )
+        assert np.isfinite([one.structures[0].threshold for one in others]).all()
+        if any(one.structures[0].feature[0] == 2 for one in others):
+            break
+    else:
+        pytest.fail("nothing asked about the formula")
+    movement = Movement([count_tree(_asking(threshold=0.5), pairs, 0, divider=2)], pairs, seed=0)
+    moved = {float(one.structures[0].threshold[0]) for one in movement.ask()}
+    assert len(moved) == POPULATION
+    assert np.isfinite(list(moved)).all()
+
+
+def _asking(*, threshold: float | None) -> TreeStructure:
+    """About feature 2 whether it is at most the threshold; nothing where there is none."""
+    if threshold is None:
+        end = np.array([LEAF])
+        return TreeStructure(end, np.zeros(1), end, end, np.array([0]))
+    return TreeStructure(
+        np.array([2, LEAF, LEAF]),
+        np.array([threshold, 0.0, 0.0]),
+        np.array([1, LEAF, LEAF]),
+        np.array([2, LEAF, LEAF]),
+        np.array([0, 0, 1]),
+    )
 
 
 def test_where_all_do_alike_nothing_is_followed() -> None:
