@@ -12,7 +12,7 @@ from sarl_core.agents.agent import Agent, EpisodicAgent, PolicyAgent
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.agents.spaces import Actions
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.derived import DerivedFeature
+from sarl_core.demonstrations.derived import DerivedFeature, Extension
 from sarl_core.demonstrations.names import in_order_of
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
@@ -101,6 +101,22 @@ def importance(label_scores: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(gap / mean) if mean > 0 else np.ones(len(gap))
 
 
+def with_values(
+    observations: NDArray[np.float32], derived: Sequence[DerivedFeature]
+) -> NDArray[np.int64]:
+    """The states that can be learned from: 0/0 is no value of a formula.
+
+    Args:
+        observations: Shape (B, d), float32.
+        derived: What is derived of them.
+
+    Returns:
+        Rows in which all of it has a value, ascending.
+    """
+    extension = Extension(observations.shape[1], [one.definition for one in derived])
+    return np.flatnonzero(~np.isnan(extension.many(observations)).any(axis=1))
+
+
 def answered(
     env_id: EnvironmentOrId,
     expert: Agent,
@@ -181,20 +197,21 @@ class Answers:
         self._steps = [np.arange(len(start)) if start.steps is None else start.steps]
 
     def add(self, table: StepTable, actions: Actions, *, seed: int) -> None:
-        """Take up the states of one more round.
+        """Take up the states of one more round, but those in which a formula has no value.
 
         Args:
             table: The N steps of its episodes.
             actions: What the expert says about them, (N, m).
             seed: For choosing some of them, where they are too many.
         """
-        rows = np.arange(len(table))
+        rows = with_values(table.observation, self._derived)
         if len(rows) > _PAIRS_A_ROUND:
             generator = np.random.default_rng(seed)
             rows = np.sort(generator.choice(rows, _PAIRS_A_ROUND, replace=False))
         self._observations.append(table.observation[rows])
         self._actions.append(actions[rows])
-        self._episodes.append(self._episodes[-1][-1] + 1 + table.episode[rows])
+        last = max(int(episodes[-1]) for episodes in self._episodes if len(episodes))
+        self._episodes.append(last + 1 + table.episode[rows])
         self._steps.append(table.step[rows])
 
     def pairs(

@@ -17,7 +17,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement
-from sarl_core.improving.questions import answered, ask, scores
+from sarl_core.improving.questions import answered, ask, scores, with_values
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.budgeted_trees import leaf_rules
@@ -165,7 +165,7 @@ class Refinement:
         table = played.steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
-        rows = np.arange(len(table))
+        rows = with_values(table.observation, self.here.derived)
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
         pairs = answered(

@@ -10,6 +10,7 @@ import pytest
 
 from sarl_core import InputError, load_demonstrations
 from sarl_core.agents.agent import EXPERT_FOLDER
+from sarl_core.demonstrations.dataset import with_formulas
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
@@ -88,6 +89,20 @@ def test_the_same_plan_gives_the_same_rules_whatever_the_processes(cart, small, 
     again = aggregate(cart, small, jobs=2)
     assert again.rule_set == found.rule_set
     assert (again.reported.returns == found.reported.returns).all()
+
+
+def test_states_in_which_a_formula_has_no_value_are_not_learned_from(cart, small_search):
+    """In every demonstrated state it is 1; further to the left, where rules lead, 0/0."""
+    least = 0.001 - float(cart.observations[:, 2].min())
+    upright = f"max(pole_angle + {least:.6f}, 0)"
+    start = with_formulas(cart, [f"upright = {upright} / {upright}"])
+    plan = Plan(max_rules=2, rounds=2, episodes=8, validation=4, report=2, turns=1, max_steps=80)
+    found = aggregate(start, plan)
+    assert len(found.rounds) == 2
+    met = int(found.rounds[0].returns.sum())  # 1 a step
+    assert 0 < found.rounds[1].pairs - found.rounds[0].pairs < met
+    assert (found.demonstrations.observations[:, 4] == 1.0).all()
+    assert found.is_finished
 
 
 def test_another_seed_gives_other_episodes(cart, small, found):
