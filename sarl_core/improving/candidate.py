@@ -17,6 +17,7 @@ from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.combining.queries import over_queried
 from sarl_core.mining.tree import PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import run_each
+from sarl_core.progress import Progress
 from sarl_core.rollouts.choices import Choice, scores
 from sarl_core.rollouts.episodes import LOST, rollout
 from sarl_core.shielding.projection import Projection
@@ -112,6 +113,7 @@ class Evaluator:
         seed: int,
         episodes: int,
         workers: Executor | None,
+        progress: Progress | None = None,
     ) -> list[NDArray[np.float64]]:
         """What each candidate achieves.
 
@@ -121,16 +123,18 @@ class Evaluator:
             seed: Of the first episode, the same for all.
             episodes: For each, E.
             workers: Who runs them.
+            progress: Called with (candidates done, in all); returning False stops.
 
         Returns:
             K times (E, c), as `choices.scores` gives them.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
+            CancelledError: If `progress` returned False.
         """
         few = _first_of(pairs, _FEW)
         tasks = [(self, candidate, few, seed, episodes) for candidate in candidates]
-        return run_each(episode_scores, tasks, lost=LOST, executor=workers)
+        return run_each(episode_scores, tasks, lost=LOST, executor=workers, progress=progress)
 
 
 def episode_scores(

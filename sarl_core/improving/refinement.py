@@ -124,7 +124,7 @@ class Refinement:
         self._progress, self._total = progress, refinement_cost(turns)
         marks = []
         for turn in range(1, turns + 1):
-            before = self.here
+            before = self._compared
             self._turn()
             self._tell(refinement_cost(turn) - self._done)  # some had fewer neighbours
             marks += [self._compared, self.here]
@@ -233,11 +233,15 @@ class Refinement:
         self, tried: Sequence[Candidate], met: MetStates, *, seed: int, episodes: int
     ) -> list[NDArray[np.float64]]:
         """What each candidate achieves in the same episodes."""
-        achieved = self._evaluator.scores(
-            tried, met.pairs, seed=seed, episodes=episodes, workers=self._workers
+        before = self._done
+        return self._evaluator.scores(
+            tried,
+            met.pairs,
+            seed=seed,
+            episodes=episodes,
+            workers=self._workers,
+            progress=lambda done, _: self._tell(before + done * episodes - self._done),
         )
-        self._tell(len(tried) * episodes)
-        return achieved
 
     def _take(self, episodes: int) -> int:
         """Seed of episodes that are used for nothing else."""

@@ -209,9 +209,23 @@ def test_two_rules_over_two_features_balance_the_pole(sized_search) -> None:
     assert mean_return(leaf_rules(last.trees(pairs, 2))) > 480
 
 
-def test_it_can_be_stopped() -> None:
+def test_it_can_be_stopped_after_any_candidate(small_search) -> None:
+    ticks: list[int] = []
     with pytest.raises(CancelledError):
-        search().run(1, progress=lambda done, total: done < 200)
+        search().run(1, progress=lambda done, total: ticks.append(done) or done < 3 + 2)
+    assert ticks[-1] == 3 + 2  # where the rules lead, and the first of three neighbours
+
+
+def test_where_the_thresholds_were_moved_is_told_once_it_was_compared(
+    small_search, monkeypatch
+) -> None:
+    monkeypatch.setattr(
+        Refinement, "_ranking", lambda self, tried, met, episodes: range(len(tried))
+    )
+    told: list[Candidate] = []
+    marks = search().run(2, better=told.append)
+    assert marks[0] is not marks[1]  # nothing was better in the first turn, and then it was moved
+    assert told == [marks[1]] == [marks[2]]
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
