@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +176,14 @@ class Refinement:
             wanted[rows],
             table.episode[rows],
             table.step[rows],
+        )
+        # Where the space has no bounds, what was shown is divided; labels stay what they are.
+        shown = self._start
+        pairs = replace(
+            pairs,
+            action_low=shown.action_low,
+            action_high=shown.action_high,
+            bounds_from=shown.bounds_from,
         )
         offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
         # What the trees ask about stands first, where they look for it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -207,6 +208,25 @@ def test_two_rules_over_two_features_balance_the_pole(sized_search) -> None:
     assert derived.definition.features == (2, 3)  # angle and angular velocity
     pairs = CARTPOLE.deriving(last.derived)
     assert mean_return(leaf_rules(last.trees(pairs, 2))) > 480
+
+
+def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) -> None:
+    """As of an action space without bounds, of which the demonstrated values are divided."""
+    pendulum = "Pendulum-v1"
+    shown = replace(
+        PENDULUM, actions=PENDULUM.actions / 4, action_low=None, action_high=None, bounds_from=None
+    )
+    search = Refinement(
+        grow_budgeted_trees(shown, max_rules=4, divider=8),
+        shown,
+        Evaluator(pendulum, make_agent("novice", pendulum), "centre", 8, "return", 20),
+        expert=make_agent("expert", pendulum),
+        max_rules=4,
+        first=0,
+    )
+    met = search._met().pairs
+    assert np.abs(met.actions).max() > np.abs(shown.actions).max()
+    assert met.action_dimensions == shown.action_dimensions
 
 
 def test_it_can_be_stopped_after_any_candidate(small_search) -> None:
