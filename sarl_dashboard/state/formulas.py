@@ -11,7 +11,7 @@ from typing import cast
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.derived import DerivedFeature
+from sarl_core.demonstrations.derived import DerivedFeature, formula_texts
 from sarl_core.environments.formulas import Formula
 from sarl_dashboard.cache import cached
 
@@ -25,6 +25,11 @@ def _written() -> dict[str, Derived]:
 def derived_of(raw: Demonstrations) -> Derived:
     """What is derived of the features: what the file derives, until a visitor changes it."""
     return _written().get(raw.digest, raw.derived)
+
+
+def texts_beside(raw: Demonstrations) -> tuple[str, ...]:
+    """What a visitor wrote beside what the file derives, as the command line takes it."""
+    return formula_texts([one for one in derived_of(raw) if one not in raw.derived])
 
 
 def put(raw: Demonstrations, derived: Derived) -> None:

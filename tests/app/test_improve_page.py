@@ -171,17 +171,23 @@ def test_a_run_is_what_the_library_gives_and_goes_on_from_there(expected: Aggreg
     assert metrics(app)["Steps"] == f"{len(expected.demonstrations):,}"
 
 
-def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    commands: list[list[str]] = []
+@pytest.fixture
+def commands(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The commands that do what the page does, as they are made."""
+    made: list[list[str]] = []
 
     def noted(*arguments: Any) -> str:
         command = command_for(*arguments)
-        commands.append(shlex.split(command))
+        made.append(shlex.split(command))
         return command
 
     monkeypatch.setattr("sarl_dashboard.views.improve.order.command_for", noted)
+    return made
+
+
+def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
+    commands: list[list[str]],
+) -> None:
     small = {**SMALL, "rounds": "1"}
     app = run(open_page("improve", data="cartpole", combine="2,3", **small))
     assert not errors(app)
@@ -194,6 +200,17 @@ def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
     assert commands[-1][-3:] == ["--combine", "--out", "rules.json"]
     open_page("improve", data="cartpole", **small)
     assert "--combine" not in commands[-1]
+
+
+def test_the_command_has_the_formulas_of_the_page_names(commands: list[list[str]]) -> None:
+    formula = "lean [rad] = abs(pole_angle)"
+    app = open_page("names", data="cartpole")
+    app.text_input(key=f"formula_{CARTPOLE.digest[:8]}").set_value(formula).run()
+    app.button(key="formula_take").click().run()
+    app.switch_page("improve.py").run()
+    assert not app.exception
+    assert not errors(app)
+    assert commands[-1][-4:] == ["--feature", formula, "--out", "rules.json"]
 
 
 def test_an_own_expert_and_rules_cut_at_thresholds() -> None:

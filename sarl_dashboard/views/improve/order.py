@@ -18,12 +18,13 @@ from sarl_core.rollouts.choices import check_choice
 from sarl_core.rollouts.seeds import FRESH
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.jobs.improving import ImprovementOrder
-from sarl_dashboard.state import combining
+from sarl_dashboard.state import combining, formulas
 from sarl_dashboard.state.agents import agent_for, has_expert, own_agents
 from sarl_dashboard.state.data import (
     SHIPPED_SETS,
     chosen_dataset,
     data_parts,
+    raw_demonstrations,
     uncombined_demonstrations,
     upload_name,
 )
@@ -158,6 +159,9 @@ def command_for(
     ):
         if value is not None and value != usual:
             words += [option, str(value)]
+    raw = raw_demonstrations()
+    for formula in () if raw is None else formulas.texts_beside(raw):
+        words += ["--feature", formula]
     names = [feature.name for feature in demonstrations.features]
     if combined and not combining.chosen().features:
         words.append("--combine")
