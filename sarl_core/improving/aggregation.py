@@ -94,7 +94,7 @@ class Aggregation:
         chosen: Number of the round whose rules are the best.
         validation_mean: Mean return in the episodes by which these very rules were chosen; too good
             by what luck they had. None where the run was stopped before.
-        refined: Whether its thresholds and labels were moved afterwards.
+        refined: Whether its queries, labels or thresholds were changed afterwards.
         reported: Episodes that nothing was chosen by; None where the run was stopped before.
         demonstrations: All pairs of the chosen round.
         seeds: Which episodes served for what.

@@ -79,8 +79,8 @@ def neighbours(
         trees: One an action dimension, counted over `met.pairs`.
         met: States that they lead to.
         max_rules: Most leaves of each.
-        count: Of neighbours, at most: a third with a query less, a third with another label and
-            a third with another query, or one more where there is room.
+        count: Of neighbours, at most: up to a third with a query less, up to a third with another
+            label, and the rest with another query, or one more where there is room.
         generator: Which of them.
 
     Returns:

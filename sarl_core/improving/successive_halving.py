@@ -70,7 +70,7 @@ def successive_halving(
 
     Args:
         candidates: K, at least 1.
-        score: Runs episodes of one candidate.
+        score: Runs episodes of the candidates that are left.
         seed: Of the first episode.
         first: Episodes of the first turn.
         most: Most episodes a candidate is given; the last one left gets them all.

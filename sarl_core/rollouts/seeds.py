@@ -116,7 +116,7 @@ class RunSeeds(NamedTuple):
     Attributes:
         rounds: The rules act, the expert answers.
         validation: The best round was chosen.
-        refinement: Thresholds and labels were moved.
+        refinement: Queries, labels and thresholds were changed.
         second_validation: The best point of the refinement was chosen.
         report: What came of it, on episodes that nothing was chosen by.
     """
