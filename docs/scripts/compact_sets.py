@@ -21,6 +21,8 @@ from sarl_core.improving.aggregation import Aggregation, aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.combining.candidates import pairs_by_name, pairs_of_like_kind
+from sarl_core.rollouts.episodes import Episodes, rollout
+from sarl_core.rollouts.seeds import REPORT
 
 FOLDER = Path(__file__).resolve().parents[2]
 RULES = FOLDER / "data" / "rules"
@@ -79,6 +81,7 @@ def main() -> None:
     arguments.work.mkdir(parents=True, exist_ok=True)
     for name in arguments.sets or SETS:
         make(name, arguments.work, arguments.jobs)
+        measure_expert(SETS[name], arguments.jobs)
 
 
 def make(name: str, work: Path, jobs: int) -> None:
@@ -108,6 +111,18 @@ def make(name: str, work: Path, jobs: int) -> None:
             unfinished.write_bytes(path.read_bytes())
 
 
+def measure_expert(one: RuleSetPlan, jobs: int) -> None:
+    """What the expert of a task achieves alone, in the episodes of the report."""
+    name = f"{one.task}_expert"
+    if name in _known():
+        return
+    env_id = load_demonstrations(FOLDER / "data" / "demonstrations" / f"{one.task}.parquet").env_id
+    played = rollout(
+        env_id, "expert", episodes=one.plan.report, seed=REPORT, keep_steps=False, jobs=jobs
+    )
+    _add(name, {"seed": None, "rules": None, **outcome(played)})
+
+
 def command(name: str, plan: Plan) -> str:
     """The command that makes one seed of a set."""
     defaults = {field.name: field.default for field in fields(Plan)}
@@ -126,13 +141,16 @@ def command(name: str, plan: Plan) -> str:
 
 def achieved(aggregation: Aggregation) -> dict[str, Any]:
     """What a set achieves in the episodes that nothing was chosen by."""
-    reported = aggregation.reported
-    assert reported is not None
-    returns = reported.returns
-    failures = reported.failures
+    assert aggregation.reported is not None
     rules = aggregation.rule_set
+    most = max(len(rules.of_dimension(index)) for index in range(len(rules.actions)))
+    return {"rules": most, **outcome(aggregation.reported)}
+
+
+def outcome(played: Episodes) -> dict[str, Any]:
+    """Returns and failures of episodes."""
+    returns, failures = played.returns, played.failures
     return {
-        "rules": max(len(rules.of_dimension(index)) for index in range(len(rules.actions))),
         "episodes": len(returns),
         "mean": round(float(returns.mean()), 2),
         "std": round(float(returns.std(ddof=1)), 2),

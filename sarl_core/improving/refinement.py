@@ -178,12 +178,11 @@ class Refinement:
             table.step[rows],
         )
         # Where the space has no bounds, what was shown is divided; labels stay what they are.
-        shown = self._start
         pairs = replace(
             pairs,
-            action_low=shown.action_low,
-            action_high=shown.action_high,
-            bounds_from=shown.bounds_from,
+            action_low=self._start.action_low,
+            action_high=self._start.action_high,
+            bounds_from=self._start.bounds_from,
         )
         offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
         # What the trees ask about stands first, where they look for it.

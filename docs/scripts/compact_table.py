@@ -1,0 +1,149 @@
+"""Writes what the compact sets achieve into the pages: ``python -m docs.scripts.compact_table``.
+
+The numbers are those of data/rules/seeds.json and data/rules/budgets.json, which
+``docs.scripts.compact_sets`` and ``docs.scripts.budgets`` have measured.
+"""
+
+from __future__ import annotations
+
+import json
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+from docs.scripts.compact_sets import LEARNING_SEEDS, RULES, SEEDS, SETS, median
+from sarl_core.explaining.figures.png import figure_to_png
+from sarl_core.explaining.rule_budgets import (
+    BudgetPoint,
+    PublishedPoint,
+    budget_figure,
+    budget_points,
+)
+from sarl_core.files import whole_file
+from sarl_core.mining.language import share_text
+
+FOLDER = Path(__file__).resolve().parents[2]
+PAGES = ("README.md", "docs/results/compact_rules.md")
+BEGIN = "<!-- made by: python -m docs.scripts.compact_table -->"
+END = "<!-- end of what is made -->"
+TASKS = {
+    "cartpole": ("Cart Pole", "CartPole-v1"),
+    "lunar_lander": ("Lunar Lander", "LunarLander-v3"),
+    "lunar_lander_continuous": ("Lunar Lander, continuous", "LunarLanderContinuous-v3"),
+    "pendulum": ("Pendulum", "Pendulum-v1"),
+    "bipedal_walker": ("Bipedal Walker", "BipedalWalker-v3"),
+    "driving": ("Driving", "Driving-v0"),
+}
+COSTA = "Costa et al. 2024"
+PUBLISHED = {
+    "cartpole": ((PublishedPoint(3, 500.0, COSTA), "500 ± 0"),),
+    "lunar_lander": (
+        (PublishedPoint(19, 237.7, COSTA), "237.7 ± 72.5"),
+        (PublishedPoint(94, 245.0, COSTA), "245 ± 40.5"),
+    ),
+}
+HEAD = (
+    "| task | rules | features a query | mean return, 95 % interval | failures, 95 % interval | "
+    "over five learning seeds |",
+    "| --- | --- | --- | --- | --- | --- |",
+)
+
+
+def main() -> None:
+    """Write the table into every page, and the pictures."""
+    table = compact_table(json.loads(SEEDS.read_text(encoding="utf-8")))
+    for name in PAGES:
+        page = FOLDER / name
+        with whole_file(page) as unfinished:
+            unfinished.write_text(
+                with_table(page.read_text(encoding="utf-8"), table), encoding="utf-8"
+            )
+    for task in TASKS:
+        front(task)
+
+
+def with_table(page: str, table: str) -> str:
+    """A page with the table between its marks."""
+    before, rest = page.split(BEGIN)
+    return f"{before}{BEGIN}\n\n{table}\n\n{END}{rest.split(END)[1]}"
+
+
+def compact_table(known: dict[str, list[dict[str, Any]]]) -> str:
+    """The sets of which every seed is known, each task's expert and what others have published."""
+    rows = list(HEAD)
+    for task, (title, _) in TASKS.items():
+        sets = [
+            (name, known[name])
+            for name, one in SETS.items()
+            if one.task == task and len(known.get(name, ())) == len(LEARNING_SEEDS)
+        ]
+        for name, seeds in sets:
+            chosen = median(seeds)
+            means = sorted(one["mean"] for one in seeds)
+            over = f"{means[0]:,.1f} to {means[-1]:,.1f}"
+            if chosen["failures"] is not None:
+                failed = sorted(one["failures"] / one["episodes"] for one in seeds)
+                over += f"; {share_text(failed[0])} to {share_text(failed[-1])} fail"
+            features = "two" if SETS[name].combine else "one"
+            rows.append(
+                f"| {title} | {chosen['rules']} | {features} | {mean_text(chosen)} | "
+                f"{failure_text(chosen)} | {over} |"
+            )
+        if sets:
+            for point, text in PUBLISHED.get(task, ()):
+                rows.append(f"| *{point.name}* | {point.rules} | one | {text} | – | – |")
+            (expert,) = known[f"{task}_expert"]
+            rows.append(
+                f"| *the expert* | – | – | {mean_text(expert)} | {failure_text(expert)} | – |"
+            )
+    return "\n".join(rows)
+
+
+def mean_text(one: dict[str, Any]) -> str:
+    """A mean with its interval."""
+    half = 1.96 * one["std"] / sqrt(one["episodes"])
+    low, high = one["mean"] - half, one["mean"] + half
+    return f"{one['mean']:,.1f} ({low:,.1f} to {high:,.1f})"
+
+
+def failure_text(one: dict[str, Any]) -> str:
+    """Failures of how many episodes, with the interval of the rate."""
+    if one["failures"] is None:
+        return "–"
+    between = f"{100 * one['failure_low']:.2g} to {100 * one['failure_high']:.2g} %"
+    return f"{one['failures']:,} of {one['episodes']:,} ({between})"
+
+
+def front(task: str) -> None:
+    """The picture of return and failures against the number of rules."""
+    env_id = TASKS[task][1]
+    points = budget_points(json.loads((RULES / "budgets.json").read_text("utf-8")), env_id)
+    known = json.loads(SEEDS.read_text(encoding="utf-8"))
+    refined = [
+        BudgetPoint(
+            rules=chosen["rules"],
+            mean=chosen["mean"],
+            std=chosen["std"],
+            episodes=chosen["episodes"],
+            failures=chosen["failures"],
+            failure_low=chosen["failure_low"] or 0.0,
+            failure_high=1.0 if chosen["failure_high"] is None else chosen["failure_high"],
+            combined=bool(one.combine),
+            refined=True,
+        )
+        for name, one in SETS.items()
+        if one.task == task and len(known.get(name, ())) == len(LEARNING_SEEDS)
+        for chosen in [median(known[name])]
+    ]
+    if not points and not refined:
+        return
+    figure = budget_figure(
+        sorted((*points, *refined), key=lambda point: point.rules),
+        published=[point for point, _ in PUBLISHED.get(task, ())],
+    )
+    with whole_file(FOLDER / "docs" / "pictures" / f"front_{task}.png") as unfinished:
+        unfinished.write_bytes(figure_to_png(figure.update_layout(width=640)))
+
+
+if __name__ == "__main__":
+    main()
