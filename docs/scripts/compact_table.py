@@ -13,7 +13,7 @@ from typing import Any
 
 from docs.scripts.compact_sets import LEARNING_SEEDS, RULES, SEEDS, SETS, median
 from sarl_core.explaining.figures.png import figure_to_png
-from sarl_core.explaining.rule_budgets import (
+from sarl_core.explaining.figures.rule_budgets import (
     BudgetPoint,
     PublishedPoint,
     budget_figure,

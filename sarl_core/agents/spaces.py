@@ -76,7 +76,7 @@ class SpaceAdapter:
         vector = state_vector(observation, None if self.is_vector else self.observation_space)
         whole = type(vector) is np.ndarray and vector.shape == (self.n_features,)
         if whole and vector.dtype == np.float32:
-            return cast(NDArray[np.float32], vector)
+            return cast("NDArray[np.float32]", vector)  # the text costs nothing at each step
         return np.full(self.n_features, np.nan, dtype=np.float32)
 
     def shaped(self, columns: Actions) -> Actions:

@@ -1,10 +1,12 @@
-"""Round numbers for an axis."""
+"""Round numbers for an axis; shares are written on it as they are everywhere else."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_LEAST = 1e-3  # an axis of shares over less than this would have no round number
 
 
 def round_ticks(low: float, high: float, most: int, *, whole: bool = False) -> list[float]:
@@ -41,3 +43,22 @@ def tick_text(tick: float) -> str:
         As "102.5".
     """
     return f"{tick:,.10g}"
+
+
+def share_ticks(low: float, high: float, most: int = 5) -> dict[str, Any]:
+    """Ticks for an axis or a colour bar of Plotly, which itself leaves no space before the sign.
+
+    Args:
+        low: The least share that is seen.
+        high: The largest.
+        most: About so many ticks.
+
+    Returns:
+        Arguments of the axis: round percentages within, as "12.5 %".
+    """
+    ticks = round_ticks(100 * low, 100 * max(high, low + _LEAST), most)
+    return {
+        "tickmode": "array",
+        "tickvals": [tick / 100 for tick in ticks],
+        "ticktext": [f"{tick_text(tick)} %" for tick in ticks],
+    }

@@ -68,6 +68,12 @@ class Plan:
             raise InputError(
                 f"the best is to be chosen by {quoted(self.choose)}; give return or failures"
             )
+        if self.thresholds is not None and self.turns:
+            # The search tries every leaf as a rule: what is cut away would be judged with it.
+            raise InputError(
+                "rules that thresholds cut are not refined; give --refine without --support and "
+                "--confidence, or these without it"
+            )
         for name, value, least, most in (
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),

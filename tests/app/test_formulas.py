@@ -92,6 +92,9 @@ def test_a_formula_is_changed_and_two_stand_beside_each_other() -> None:
         "cart_velocity * cart_velocity",
     ]
     app.button(key="formula_change_1").click().run()
+    typed(app, "")
+    assert not errors(app)
+    assert app.button(key="formula_take").disabled
     app.button(key="formula_cancel").click().run()
     assert "formula_take" not in keys(app)
     app.button(key="formula_remove_0").click().run()

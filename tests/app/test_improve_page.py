@@ -225,6 +225,8 @@ def test_an_own_expert_and_rules_cut_at_thresholds() -> None:
     )
     (sentence,) = errors(app)
     assert "No policy has been uploaded" in sentence
+    # The search tries every leaf as a rule: with thresholds it is not offered.
+    assert "refine" not in [field.key for field in app.number_input]
     policy = (DATA / "experts" / "cartpole.npz").read_bytes()
     app.file_uploader(key="expert_file").set_value([("mine.npz", policy, "")]).run()
     run(app)

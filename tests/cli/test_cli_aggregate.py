@@ -59,6 +59,10 @@ def test_without_an_expert_the_gaps_are_written(run, tmp_path):
         (("--episodes", "0"), "the number of episodes a round is 0"),
         (("--support", "0.1"), "--support and --confidence belong together"),
         (("--support", "2", "--confidence", "0.5"), "the minimum support is 2"),
+        (
+            ("--support", "0.1", "--confidence", "0.9", "--refine", "1"),
+            "rules that thresholds cut are not refined; give --refine without",
+        ),
         (("--expert", "novice"), "acts at random"),
         (("--expert", "nowhere.npz"), "nowhere.npz"),
         (("--expert", "none"), "must end in .csv"),

@@ -14,7 +14,7 @@ from sarl_core.explaining.figures.aggregation import (
     rounds_figure,
 )
 from sarl_core.explaining.figures.gaps import gap_figure, gap_histograms
-from sarl_core.explaining.rule_budgets import PublishedPoint, budget_figure, budget_points
+from sarl_core.explaining.figures.rule_budgets import PublishedPoint, budget_figure, budget_points
 from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.improving.gaps import Gaps, join_gaps
 

@@ -14,8 +14,8 @@ from plotly.subplots import make_subplots
 from sarl_core.documents import Count, MisfitError, NotNegative, Number, Share, conformed
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR, faded
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.improving.aggregation import AggregationRound
 from sarl_core.mining.language import share_text
 

@@ -13,8 +13,8 @@ from sarl_core.explaining.colours import (
     LABEL_COLOURS,
     faded,
 )
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.validation.contradictions import EpisodeContradictions
 from sarl_core.mining.validation.learning_curve import MiningCurve

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.improving.gaps import Gaps
 from sarl_core.mining.language import number_text, share_text
 

@@ -13,8 +13,8 @@ from plotly.subplots import make_subplots
 
 from sarl_core.decimals import rounded_text
 from sarl_core.explaining.colours import LABEL_COLOURS, MUTED_COLOUR, faded
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.files import whole_file
 from sarl_core.learning.arms import LearningArm
 from sarl_core.learning.study_files import LearningRun, LearningStudy

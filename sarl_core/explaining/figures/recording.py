@@ -10,9 +10,9 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from sarl_core.explaining.colours import faded
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import counted, share_text
 from sarl_core.rollouts.statistics import MeanInterval
 

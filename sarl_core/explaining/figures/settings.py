@@ -8,9 +8,9 @@ import plotly.graph_objects as go
 
 from sarl_core.explaining.colours import MUTED_COLOUR
 from sarl_core.explaining.figures.comparison import arm_style
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import LEGEND_ABOVE, figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import share_text
 
 SETTING_COLOURS = {

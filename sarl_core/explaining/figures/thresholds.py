@@ -14,9 +14,9 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.explaining.colours import LAYER_SCALE, MARKER_COLOUR
-from sarl_core.explaining.figures.share_axis import share_ticks
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import number_text, share_text
 from sarl_core.mining.thresholds.landscape import Landscape
 

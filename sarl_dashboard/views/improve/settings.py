@@ -131,16 +131,17 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     "Failures: the fewest failures, and among equals the highest mean return. It "
                     "is reported on other episodes.",
                 )
-                refinement = number(
-                    "Refinement turns",
-                    "refine",
-                    0,
-                    MOST,
-                    0,
-                    "Afterwards the rules' queries, numbers and actions are changed to where they "
-                    f"achieve more, so many times. Each turn takes up to "
-                    f"{refinement_cost(1):,} episodes. 0: not at all.",
-                )
+                if cut == EVERY_LEAF:
+                    refinement = number(
+                        "Refinement turns",
+                        "refine",
+                        0,
+                        MOST,
+                        0,
+                        "Afterwards the rules' queries, numbers and actions are changed to where "
+                        f"they achieve more, so many times. Each turn takes up to "
+                        f"{refinement_cost(1):,} episodes. 0: not at all.",
+                    )
             seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
             if not demonstrations.is_discrete:
                 divider = st.slider(

@@ -10,7 +10,7 @@ from msgspec import Struct
 from sarl_core.documents import Count, MisfitError, Number, Share, conformed, read_object
 from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.figures.aggregation import card_points
-from sarl_core.explaining.rule_budgets import budget_figure, budget_points
+from sarl_core.explaining.figures.rule_budgets import budget_figure, budget_points
 from sarl_core.explaining.words.comparison import POLICY_TEXT
 from sarl_core.improving.aggregation_files import card_path
 from sarl_core.mining.language import counted, share_text

@@ -153,12 +153,12 @@ def formula_editor(raw: Demonstrations, named: Demonstrations) -> None:
         "features, + - * /, min, max, abs and parentheses. A name is written as it is, with "
         "spaces or underscores, and in quotation marks where it has other signs.",
     )
-    if not (text or "").strip():
-        if place is None:
-            _beginning(raw, example)
+    is_empty = not (text or "").strip()
+    if is_empty and place is None:
+        _beginning(raw, example)
         return
     draft = _draft(raw)
-    if draft.problem:
+    if draft.problem and not is_empty:
         refuse(draft.problem)
     for warning in draft.warnings:
         st.warning(in_full(warning), icon=":material/straighten:")

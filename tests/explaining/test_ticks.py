@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from sarl_core.explaining.figures.share_axis import share_ticks
+from sarl_core.explaining.ticks import share_ticks
 
 
 @pytest.mark.parametrize(
