@@ -59,7 +59,7 @@ class RuleSetPlan:
 _CARTPOLE = Plan(
     2, rounds=6, episodes=10, turns=2, validation=4_000, report=3_000, choose="failures"
 )
-_LANDER = Plan(2, rounds=16, episodes=24, turns=6, validation=512, report=1_000, choose="failures")
+_LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
     "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=3)),
@@ -67,7 +67,7 @@ SETS = {
     "lunar_lander_few_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=8), "every"
     ),
-    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=12)),
+    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=4)),
 }
 
 

@@ -43,6 +43,7 @@ from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
 _FIRST_VALIDATION = 16
+_USUAL = (0.05, 0.95)  # quantiles between which most returns lie
 _FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
 
 
@@ -279,7 +280,7 @@ class _Run:
         plan = self.plan
         refined = 0
         if plan.turns:
-            refined = refinement_cost(plan.turns) + planned_episodes(
+            refined = refinement_cost(plan.turns, plan.rounds) + planned_episodes(
                 2 * plan.turns + 1, _first_validation(plan), plan.validation
             )
         return (
@@ -412,15 +413,16 @@ class _Run:
         if not plan.turns:
             return
         pairs, first = self.pairs(start), self.seed(seeds.REFINEMENT)
+        starts = [start.trees, *(trees for trees in self.trees if trees is not start.trees)]
         search = Refinement(
-            start.trees,
+            starts,
             pairs,
             Evaluator(
                 self.env_id,
                 self.agent,
                 projection=plan.projection,
                 divider=plan.divider,
-                choose=plan.choose,
+                worth=self.worth(),
                 max_steps=plan.max_steps,
             ),
             expert=self.expert,
@@ -448,6 +450,13 @@ class _Run:
         index, mean = self.best_of([self.rules(one.trees) for one in choices], second, clock)
         self.choice = replace(choices[index], mean=mean)
         self.seeds = self.seeds._replace(second_validation=second)
+
+    def worth(self) -> float:
+        """What a failure counts in a search: as much as returns differ where failures do."""
+        if self.plan.choose == "return":
+            return 0.0
+        low, high = np.quantile(np.concatenate([one.returns for one in self.rounds]), _USUAL)
+        return float(high - low)
 
     def report(self, clock: _Clock) -> None:
         """Episodes that nothing was chosen by."""

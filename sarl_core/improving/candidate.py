@@ -18,7 +18,7 @@ from sarl_core.mining.combining.queries import over_queried
 from sarl_core.mining.tree import PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
-from sarl_core.rollouts.choices import Choice, scores
+from sarl_core.rollouts.choices import weighed
 from sarl_core.rollouts.episodes import LOST, rollout
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -94,7 +94,7 @@ class Evaluator:
         agent: Who is shielded.
         projection: How the shield replaces a continuous action.
         divider: Number of intervals of continuous dimensions.
-        choose: What comes first where two are compared.
+        worth: Of a failure where two are compared, in units of the return.
         max_steps: After which an episode is cut off; `episodes.MAX_STEPS` where None.
     """
 
@@ -102,7 +102,7 @@ class Evaluator:
     agent: Agent
     projection: Projection
     divider: int
-    choose: Choice
+    worth: float
     max_steps: int | None
 
     def scores(
@@ -126,7 +126,7 @@ class Evaluator:
             progress: Called with (candidates done, in all); returning False stops.
 
         Returns:
-            K times (E, c), as `choices.scores` gives them.
+            K times (E,), as `choices.weighed` gives them.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
@@ -140,7 +140,7 @@ class Evaluator:
 def episode_scores(
     evaluator: Evaluator, candidate: Candidate, few: Demonstrations, seed: int, episodes: int
 ) -> NDArray[np.float64]:
-    """What one candidate achieves, (E, c).
+    """What one candidate achieves, (E,).
 
     Args:
         evaluator: How it is tried.
@@ -159,7 +159,7 @@ def episode_scores(
         keep_steps=False,
         max_steps=evaluator.max_steps,
     )
-    return scores(played, evaluator.choose)
+    return weighed(played, evaluator.worth)
 
 
 def _first_of(pairs: Demonstrations, most: int) -> Demonstrations:

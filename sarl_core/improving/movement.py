@@ -145,10 +145,10 @@ class Movement:
         """Take a step.
 
         Args:
-            means: What the neighbours have achieved, (POPULATION, K), as `mean_score` gives it.
+            means: What the neighbours have achieved, (POPULATION,).
         """
         assert self._strategy is not None
-        if len(np.unique(means, axis=0)) == 1:
+        if np.ptp(means) == 0:
             # There is nothing to follow; further around there may be, and away from what does
             # worse there is the middle of what does well.
             self._strategy.sigma *= _WIDER
@@ -177,20 +177,19 @@ def _evolution_strategy(count: int, seed: int) -> Any:
 
 
 def ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places from -0.5, the least, to 0.5, by the first column, of equals by the next.
+    """Places from -0.5, the least, to 0.5.
 
     Args:
-        means: Shape (n, K).
+        means: Shape (n,).
 
     Returns:
         Shape (n,). Equal means share theirs, so that nothing is followed where all do alike.
     """
-    ladder = np.empty(len(means))
-    ladder[np.lexsort(means.T[::-1])] = np.linspace(-0.5, 0.5, len(means))
-    _, group, size = np.unique(means, axis=0, return_inverse=True, return_counts=True)
-    group = group.reshape(-1)
-    shared: NDArray[np.float64] = (np.bincount(group, weights=ladder) / size)[group]
-    return shared
+    _, group, size = np.unique(means, return_inverse=True, return_counts=True)
+    last = np.cumsum(size) - 1
+    middle = last - 0.5 * (size - 1)
+    places: NDArray[np.float64] = middle[group] / max(len(means) - 1, 1) - 0.5
+    return places
 
 
 def _moving_leaves(tree: PolicyTree) -> NDArray[np.int64]:

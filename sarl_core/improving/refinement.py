@@ -6,6 +6,7 @@ are tried, of which the best stays; then thresholds, ratios and intervals are mo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -26,12 +27,14 @@ from sarl_core.mining.combining.candidates import Pair, candidates
 from sarl_core.mining.tree import PolicyTree, count_tree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.choices import mean_score
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.shield import Shield
 
 EPISODES = 16  # for each neighbour, the same for all of a generation
 
+_EXPERT_EPISODES = 32  # in which it is seen how long the expert takes
+_LONG = 0.9  # quantile of their lengths
+_PATIENCE = 2  # times as long: what takes longer is tried no further
 _MET_EPISODES = 32  # in which it is seen where the rules lead
 _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
@@ -41,21 +44,23 @@ _SHAPES = 4  # that are moved: which has most in it is not seen before
 _EARLY = 4  # generations for each of them
 _LATE = 8  # further ones for the best
 _COMPARED_EPISODES = 128  # by which it is the best
+_STARTS = 8  # that are neighbours of the first turn, of all that the search may begin with
 GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
 
 
-def refinement_cost(turns: int) -> int:
-    """Most episodes of a refinement."""
+def refinement_cost(turns: int, starts: int = 1) -> int:
+    """Most episodes of a refinement that may begin with one of so many."""
     shapes = planned_episodes(_NEIGHBOURS, EPISODES, _SHAPE_EPISODES)
     compared = planned_episodes(_SHAPES + 2, EPISODES, _COMPARED_EPISODES)
     moved = GENERATIONS * POPULATION * EPISODES
-    return turns * (_MET_EPISODES + shapes + moved + compared)
+    begun = planned_episodes(starts, EPISODES, _COMPARED_EPISODES) if starts > 1 else 0
+    return _EXPERT_EPISODES + begun + turns * (_MET_EPISODES + shapes + moved + compared)
 
 
 def refinement_seeds(turns: int) -> int:
     """Most seeds of a refinement: all that are compared play the same episodes."""
     compared = _MET_EPISODES + _SHAPE_EPISODES + _COMPARED_EPISODES
-    return turns * (compared + GENERATIONS * EPISODES)
+    return _EXPERT_EPISODES + _COMPARED_EPISODES + turns * (compared + GENERATIONS * EPISODES)
 
 
 class Refinement:
@@ -63,7 +68,7 @@ class Refinement:
 
     def __init__(
         self,
-        trees: Sequence[PolicyTree],
+        starts: Sequence[Sequence[PolicyTree]],
         pairs: Demonstrations,
         evaluator: Evaluator,
         *,
@@ -78,8 +83,9 @@ class Refinement:
         """Begin a search.
 
         Args:
-            trees: Where it begins, one an action dimension; every leaf is a rule.
-            pairs: What they were grown from.
+            starts: Where it may begin, each one tree an action dimension; every leaf is a rule.
+                What achieves most of them is where it does begin.
+            pairs: What trees are counted over where no others are known.
             evaluator: How candidates are tried.
             expert: Who is asked about the states that they lead to.
             combined: Pairs of features of which new queries may ask about combinations.
@@ -89,8 +95,8 @@ class Refinement:
             jobs: Processes; changes the speed, never the result.
             executor: Whose processes they are; this machine's where not given.
         """
-        self.here = Candidate.of_trees(trees)
-        self._compared = self.here
+        self._starts = [Candidate.of_trees(trees) for trees in starts]
+        self.here = self._compared = self._starts[0]
         self._start = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
@@ -122,16 +128,47 @@ class Refinement:
             WorkError: If a process ended in the middle of its work.
             CancelledError: If `progress` returned False.
         """
-        self._progress, self._total = progress, refinement_cost(turns)
+        self._progress, self._total = progress, refinement_cost(turns, len(self._starts))
+        self._begin()
+        begun = self._done - refinement_cost(0)
         marks = []
         for turn in range(1, turns + 1):
             before = self._compared
             self._turn()
-            self._tell(refinement_cost(turn) - self._done)  # some had fewer neighbours
+            # Some had fewer neighbours.
+            self._tell(begun + refinement_cost(turn) - self._done)
             marks += [self._compared, self.here]
             if better is not None and self._compared is not before:
                 better(self._compared)
         return marks
+
+    def _begin(self) -> None:
+        """Begin with what achieves most; the next best are tried as its neighbours are."""
+        self._evaluator = replace(self._evaluator, max_steps=self._patience())
+        starts, self._starts = self._starts, []
+        if len(starts) > 1:
+            ranking = self._ranking(starts, self._start, _COMPARED_EPISODES)
+            best, *self._starts = [starts[place] for place in ranking[: 1 + _STARTS]]
+            self.here = self._compared = best
+
+    def _patience(self) -> int:
+        """Steps after which an episode of the search is left.
+
+        Rules that never come to an end would cost most of the time, and what they do so long is
+        not what the expert does.
+        """
+        played = rollout(
+            self._evaluator.env_id,
+            self._expert,
+            episodes=_EXPERT_EPISODES,
+            seed=self._take(_EXPERT_EPISODES),
+            keep_steps=False,
+            max_steps=self._evaluator.max_steps,
+            executor=self._workers,
+        )
+        self._tell(_EXPERT_EPISODES)
+        long = math.ceil(_PATIENCE * float(np.quantile(played.lengths, _LONG)))
+        return min(long, self._evaluator.max_steps or long)
 
     def _turn(self) -> None:
         """Change the shape, if that is better, and move the thresholds."""
@@ -142,7 +179,7 @@ class Refinement:
         # What was best before it was moved further on, too: it may have been led astray.
         unmoved = [self.here] if self._compared is self.here else [self.here, self._compared]
         compared = [*unmoved, *(one.here for one in moving)]
-        best = self._ranking(compared, met, _COMPARED_EPISODES)[0]
+        best = self._ranking(compared, met.pairs, _COMPARED_EPISODES)[0]
         self._compared = compared[best]
         place = best - len(unmoved)
         one = moving[place] if place >= 0 else self._movement(self._compared, met)
@@ -209,15 +246,20 @@ class Refinement:
             count=_NEIGHBOURS,
             generator=self._generator,
         )
+        # In the first turn, what else it might have begun with, in place of the unlikeliest.
+        others = [*others[: max(_NEIGHBOURS - len(self._starts), 0)], *self._starts]
+        self._starts = []
         if not others:
             return []
-        return [others[one] for one in self._ranking(others, met, _SHAPE_EPISODES)[:_SHAPES]]
+        return [others[one] for one in self._ranking(others, met.pairs, _SHAPE_EPISODES)[:_SHAPES]]
 
-    def _ranking(self, tried: Sequence[Candidate], met: MetStates, episodes: int) -> Sequence[int]:
+    def _ranking(
+        self, tried: Sequence[Candidate], pairs: Demonstrations, episodes: int
+    ) -> Sequence[int]:
         """Candidates by what they achieve, the best first."""
 
         def achieved(left: Sequence[int], seed: int, count: int) -> list[NDArray[np.float64]]:
-            return self._scores([tried[place] for place in left], met, seed=seed, episodes=count)
+            return self._scores([tried[place] for place in left], pairs, seed=seed, episodes=count)
 
         first = self._take(episodes)
         return successive_halving(
@@ -233,18 +275,18 @@ class Refinement:
         """Move thresholds in the direction that brings more."""
         for _ in range(generations if movement.count else 0):
             achieved = self._scores(
-                movement.ask(), met, seed=self._take(EPISODES), episodes=EPISODES
+                movement.ask(), met.pairs, seed=self._take(EPISODES), episodes=EPISODES
             )
-            movement.tell(np.array([mean_score(one) for one in achieved]))
+            movement.tell(np.array([one.mean() for one in achieved]))
 
     def _scores(
-        self, tried: Sequence[Candidate], met: MetStates, *, seed: int, episodes: int
+        self, tried: Sequence[Candidate], pairs: Demonstrations, *, seed: int, episodes: int
     ) -> list[NDArray[np.float64]]:
         """What each candidate achieves in the same episodes."""
         before = self._done
         return self._evaluator.scores(
             tried,
-            met.pairs,
+            pairs,
             seed=seed,
             episodes=episodes,
             workers=self._workers,

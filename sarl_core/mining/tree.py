@@ -8,7 +8,9 @@ a node a slice.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
@@ -370,13 +372,17 @@ def grow_policy_trees(
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
     if max_depth is not None and not (isinstance(max_depth, Integral) and max_depth >= 1):
         raise InputError(f"the maximum depth is {quoted(max_depth)}; give 1 or more, or none")
-    trees = []
-    for index, dimension in enumerate(label_dimensions(demonstrations, divider)):
-        labels = dimension.labels_of(demonstrations.action_columns[:, index])
+    dimensions = label_dimensions(demonstrations, divider)
+
+    def grown(index: int) -> PolicyTree:
+        labels = dimensions[index].labels_of(demonstrations.action_columns[:, index])
         learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
         structure = fitted(learner, demonstrations.observations, labels)
-        trees.append(count_tree(structure, demonstrations, index, divider=divider))
-    return tuple(trees)
+        return count_tree(structure, demonstrations, index, divider=divider)
+
+    # scikit-learn lets other threads run while it grows a tree.
+    with ThreadPoolExecutor(min(len(dimensions), os.cpu_count() or 1)) as threads:
+        return tuple(threads.map(grown, range(len(dimensions))))
 
 
 @dataclass(frozen=True, eq=False)

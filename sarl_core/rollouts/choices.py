@@ -56,6 +56,25 @@ def scores(episodes: Episodes, choose: Choice) -> NDArray[np.float64]:
     return np.column_stack([-may_have_failed.astype(np.float64), episodes.returns])
 
 
+def weighed(episodes: Episodes, worth: float) -> NDArray[np.float64]:
+    """What episodes count where something is moved to where it achieves more.
+
+    Where failures came first, what never ends would be better than what fails once; so what is
+    moved is led by returns, less by so much for a failure.
+
+    Args:
+        episodes: E of them.
+        worth: Of a failure, in units of the return, at least 0. What may have failed counts as a
+            failure.
+
+    Returns:
+        Numbers of which more is better, (E,).
+    """
+    may_have_failed = episodes.failed | episodes.undecided
+    less: NDArray[np.float64] = episodes.returns - worth * may_have_failed
+    return less
+
+
 def mean_score(scored: NDArray[np.float64]) -> tuple[float, ...]:
     """What the episodes of a candidate come to.
 

@@ -10,6 +10,7 @@ from sarl_core.improving import movement, refinement
 
 SMALL = {
     "EPISODES": 2,
+    "_EXPERT_EPISODES": 2,
     "_MET_EPISODES": 3,
     "_NEIGHBOURS": 3,
     "_SHAPE_EPISODES": 3,

@@ -86,7 +86,7 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
     # None of the rounds shares an episode with another, nor any part of the search.
     assert len(used["rounds"]) == 2 * 3
-    assert len(used["refinement"]) == refinement.refinement_seeds(1) == 3 + 3 + 4 + 3 * 2
+    assert len(used["refinement"]) == refinement.refinement_seeds(1) == 2 + 4 + 3 + 3 + 4 + 3 * 2
     assert len(used["report"]) == 5
     # And the record says where each begins.
     assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}

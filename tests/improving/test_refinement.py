@@ -18,8 +18,8 @@ from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.candidates import pairs_of_like_kind
 from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.progress import CancelledError
-from sarl_core.rollouts.choices import mean_score
-from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.choices import mean_score, scores, weighed
+from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
@@ -27,7 +27,7 @@ CART = "CartPole-v1"
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet").select(range(4))
 PENDULUM = load_demonstrations(DATA / "pendulum.parquet").select(range(8))
-TRIAL = Evaluator(CART, make_agent("novice", CART), "centre", 2, "return", None)
+TRIAL = Evaluator(CART, make_agent("novice", CART), "centre", 2, 0.0, None)
 
 
 def neighbours_of(
@@ -89,7 +89,7 @@ def test_thresholds_go_to_where_they_bring_more() -> None:
         tried = movement.ask()
         assert len(tried) == POPULATION
         achieved = TRIAL.scores(tried, CARTPOLE, seed=number * 8, episodes=8, workers=None)
-        movement.tell(np.array([mean_score(one) for one in achieved]))
+        movement.tell(np.array([one.mean() for one in achieved]))
     (moved,) = movement.here.trees(CARTPOLE, 2)
     assert moved.feature.tolist() == trees[0].feature.tolist()
     assert moved.threshold[0] != trees[0].threshold[0]
@@ -155,28 +155,24 @@ def _asking(*, threshold: float | None) -> TreeStructure:
 
 
 def test_where_all_do_alike_nothing_is_followed() -> None:
-    assert ranks(np.array([[3.0], [1.0], [2.0]])).tolist() == [0.5, -0.5, 0.0]
-    assert np.allclose(ranks(np.full((6, 1), 500.0)), 0.0)
-    tied = ranks(np.array([[1.0], [7.0], [7.0], [0.0]]))
-    assert tied[1] == tied[2] > tied[0] > tied[3]
+    assert ranks(np.array([3.0, 1.0, 2.0])).tolist() == [0.5, -0.5, 0.0]
+    assert np.allclose(ranks(np.full(6, 500.0)), 0.0)
+    assert np.allclose(ranks(np.array([1.0, 7.0, 7.0, 0.0])), [-1 / 6, 1 / 3, 1 / 3, -0.5])
     movement = Movement(grow_budgeted_trees(CARTPOLE, max_rules=4), CARTPOLE, seed=0)
     before = movement.here.structures[0].threshold
     movement.ask()
-    movement.tell(np.full((POPULATION, 1), 500.0))
+    movement.tell(np.full(POPULATION, 500.0))
     np.testing.assert_array_equal(movement.here.structures[0].threshold, before)
-    # Failures before returns.
-    both = ranks(np.array([[-0.5, 9.0], [0.0, 1.0], [0.0, 2.0]]))
-    assert both.tolist() == [-0.5, 0.0, 0.5]
 
 
 def mean_return(rules) -> float:
     return float(rollout(CART, "novice", shield=Shield(rules), episodes=32, seed=77).returns.mean())
 
 
-def search(**named) -> Refinement:
+def search(*others, **named) -> Refinement:
     trees = grow_budgeted_trees(CARTPOLE, max_rules=2)
     return Refinement(
-        trees,
+        [trees, *others],
         CARTPOLE,
         TRIAL,
         expert=make_agent("expert", CART),
@@ -217,9 +213,9 @@ def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) 
         PENDULUM, actions=PENDULUM.actions / 4, action_low=None, action_high=None, bounds_from=None
     )
     search = Refinement(
-        grow_budgeted_trees(shown, max_rules=4, divider=8),
+        [grow_budgeted_trees(shown, max_rules=4, divider=8)],
         shown,
-        Evaluator(pendulum, make_agent("novice", pendulum), "centre", 8, "return", 20),
+        Evaluator(pendulum, make_agent("novice", pendulum), "centre", 8, 0.0, 20),
         expert=make_agent("expert", pendulum),
         max_rules=4,
         first=0,
@@ -229,11 +225,93 @@ def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) 
     assert met.action_dimensions == shown.action_dimensions
 
 
+def test_it_begins_with_what_achieves_most_and_tries_the_others_as_neighbours(
+    small_search, monkeypatch
+) -> None:
+    better = grow_budgeted_trees(CARTPOLE, max_rules=8)
+    worse = grow_budgeted_trees(CARTPOLE, max_rules=3)
+    compared: list[list[Candidate]] = []
+    ranked = Refinement._ranking
+
+    def ranking(self, tried, pairs, episodes):
+        compared.append(list(tried))
+        return ranked(self, tried, pairs, episodes)
+
+    monkeypatch.setattr(Refinement, "_ranking", ranking)
+    begun = search(worse, better)
+    starts = [Candidate.of_trees(trees) for trees in (worse, better)]
+    ticks: list[tuple[int, int]] = []
+    begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
+    assert ticks[-1] == (refinement_cost(2, 3), refinement_cost(2, 3))
+    first, shapes, end, later, _ = compared
+    best = max(first, key=lambda one: mean_return(leaf_rules(one.trees(CARTPOLE, 2))))
+    assert best.structures[0].threshold.tolist() == starts[1].structures[0].threshold.tolist()
+    assert end[0] is best
+    others = [one for one in first if one is not best]
+    assert all(one in shapes for one in others)
+    assert not any(one in later for one in others)
+
+
+def played(returns: list[float], failed: list[bool]) -> Episodes:
+    """Episodes of an environment that signals its failures."""
+    zeros = np.zeros(len(returns), dtype=np.int64)
+    return Episodes(
+        env_id=CART,
+        agent="novice",
+        seeds=zeros,
+        returns=np.array(returns),
+        lengths=zeros + 1,
+        interventions=zeros,
+        covered=zeros,
+        terminated=np.array(failed),
+        truncated=~np.array(failed),
+        last_rewards=np.zeros(len(returns)),
+        signalled=np.array(failed, dtype=np.float64),
+    )
+
+
+def test_what_never_ends_is_not_better_than_what_fails_once() -> None:
+    landing = played(returns=[250.0] * 15 + [-100.0], failed=[False] * 15 + [True])
+    hovering = played(returns=[-20.0] * 16, failed=[False] * 16)
+    assert mean_score(scores(hovering, "failures")) > mean_score(scores(landing, "failures"))
+    assert weighed(landing, 350.0).mean() > weighed(hovering, 350.0).mean()
+    assert weighed(landing, 350.0)[-1] == -450.0
+    np.testing.assert_array_equal(weighed(landing, 0.0), landing.returns)
+
+
+def test_what_takes_much_longer_than_the_expert_is_tried_no_further(
+    sized_search, monkeypatch
+) -> None:
+    lander = "LunarLander-v3"
+    demonstrations = load_demonstrations(DATA / "lunar_lander.parquet").select(range(4))
+    sized_search(_EXPERT_EPISODES=10)
+    expert = make_agent("expert", lander)
+    search = Refinement(
+        [grow_budgeted_trees(demonstrations, max_rules=4)],
+        demonstrations,
+        Evaluator(lander, make_agent("novice", lander), "centre", 2, 0.0, None),
+        expert=expert,
+        max_rules=4,
+        first=50,
+    )
+    limits: list[int | None] = []
+    trial = Evaluator.scores
+    monkeypatch.setattr(
+        Evaluator,
+        "scores",
+        lambda self, *given, **named: limits.append(self.max_steps) or trial(self, *given, **named),
+    )
+    search.run(1)
+    lengths = rollout(lander, expert, episodes=10, seed=50).lengths
+    assert set(limits) == {int(np.ceil(2 * np.quantile(lengths, 0.9)))}
+
+
 def test_it_can_be_stopped_after_any_candidate(small_search) -> None:
     ticks: list[int] = []
     with pytest.raises(CancelledError):
-        search().run(1, progress=lambda done, total: ticks.append(done) or done < 3 + 2)
-    assert ticks[-1] == 3 + 2  # where the rules lead, and the first of three neighbours
+        search().run(1, progress=lambda done, total: ticks.append(done) or done < 2 + 3 + 2)
+    # The expert, where the rules lead, and the first of three neighbours.
+    assert ticks[-1] == 2 + 3 + 2
 
 
 def test_where_the_thresholds_were_moved_is_told_once_it_was_compared(
@@ -249,4 +327,6 @@ def test_where_the_thresholds_were_moved_is_told_once_it_was_compared(
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
-    assert refinement_seeds(3) == 3 * refinement_seeds(1) > 0
+    # Those of the choice where to begin are used once.
+    assert refinement_seeds(3) - refinement_seeds(2) == refinement_seeds(2) - refinement_seeds(1)
+    assert 2 * refinement_seeds(1) > refinement_seeds(2)
