@@ -60,6 +60,8 @@ _CARTPOLE = Plan(
     2, rounds=6, episodes=10, turns=2, validation=4_000, report=3_000, choose="failures"
 )
 _LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
+_CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)
+_PENDULUM = Plan(16, rounds=16, episodes=20, divider=16, turns=3, validation=512, report=1_000)
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
     "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=3)),
@@ -68,6 +70,11 @@ SETS = {
         "lunar_lander", replace(_LANDER, max_rules=8), "every"
     ),
     "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=4)),
+    "lunar_lander_continuous_combined": RuleSetPlan(
+        "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
+    ),
+    "pendulum_combined": RuleSetPlan("pendulum", _PENDULUM, "every"),
+    "pendulum_compact": RuleSetPlan("pendulum", _PENDULUM),
 }
 
 

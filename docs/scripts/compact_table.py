@@ -1,4 +1,4 @@
-"""Writes what the compact sets achieve into the pages: ``python -m docs.scripts.compact_table``.
+"""Writes what the compact sets achieve into the guide: ``python -m docs.scripts.compact_table``.
 
 The numbers are those of data/rules/seeds.json and data/rules/budgets.json, which
 ``docs.scripts.compact_sets`` and ``docs.scripts.budgets`` have measured.
@@ -23,7 +23,7 @@ from sarl_core.files import whole_file
 from sarl_core.mining.language import share_text
 
 FOLDER = Path(__file__).resolve().parents[2]
-PAGES = ("README.md", "docs/results/compact_rules.md")
+PAGE = FOLDER / "docs" / "results" / "compact_rules.md"
 BEGIN = "<!-- made by: python -m docs.scripts.compact_table -->"
 END = "<!-- end of what is made -->"
 TASKS = {
@@ -36,34 +36,32 @@ TASKS = {
 }
 COSTA = "Costa et al. 2024"
 PUBLISHED = {
-    "cartpole": ((PublishedPoint(3, 500.0, COSTA), "500 ± 0"),),
+    "cartpole": ((PublishedPoint(3, 500.0, COSTA), "500 ± 0", "–"),),
     "lunar_lander": (
-        (PublishedPoint(19, 237.7, COSTA), "237.7 ± 72.5"),
-        (PublishedPoint(94, 245.0, COSTA), "245 ± 40.5"),
+        (PublishedPoint(19, 237.7, COSTA), "237.7 ± 72.5", "91 %"),
+        (PublishedPoint(94, 245.0, COSTA), "245 ± 40.5", "–"),
     ),
 }
+LANDING = ("lunar_lander", "lunar_lander_continuous")  # of which 200 counts as solved
 HEAD = (
-    "| task | rules | features a query | mean return, 95 % interval | failures, 95 % interval | "
-    "over five learning seeds |",
-    "| --- | --- | --- | --- | --- | --- |",
+    "| task | rules | features a query | mean return, 95 % interval | 200 or more | failures, "
+    "95 % interval | each of five learning seeds: mean (failures) |",
+    "| --- | --- | --- | --- | --- | --- | --- |",
 )
 
 
 def main() -> None:
-    """Write the table into every page, and the pictures."""
-    table = compact_table(json.loads(SEEDS.read_text(encoding="utf-8")))
-    for name in PAGES:
-        page = FOLDER / name
-        with whole_file(page) as unfinished:
-            unfinished.write_text(
-                with_table(page.read_text(encoding="utf-8"), table), encoding="utf-8"
-            )
+    """Write the table into the page, and the pictures."""
+    written = with_table(PAGE.read_text(encoding="utf-8"))
+    with whole_file(PAGE) as unfinished:
+        unfinished.write_text(written, encoding="utf-8")
     for task in TASKS:
         front(task)
 
 
-def with_table(page: str, table: str) -> str:
-    """A page with the table between its marks."""
+def with_table(page: str) -> str:
+    """A page with the table of what is known between its marks."""
+    table = compact_table(json.loads(SEEDS.read_text(encoding="utf-8")))
     before, rest = page.split(BEGIN)
     return f"{before}{BEGIN}\n\n{table}\n\n{END}{rest.split(END)[1]}"
 
@@ -77,26 +75,30 @@ def compact_table(known: dict[str, list[dict[str, Any]]]) -> str:
             for name, one in SETS.items()
             if one.task == task and len(known.get(name, ())) == len(LEARNING_SEEDS)
         ]
-        for name, seeds in sets:
+        for name, seeds in sorted(sets, key=lambda one: median(one[1])["rules"]):
             chosen = median(seeds)
-            means = sorted(one["mean"] for one in seeds)
-            over = f"{means[0]:,.1f} to {means[-1]:,.1f}"
-            if chosen["failures"] is not None:
-                failed = sorted(one["failures"] / one["episodes"] for one in seeds)
-                over += f"; {share_text(failed[0])} to {share_text(failed[-1])} fail"
             features = "two" if SETS[name].combine else "one"
-            rows.append(
-                f"| {title} | {chosen['rules']} | {features} | {mean_text(chosen)} | "
-                f"{failure_text(chosen)} | {over} |"
-            )
+            every = ", ".join(map(seed_text, sorted(seeds, key=lambda one: int(one["seed"]))))
+            achieved = outcome_text(task, chosen)
+            rows.append(f"| {title} | {chosen['rules']} | {features} | {achieved} | {every} |")
         if sets:
-            for point, text in PUBLISHED.get(task, ()):
-                rows.append(f"| *{point.name}* | {point.rules} | one | {text} | – | – |")
+            for point, mean, solved in PUBLISHED.get(task, ()):
+                rows.append(f"| *{point.name}* | {point.rules} | one | {mean} | {solved} | – | – |")
             (expert,) = known[f"{task}_expert"]
-            rows.append(
-                f"| *the expert* | – | – | {mean_text(expert)} | {failure_text(expert)} | – |"
-            )
+            rows.append(f"| *the expert* | – | – | {outcome_text(task, expert)} | – |")
     return "\n".join(rows)
+
+
+def outcome_text(task: str, one: dict[str, Any]) -> str:
+    """Return and failures, as three cells."""
+    solved = share_text(one["solved"]) if task in LANDING else "–"
+    return f"{mean_text(one)} | {solved} | {failure_text(one)}"
+
+
+def seed_text(one: dict[str, Any]) -> str:
+    """What the rules of one learning seed achieve."""
+    failures = "" if one["failures"] is None else f" ({one['failures']:,})"
+    return f"{one['mean']:,.1f}{failures}"
 
 
 def mean_text(one: dict[str, Any]) -> str:
@@ -139,7 +141,7 @@ def front(task: str) -> None:
         return
     figure = budget_figure(
         sorted((*points, *refined), key=lambda point: point.rules),
-        published=[point for point, _ in PUBLISHED.get(task, ())],
+        published=[point for point, *_ in PUBLISHED.get(task, ())],
     )
     with whole_file(FOLDER / "docs" / "pictures" / f"front_{task}.png") as unfinished:
         unfinished.write_bytes(figure_to_png(figure.update_layout(width=640)))
