@@ -412,11 +412,10 @@ class _Run:
         assert start is not None
         if not plan.turns:
             return
-        pairs, first = self.pairs(start), self.seed(seeds.REFINEMENT)
-        starts = [start.trees, *(trees for trees in self.trees if trees is not start.trees)]
+        first = self.seed(seeds.REFINEMENT)
         search = Refinement(
-            starts,
-            pairs,
+            self.trees,
+            self.pairs(start),
             Evaluator(
                 self.env_id,
                 self.agent,
@@ -435,7 +434,8 @@ class _Run:
         )
 
         def moved(candidate: Candidate) -> _Choice:
-            return _Choice(start.index, candidate.trees(pairs, plan.divider), refined=True)
+            pairs = self.answers.pairs(search.begun, derived=candidate.derived)
+            return _Choice(search.begun, candidate.trees(pairs, plan.divider), refined=True)
 
         def better(candidate: Candidate) -> None:
             # By the episodes of the search only: for who stops before the second validation.

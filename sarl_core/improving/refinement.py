@@ -96,6 +96,7 @@ class Refinement:
             executor: Whose processes they are; this machine's where not given.
         """
         self._starts = [Candidate.of_trees(trees) for trees in starts]
+        self.begun = 0  # index of the start that it began with
         self.here = self._compared = self._starts[0]
         self._start = pairs
         self._progress: Progress | None = None
@@ -148,8 +149,9 @@ class Refinement:
         starts, self._starts = self._starts, []
         if len(starts) > 1:
             ranking = self._ranking(starts, self._start, _COMPARED_EPISODES)
-            best, *self._starts = [starts[place] for place in ranking[: 1 + _STARTS]]
-            self.here = self._compared = best
+            self.begun = ranking[0]
+            self.here = self._compared = starts[self.begun]
+            self._starts = [starts[place] for place in ranking[1 : 1 + _STARTS]]
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
