@@ -15,7 +15,7 @@ from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, pol
 from sarl_dashboard.state.edits import offered as edits_offered
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
+from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, OWN_FILE, compact_sets
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import in_full
 
@@ -67,8 +67,8 @@ def environment_choice() -> str | None:
 
 def offered_rule_sets(names: Sequence[str]) -> list[str]:
     """Those of some rule sets that can be had now."""
-    there = {COMPACT: compact_file().is_file(), EDITED: edits_offered()}
-    return [name for name in names if there.get(name, True)]
+    missing = COMPACT_ENDINGS.keys() - compact_sets()
+    return [name for name in names if name not in missing and (name != EDITED or edits_offered())]
 
 
 def projection_choice(width: Width = "stretch") -> Projection:

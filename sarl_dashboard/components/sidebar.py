@@ -86,8 +86,8 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         # On pages that do not ask for it the choice keeps its place in the URL by this.
         if combining.chosen().on:
             lines.append("**Combinations** of two features on")
-        if compact_set.in_force():
-            lines.append("**Compact rules** in force")
+        if compact := compact_set.in_force():
+            lines.append(f"**{compact_set.set_title(compact)}** in force")
             if with_thresholds:
                 lines.append("Thresholds, set aside:")
         if not with_thresholds:

@@ -1,4 +1,4 @@
-"""The compact rules as the set in force: in the URL, and counted on the chosen demonstrations.
+"""A compact set as the rules in force: in the URL, and counted on the chosen demonstrations.
 
 They come as a file, built from other pairs than those on screen. What stands behind a rule is
 shown of the demonstrations that were chosen, so the rules are made a tree again and counted there.
@@ -18,18 +18,36 @@ from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, compact_file, compact_rules
+from sarl_dashboard.state.rule_files import (
+    CHOSEN,
+    COMPACT_ENDINGS,
+    compact_rules,
+    compact_sets,
+)
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import refuse
 
 THRESHOLDS = "thresholds"
 # Which set the Rules page has to show, to show a rule of a set that was chosen elsewhere.
-SET_ON_RULES_PAGE = {CHOSEN: THRESHOLDS, COMPACT: COMPACT}
+SET_ON_RULES_PAGE = {CHOSEN: THRESHOLDS} | {name: name for name in COMPACT_ENDINGS}
+
+
+def set_title(name: str) -> str:
+    """What a compact set is called.
+
+    Args:
+        name: Of the set.
+
+    Returns:
+        As "Compact rules, two features".
+    """
+    size, comma, features = name.partition(",")
+    return f"{size.capitalize()} rules{comma}{features}"
 
 
 @dataclass(frozen=True, eq=False)
 class Compact:
-    """The compact rules of the chosen data.
+    """A compact set of the chosen data.
 
     Attributes:
         shipped: The rules as they are in the file.
@@ -52,23 +70,19 @@ class Compact:
         return self._in_file[rule.dimension, rule.conditions]
 
 
-def offered() -> bool:
-    """Whether there are compact rules for the chosen data."""
-    return compact_file().is_file()
+def in_force() -> str | None:
+    """Name of the set that was chosen (URL: set); None for the rules at the thresholds."""
+    name = url_choice("set", (THRESHOLDS, *compact_sets()), THRESHOLDS)
+    return None if name == THRESHOLDS else name
 
 
-def in_force() -> bool:
-    """Whether they were chosen (URL: set)."""
-    return url_choice("set", (THRESHOLDS, COMPACT)[: 1 + offered()], THRESHOLDS) == COMPACT
-
-
-def choose(compact: bool) -> None:
-    """Choose the compact rules, or those at the thresholds; for callbacks."""
-    set_url_choice("set", COMPACT if compact else THRESHOLDS, THRESHOLDS)
+def choose(name: str | None) -> None:
+    """Choose a compact set, or None for the rules at the thresholds; for callbacks."""
+    set_url_choice("set", name or THRESHOLDS, THRESHOLDS)
 
 
 def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
-    """The compact rules, if they are in force.
+    """The compact set, if one is in force.
 
     Args:
         demonstrations: N pairs to count.
@@ -77,10 +91,11 @@ def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
         None where the thresholds are in force. Rules that cannot be used are said on the page,
         and the thresholds are in force.
     """
-    if not in_force():
+    name = in_force()
+    if name is None:
         return None
     try:
-        return _counted(compact_rules(), demonstrations)
+        return _counted(compact_rules(name), demonstrations)
     except SarlError as error:
         refuse(error)
         return None

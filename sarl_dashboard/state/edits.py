@@ -30,10 +30,11 @@ from sarl_dashboard.state.data import chosen_demonstrations, data_key, held_out_
 from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
-    COMPACT,
+    COMPACT_ENDINGS,
     OWN_FILE,
     as_named,
     compact_rules,
+    compact_sets,
     rules_in_file,
     unnamed_compact_rules,
 )
@@ -83,21 +84,21 @@ class Basis:
 
 def kinds() -> list[str]:
     """What can be edited."""
-    return [CHOSEN, *([COMPACT] if compact_set.offered() else []), OWN_FILE]
+    return [CHOSEN, *compact_sets(), OWN_FILE]
 
 
 def chosen_kind() -> str:
     """What is edited: a file, or the rules in force (URL: base, set)."""
     if url_choice("base", ("force", OWN_FILE), "force") == OWN_FILE:
         return OWN_FILE
-    return COMPACT if compact_set.in_force() else CHOSEN
+    return compact_set.in_force() or CHOSEN
 
 
 def choose_kind(kind: str) -> None:
     """Choose what is edited; for callbacks."""
     set_url_choice("base", OWN_FILE if kind == OWN_FILE else "force", "force")
     if kind != OWN_FILE:
-        compact_set.choose(kind == COMPACT)
+        compact_set.choose(kind if kind in COMPACT_ENDINGS else None)
 
 
 def take_file(content: bytes, name: str) -> None:
@@ -122,8 +123,8 @@ def base() -> Base:
         if uploaded is None:
             raise InputError("no rule file has been uploaded; upload one, or edit other rules")
         return replace(uploaded, rule_set=as_named(uploaded.rule_set))
-    if kind == COMPACT:
-        return Base(kind, f"compact {unnamed_compact_rules().digest}", compact_rules())
+    if kind in COMPACT_ENDINGS:
+        return Base(kind, f"compact {unnamed_compact_rules(kind).digest}", compact_rules(kind))
     rule_set = rules_at()
     # A rule's number is its node's, the same at all thresholds.
     return Base(kind, repr((data_key(), rule_set.divider)), rule_set)

@@ -9,7 +9,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state.edits import edited_rules
 from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (
-    COMPACT,
+    COMPACT_ENDINGS,
     NO_RULES,
     OWN_FILE,
     PAPERS,
@@ -33,8 +33,8 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> RuleSet | None:
         if uploaded is None:
             raise InputError("no rule file has been uploaded; upload one, or choose other rules")
         return as_named(rules_in_file(uploaded.getvalue(), uploaded.name))
-    if choice == COMPACT:
-        return compact_rules()
+    if choice in COMPACT_ENDINGS:
+        return compact_rules(choice)
     if choice == EDITED:
         return edited_rules()
     return rules_at(PAPERS.get(choice))

@@ -1,4 +1,4 @@
-"""Rules that come as files: the compact ones that are shipped, and a visitor's own."""
+"""Rules that come as files: the compact sets that are shipped, and a visitor's own."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ from sarl_dashboard.state.data import (
 )
 
 OWN_FILE = "own file"
-CHOSEN, NO_RULES, COMPACT = "at the thresholds", "none", "compact"
+CHOSEN, NO_RULES = "at the thresholds", "none"
+COMPACT, COMBINED, FEWEST = "compact", "compact, two features", "fewest, two features"
+COMPACT_ENDINGS = {COMPACT: "compact", COMBINED: "combined", FEWEST: "few_combined"}
+"""The compact sets that there may be for some data: their names, and how their files' end."""
 PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 RULES_FOLDER = DATA / "rules"
 
@@ -68,9 +71,14 @@ def _renamed(rule_set: RuleSet, names: Names | None) -> RuleSet:
     return rule_set if names is None else renamed_rules(rule_set, names)
 
 
-def compact_file() -> Path:
-    """Where the compact rules of the chosen data lie; there may be none."""
-    return RULES_FOLDER / f"{chosen_dataset()}_compact.json"
+def compact_file(name: str) -> Path:
+    """Where a compact set of the chosen data lies, by its name; there may be none."""
+    return RULES_FOLDER / f"{chosen_dataset()}_{COMPACT_ENDINGS[name]}.json"
+
+
+def compact_sets() -> list[str]:
+    """Names of the compact sets of the chosen data."""
+    return [name for name in COMPACT_ENDINGS if compact_file(name).is_file()]
 
 
 @cached()
@@ -79,25 +87,31 @@ def _compact_rules(path: Path, stamp: int, dataset: str) -> RuleSet:
     return with_splits(shipped, shipped_demonstrations(dataset))
 
 
-def unnamed_compact_rules() -> RuleSet:
-    """The compact rules of the chosen data under the names they came with.
+def unnamed_compact_rules(name: str) -> RuleSet:
+    """A compact set of the chosen data under the names it came with.
+
+    Args:
+        name: Of the set.
 
     Raises:
-        InputError: If there are none, or they cannot be read.
+        InputError: If there is none, or it cannot be read.
     """
-    path = compact_file()
+    path = compact_file(name)
     try:
         return _compact_rules(path, path.stat().st_mtime_ns, chosen_dataset())
     except OSError as error:
         raise InputError(
-            f"there are no compact rules for {dataset_label(chosen_dataset())}; choose other rules"
+            f"there are no rules ({name}) for {dataset_label(chosen_dataset())}; choose other rules"
         ) from error
 
 
-def compact_rules() -> RuleSet:
-    """The compact rules of the chosen data.
+def compact_rules(name: str) -> RuleSet:
+    """A compact set of the chosen data.
+
+    Args:
+        name: Of the set.
 
     Raises:
-        InputError: If there are none, or they cannot be read.
+        InputError: If there is none, or it cannot be read.
     """
-    return _renamed(unnamed_compact_rules(), given_names.given_names(raw_demonstrations()))
+    return _renamed(unnamed_compact_rules(name), given_names.given_names(raw_demonstrations()))

@@ -154,7 +154,33 @@ def test_one_action_of_several_is_looked_at_alone(compact: RuleSet) -> None:
     assert not in_force(app)
 
 
+def test_of_several_compact_sets_each_is_a_click_away() -> None:
+    """The shipped ones: four rules about one feature, and two rules about two."""
+    app = open_page("thresholds", data="cartpole")
+    for key, name, title, count in (
+        ("combined", "compact, two features", "Compact rules, two features", 2),
+        ("compact", "compact", "Compact rules", 4),
+    ):
+        app.button(key=key).click().run()
+        assert not app.exception
+        assert app.query_params["set"] == name
+        assert f"**{title}** in force" in texts(app)
+        assert metrics(app)["Rules"] == str(count)
+    assert "few_combined" not in [button.key for button in app.button]
+
+
 # --- Rules -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("page", ["rules", "what_if", "export", "edit", "episodes", "evidence"])
+def test_rules_about_two_features_are_in_force_on_every_page(page: str) -> None:
+    app = open_page(page, data="cartpole", set="compact, two features")
+    assert not errors(app)
+    assert "**Compact rules, two features** in force" in texts(app)
+    if page == "export":
+        assert app.selectbox(key="carry").value == "compact, two features"
+    if page in ("rules", "what_if"):
+        assert "pole angle plus 0.2 s of pole angular velocity" in html(app) + texts(app)
 
 
 def test_a_compact_rule_is_explained_on_the_chosen_demonstrations(compact: RuleSet) -> None:
@@ -234,6 +260,15 @@ def test_compact_rules_are_replayed_where_there_are_some(compact: RuleSet) -> No
     assert f"{len(compact):,} rules (compact)" in texts(app)
     assert metrics(app)["Covered"] == "100 %"
     assert "compact" not in open_page("replay", data="pendulum").selectbox(key="rules").options
+
+
+def test_two_rules_about_two_features_keep_a_novice_s_pole_up() -> None:
+    query = {"rules": "compact, two features", "agent": "novice", "seed": "3"}
+    app = open_page("replay", data="cartpole", **query)
+    run_through(app, "replay")
+    assert not errors(app)
+    assert "2 rules (compact, two features)" in texts(app)
+    assert metrics(app)["Covered"] == "100 %"
 
 
 def test_a_browser_that_has_not_heard_of_a_choice_does_not_undo_it(compact: RuleSet) -> None:

@@ -26,10 +26,10 @@ from sarl_dashboard.state.agents import FRESH_SEED, agent_for, offered_agents
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 
 MOST_EPISODES = 500
-RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
+RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +79,8 @@ def settings() -> AblationChoice:
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
-                "is shipped for this environment. Own file: rules you saved.",
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets "
+                "that are shipped for this environment. Own file: rules you saved.",
             )
             most = st.number_input(
                 "Rules to take out",

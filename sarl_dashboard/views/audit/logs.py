@@ -19,7 +19,7 @@ from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.settings import offered_rule_sets
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 from sarl_dashboard.text import escaped, in_full, refuse
 
 
@@ -53,7 +53,7 @@ class Logs:
 
 def chosen_rules() -> ChosenRules:
     """The widgets for the rules; where there are none, the page says so and stops."""
-    offered = offered_rule_sets([CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE])
+    offered = offered_rule_sets([CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE])
     choice = st.selectbox("Rules", offered, key="audited", bind="query-params", width=320)
     file = None
     if choice == OWN_FILE:

@@ -11,7 +11,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.components.settings import offered_rule_sets
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 from sarl_dashboard.text import in_full
 
 UNEDITED = "before the edits"
@@ -51,7 +51,7 @@ def chosen_sides() -> list[Side]:
 
 def _offered() -> list[str]:
     """The rule sets that can be had."""
-    offered = offered_rule_sets([CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE])
+    offered = offered_rule_sets([CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE])
     if EDITED in offered:
         offered.insert(offered.index(EDITED), UNEDITED)
     return offered

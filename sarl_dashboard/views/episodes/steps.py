@@ -19,7 +19,7 @@ from sarl_dashboard.components.log_step import show_step
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.state.compact_set import in_force
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT
+from sarl_dashboard.state.rule_files import CHOSEN
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.episodes.scene import show_scene
 
@@ -37,7 +37,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
     left, right = st.columns(2)
     with left:
         episode = int(episodes[_number("Episode", "episode", len(episodes) - 1)])
-    choice = COMPACT if in_force() else CHOSEN
+    choice = in_force() or CHOSEN
     rule_set = rules_for(choice, None)
     assert rule_set is not None
     held = _held(rule_set, demonstrations, episode)

@@ -14,7 +14,7 @@ from sarl_dashboard.components.settings import offered_rule_sets, projection_cho
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE
 from sarl_dashboard.text import file_name, refuse
 
 
@@ -69,16 +69,17 @@ class ExportSettings:
 
 def chosen_rules() -> RuleSet:
     """The rules to carry away; where there are none to be had, say why and stop."""
-    choices = offered_rule_sets([CHOSEN, COMPACT, EDITED, OWN_FILE])
-    default = COMPACT if compact_set.in_force() and COMPACT in choices else CHOSEN
+    choices = offered_rule_sets([CHOSEN, *COMPACT_ENDINGS, EDITED, OWN_FILE])
+    default = compact_set.in_force() or CHOSEN
     choice = st.selectbox(
         "Rules",
         choices,
         index=choices.index(default),
         key="carry",
         bind="query-params",
-        help="At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
-        "this environment. Edited: as they stand on the Edit page. Own file: rules you saved.",
+        help="At the thresholds: those in the sidebar. Compact, fewest: small sets that are "
+        "shipped for this environment. Edited: as they stand on the Edit page. Own file: rules "
+        "you saved.",
     )
     uploaded = None
     if choice == OWN_FILE:

@@ -17,8 +17,9 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.statistics import Rate
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state.data import SHIPPED_SETS
-from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file
+from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, RULES_FOLDER, compact_file
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
@@ -50,13 +51,21 @@ def show_shipped(*, gaps: bool) -> None:
     )
     if gaps:
         return
-    file = card_path(compact_file())
     try:
-        if file.is_file():
-            show_card(read_object(file, ADVICE))
+        _show_cards()
         show_budgets()
     except SarlError as error:
         refuse(error)
+
+
+def _show_cards() -> None:
+    """What the compact sets of the chosen data have achieved, one at a time."""
+    names = [name for name in COMPACT_ENDINGS if card_path(compact_file(name)).is_file()]
+    if not names:
+        return
+    st.subheader("The compact rules that are shipped")
+    name = names[0] if len(names) == 1 else switch("Compact rules", "shipped_set", names)
+    show_card(read_object(card_path(compact_file(name)), ADVICE))
 
 
 class Reported(Struct):
@@ -96,7 +105,6 @@ def show_card(document: dict[str, Any]) -> None:
             "aggregate"
         ) from error
     points = card_points(document)
-    st.subheader("The compact rules that are shipped")
     st.markdown(card_sentence(card))
     with st.popover("The command that made them", icon=":material/terminal:"):
         st.code(card.command, language="sh", wrap_lines=True)

@@ -15,7 +15,7 @@ from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, compact_file
+from sarl_dashboard.state.rule_files import CHOSEN, OWN_FILE, compact_sets
 from sarl_dashboard.text import refuse
 
 MOST_STEPS, MOST_SEEDS, MOST_EPISODES = 500_000, 5, 500
@@ -29,17 +29,13 @@ def settings() -> LearningOrder | None:
         with st.grid(3 if discrete else 4, min_column_width=150, gap="small"):
             rules = st.selectbox(
                 "Rules",
-                [
-                    name
-                    for name in ("unfiltered", "filtered", CHOSEN, COMPACT, OWN_FILE)
-                    if name != COMPACT or compact_file().is_file()
-                ],
+                ["unfiltered", "filtered", CHOSEN, *compact_sets(), OWN_FILE],
                 key="learn_rules",
                 bind="query-params",
                 persist_state="session",
                 help="In force while learning. Unfiltered: support 0, confidence 1. Filtered: "
                 "support 0.005, confidence 0.95. At the thresholds: those in the sidebar. "
-                "Compact: a small set that is shipped. Own file: rules you saved.",
+                "Compact, fewest: small sets that are shipped. Own file: rules you saved.",
             )
             steps = st.number_input(
                 "Steps",

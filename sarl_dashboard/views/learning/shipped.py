@@ -15,7 +15,7 @@ from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.cache import cached
 from sarl_dashboard.jobs import learning
 from sarl_dashboard.state.data import SHIPPED_SETS, uncombined_demonstrations
-from sarl_dashboard.state.rule_files import RULES_FOLDER
+from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, RULES_FOLDER
 from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.learning.study import show_study
 
@@ -106,7 +106,10 @@ def commands(study: LearningStudy) -> list[str]:
 def shipped_rules() -> dict[str, str]:
     """The shipped rule files, by what tells their rules from others."""
     files = {}
-    for path in sorted(RULES_FOLDER.glob("*_compact.json")):
+    endings = tuple(f"_{ending}.json" for ending in COMPACT_ENDINGS.values())
+    for path in sorted(RULES_FOLDER.glob("*.json")):
+        if not path.name.endswith(endings):
+            continue
         with suppress(SarlError):
             files[rules_digest(RuleSet.load(path))] = f"data/rules/{path.name}"
     return files

@@ -28,9 +28,9 @@ from sarl_dashboard.state.agents import (
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import continuous, environment_of
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, NO_RULES, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, NO_RULES, OWN_FILE, PAPERS
 
-RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE, NO_RULES)
+RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE, NO_RULES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +93,9 @@ def settings() -> ReplaySettings:
                 key="rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact: a small set that "
-                "is shipped for this environment. Edited: what you made of them on the Edit page. "
-                "Own file: rules you saved. None: the agent alone.",
+                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets "
+                "that are shipped for this environment. Edited: what you made of them on the Edit "
+                "page. Own file: rules you saved. None: the agent alone.",
             )
             seed = st.number_input(
                 "Seed",

@@ -22,7 +22,7 @@ from sarl_dashboard.state.data import (
 from sarl_dashboard.state.environments import offers
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import COMPACT, OWN_FILE, compact_file
+from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, OWN_FILE, compact_file
 from sarl_dashboard.views.report.settings import ReportChoices
 
 
@@ -63,7 +63,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     if rule_set.cut == "thresholds":
         trees = grown_trees(demonstrations, rule_set.divider)
     # The card of the shipped compact rules says how they came about.
-    card = read_card(compact_file()) if choices.rules == COMPACT else None
+    card = read_card(compact_file(choices.rules)) if choices.rules in COMPACT_ENDINGS else None
     return ReportOrder(rule_set, demonstrations, wishes, card, results, trees)
 
 
@@ -94,8 +94,8 @@ def file_names(choices: ReportChoices) -> tuple[str, str]:
     if name == UPLOAD:
         data = upload_name()
     rules = "rules.json"
-    if choices.rules == COMPACT:
-        rules = f"data/rules/{compact_file().name}"
+    if choices.rules in COMPACT_ENDINGS:
+        rules = f"data/rules/{compact_file(choices.rules).name}"
     elif choices.rule_file is not None:
         rules = choices.rule_file.name
     return rules, data
@@ -109,7 +109,7 @@ def commands(
     if raw is None or raw.digest != demonstrations.deriving(raw.derived).digest:
         return ()  # episodes are held out or left out, or things have other names
     mined = None
-    if choices.rules not in (COMPACT, OWN_FILE):
+    if choices.rules not in (*COMPACT_ENDINGS, OWN_FILE):
         mined = mining_command(
             rule_set, named.rules, named.demonstrations, demonstrations, read=raw
         )

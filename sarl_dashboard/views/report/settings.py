@@ -9,9 +9,9 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_dashboard.components.settings import offered_rule_sets
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 
-RULE_SETS = (CHOSEN, *PAPERS, COMPACT, EDITED, OWN_FILE)
+RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +40,9 @@ def settings(has_comparison: bool) -> ReportChoices:
                 key="report_rules",
                 bind="query-params",
                 help="At the thresholds: those in the sidebar. Filtered: support 0.005, confidence "
-                "0.95. Unfiltered: support 0, confidence 1. Compact: a small set that is shipped "
-                "for this task. Edited: those you changed on the page Edit. Own file: rules you "
-                "saved.",
+                "0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets that are "
+                "shipped for this task. Edited: those you changed on the page Edit. Own file: "
+                "rules you saved.",
             )
             in_full = st.number_input(
                 "Rules in full",

@@ -25,7 +25,7 @@ from sarl_dashboard.state.agents import (
 )
 from sarl_dashboard.state.environments import continuous, environment_of
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 
 NO_SHIELD = "no shield"
 MOST_EPISODES = 1_000
@@ -100,7 +100,9 @@ def settings() -> ShieldChoices:
         policy_files: list[PolicyFile] = []
         if OWN_FILE in agents:
             policy_files = policy_uploads("Policies", "policy_files", env)
-        offered = offered_rule_sets([NO_SHIELD, *PAPERS, CHOSEN, COMPACT, EDITED, OWN_FILE])
+        offered = offered_rule_sets(
+            [NO_SHIELD, *PAPERS, CHOSEN, *COMPACT_ENDINGS, EDITED, OWN_FILE]
+        )
         shields = st.pills(
             "Shields",
             offered,
@@ -109,9 +111,9 @@ def settings() -> ShieldChoices:
             key="shields",
             bind="query-params",
             help="Filtered: support 0.005, confidence 0.95. Unfiltered: support 0, confidence 1. "
-            "At the thresholds: those in the sidebar. Compact: a small set that is shipped for "
-            "this environment. Edited: what you made of them on the Edit page. Own file: rules you "
-            "saved.",
+            "At the thresholds: those in the sidebar. Compact, fewest: small sets that are "
+            "shipped for this environment. Edited: what you made of them on the Edit page. Own "
+            "file: rules you saved.",
         )
         rule_file = own_rule_file() if OWN_FILE in shields else None
     return ShieldChoices(

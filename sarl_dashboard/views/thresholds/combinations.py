@@ -61,12 +61,12 @@ def combinations_choice() -> None:
 
 
 def _switch() -> None:
-    compact_set.choose(False)
+    compact_set.choose(None)
     combining.choose(
         CombinationChoice(st.session_state["_combinations"], combining.chosen().features)
     )
 
 
 def _choose_features() -> None:
-    compact_set.choose(False)
+    compact_set.choose(None)
     combining.choose(CombinationChoice(True, tuple(st.session_state[_FEATURES])))

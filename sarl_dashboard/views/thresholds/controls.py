@@ -22,6 +22,13 @@ from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import compact_set
+from sarl_dashboard.state.rule_files import (
+    COMBINED,
+    COMPACT,
+    COMPACT_ENDINGS,
+    FEWEST,
+    compact_sets,
+)
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.largest_rules import show_largest
@@ -34,6 +41,8 @@ from sarl_dashboard.views.thresholds.moves import (
     use_compact,
 )
 from sarl_dashboard.views.thresholds.numbers import show_numbers
+
+_SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
 
 
 @st.fragment(key="controls")
@@ -90,7 +99,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
                 on_change=leave_compact,
                 help="Number of equal intervals each continuous action is divided into.",
             )
-        named_settings(thresholds, compact=display.compact is not None)
+        named_settings(thresholds, compact_set.in_force() if display.compact else None)
     point = display.point(thresholds)
     everything = display.dimension is None
     show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
@@ -129,12 +138,12 @@ def jump_buttons(name: str, below: float | None, above: float | None) -> None:
             )
 
 
-def named_settings(thresholds: Thresholds, *, compact: bool) -> None:
-    """The paper's two settings and, where there are some, the compact rules; a click each.
+def named_settings(thresholds: Thresholds, compact: str | None) -> None:
+    """The paper's two settings and, where there are some, the compact sets; a click each.
 
     Args:
         thresholds: Those in force, or set aside.
-        compact: Whether the compact rules are in force.
+        compact: Name of the compact set in force; None for the thresholds.
     """
     with st.container(horizontal=True, gap="small", horizontal_alignment="right"):
         for name, setting in (("Filtered", FILTERED), ("Unfiltered", UNFILTERED)):
@@ -147,12 +156,13 @@ def named_settings(thresholds: Thresholds, *, compact: bool) -> None:
                 help=f"The paper's setting: support {setting.support:g}, "
                 f"confidence {setting.confidence:g}",
             )
-        if compact_set.offered():
+        for name in compact_sets():
             st.button(
-                "Compact",
-                key="compact",
+                _SHORT[name],
+                key=COMPACT_ENDINGS[name],
                 on_click=use_compact,
-                type="primary" if compact else "secondary",
-                help="A small set that comes with these data: it has a rule for every state, and "
-                "was chosen by what a novice achieves with it",
+                args=(name,),
+                type="primary" if compact == name else "secondary",
+                help=f"{compact_set.set_title(name)}: a small set that comes with these data. It "
+                "has a rule for every state, and was chosen by what a novice achieves with it",
             )

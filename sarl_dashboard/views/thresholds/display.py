@@ -148,7 +148,7 @@ def more() -> None:
             key="lift",
             bind="query-params",
             on_change=compact_set.choose,
-            args=(False,),
+            args=(None,),
             help="How many times more often than over all states the expert must have done what "
             "the rule says. 0: no limit.",
         )
@@ -160,7 +160,7 @@ def more() -> None:
             key="depth",
             bind="query-params",
             on_change=compact_set.choose,
-            args=(False,),
+            args=(None,),
             help="Most conditions of a rule. 0: no limit.",
         )
 

@@ -47,19 +47,19 @@ def jump(name: str, value: float) -> None:
 def use(setting: Thresholds) -> None:
     """Put a named setting in force."""
     choose_thresholds(setting)
-    compact_set.choose(False)
+    compact_set.choose(None)
     st.rerun()  # lift and depth, which it resets, are part of the maps
 
 
-def use_compact() -> None:
-    """Put the compact rules in force."""
-    compact_set.choose(True)
+def use_compact(name: str) -> None:
+    """Put a compact set in force."""
+    compact_set.choose(name)
     st.rerun()  # the maps lose their ring
 
 
 def leave_compact() -> None:
     """Go back to the thresholds; for callbacks, and the last thing they do."""
-    compact_set.choose(False)
+    compact_set.choose(None)
     st.rerun()  # the ring comes back to the maps, and the sidebar says what is in force
 
 
