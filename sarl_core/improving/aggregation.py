@@ -208,8 +208,10 @@ def aggregate(
             run.round(number, clock)
             if watch is not None:
                 watch(run.rounds[-1])
-        run.select(clock)
-        run.refine(clock)
+        if plan.turns:
+            run.refine(clock)
+        else:
+            run.select(clock)
         run.report(clock)
     except (CancelledError, KeyboardInterrupt, AgentFaultError, EpisodeFaultError) as error:
         if not run.rounds:
@@ -278,17 +280,10 @@ class _Run:
 
     def planned_units(self) -> int:
         plan = self.plan
-        refined = 0
-        if plan.turns:
-            refined = refinement_cost(plan.turns, plan.rounds) + planned_episodes(
-                2 * plan.turns + 1, _first_validation(plan), plan.validation
-            )
-        return (
-            plan.rounds * plan.episodes
-            + planned_episodes(plan.rounds, _first_validation(plan), plan.validation)
-            + refined
-            + plan.report
-        )
+        refined = refinement_cost(plan.turns, plan.rounds) if plan.turns else 0
+        tried = 2 * plan.turns + 1 if plan.turns else plan.rounds
+        chosen = planned_episodes(tried, _first_validation(plan), plan.validation)
+        return plan.rounds * plan.episodes + refined + chosen + plan.report
 
     def grow(self, index: int) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
@@ -407,15 +402,11 @@ class _Run:
         return tried.best, float(tried.means[tried.best])
 
     def refine(self, clock: _Clock) -> None:
-        """Change shape and thresholds of the best rules, and keep what is better."""
-        start, plan = self.choice, self.plan
-        assert start is not None
-        if not plan.turns:
-            return
-        first = self.seed(seeds.REFINEMENT)
+        """Change shape and thresholds of the best rules, and choose the best of all turns."""
+        plan, first = self.plan, self.seed(seeds.REFINEMENT)
         search = Refinement(
             self.trees,
-            self.pairs(start),
+            self.answers.pairs(0, derived=()),
             Evaluator(
                 self.env_id,
                 self.agent,
@@ -435,7 +426,8 @@ class _Run:
 
         def moved(candidate: Candidate) -> _Choice:
             pairs = self.answers.pairs(search.begun, derived=candidate.derived)
-            return _Choice(search.begun, candidate.trees(pairs, plan.divider), refined=True)
+            trees = candidate.trees(pairs, plan.divider)
+            return _Choice(search.begun, trees, refined=candidate is not search.start)
 
         def better(candidate: Candidate) -> None:
             # By the episodes of the search only: for who stops before the second validation.
@@ -444,12 +436,11 @@ class _Run:
 
         marks = search.run(plan.turns, progress=clock.of(), better=better)
         self.seeds = self.seeds._replace(refinement=first)
-        choices = [start, *map(moved, marks)]
-        # On other episodes than those of the rounds: the first candidate was chosen by them.
-        second = self.seed(seeds.SECOND_VALIDATION)
-        index, mean = self.best_of([self.rules(one.trees) for one in choices], second, clock)
+        choices = [moved(search.start), *map(moved, marks)]
+        chosen_by = self.seed(seeds.VALIDATION)
+        index, mean = self.best_of([self.rules(one.trees) for one in choices], chosen_by, clock)
         self.choice = replace(choices[index], mean=mean)
-        self.seeds = self.seeds._replace(second_validation=second)
+        self.seeds = self.seeds._replace(validation=chosen_by)
 
     def worth(self) -> float:
         """What a failure counts in a search: as much as returns differ where failures do."""

@@ -87,11 +87,9 @@ def chosen_by(aggregation: Aggregation) -> str:
     first = "failures, then the mean" if aggregation.plan.choose == "failures" else "mean"
     up_to = f"the {first} of up to {aggregation.plan.validation} episodes"
     if aggregation.seeds.validation is None:
-        return "the episodes of their round only"
-    if aggregation.seeds.second_validation is not None:
-        return f"{up_to} of a second validation"
-    if aggregation.refined:
-        return f"{up_to} of validation, then by those of a refinement that was not finished"
+        if aggregation.seeds.refinement is None:
+            return "the episodes of their round only"
+        return "the episodes of a refinement that was not finished"
     return f"{up_to} of validation"
 
 

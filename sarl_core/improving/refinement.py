@@ -96,8 +96,9 @@ class Refinement:
             executor: Whose processes they are; this machine's where not given.
         """
         self._starts = [Candidate.of_trees(trees) for trees in starts]
-        self.begun = 0  # index of the start that it began with
-        self.here = self._compared = self._starts[0]
+        # What it began with, and its index among those it might have.
+        self.begun, self.start = 0, self._starts[0]
+        self.here = self._compared = self.start
         self._start = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
@@ -118,8 +119,9 @@ class Refinement:
         Args:
             turns: How often the shape is changed, and thresholds are moved.
             progress: Called with (episodes done, in all); returning False stops.
-            better: Called with what achieved more than what was there before, in the same
-                episodes; so that something is there when the way is not gone to its end.
+            better: Called with what it begins with, and then with what achieved more than what
+                was there before, in the same episodes; so that something is there when the way is
+                not gone to its end.
 
         Returns:
             Two for each turn, what was best in it and where its thresholds were moved then.
@@ -131,6 +133,8 @@ class Refinement:
         """
         self._progress, self._total = progress, refinement_cost(turns, len(self._starts))
         self._begin()
+        if better is not None:
+            better(self.start)
         begun = self._done - refinement_cost(0)
         marks = []
         for turn in range(1, turns + 1):
@@ -149,8 +153,8 @@ class Refinement:
         starts, self._starts = self._starts, []
         if len(starts) > 1:
             ranking = self._ranking(starts, self._start, _COMPARED_EPISODES)
-            self.begun = ranking[0]
-            self.here = self._compared = starts[self.begun]
+            self.begun, self.start = ranking[0], starts[ranking[0]]
+            self.here = self._compared = self.start
             self._starts = [starts[place] for place in ranking[1 : 1 + _STARTS]]
 
     def _patience(self) -> int:

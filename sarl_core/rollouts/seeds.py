@@ -19,8 +19,7 @@ first seed            what its episodes are for
                       `SEEDS_A_LEARNER` for each
 `POOLED`              the benchmark of intervals draws its demonstrations from these
 `ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
-`VALIDATION`          the best of its rounds is chosen by them
-`SECOND_VALIDATION`   the best point of its refinement is chosen by them
+`VALIDATION`          the best of its rounds, or of its refinement, is chosen by them
 `REFINEMENT`          the search of its refinement
 `REPORT`              what came of it is reported on them
 ====================  =====================================================================
@@ -65,7 +64,6 @@ POOLED = 19_000_000
 
 ROUNDS = 20_000_000
 VALIDATION = 30_000_000
-SECOND_VALIDATION = 30_500_000
 REFINEMENT = 40_000_000
 REPORT = 50_000_000
 
@@ -77,7 +75,7 @@ SEEDS_A_LEARNER = 100_000
 
 MOST_EPISODES_A_ROUND = SEEDS_A_ROUND
 MOST_ROUNDS = (VALIDATION - ROUNDS) // SEEDS_A_ROUND
-MOST_VALIDATION = SECOND_VALIDATION - VALIDATION
+MOST_VALIDATION = SEEDS_A_RUN // 2
 MOST_LEARNERS = (POOLED - RELEVANCE) // SEEDS_A_LEARNER
 
 RANGES: Mapping[str, range] = {
@@ -92,8 +90,7 @@ RANGES: Mapping[str, range] = {
     "RELEVANCE": range(RELEVANCE, POOLED),
     "POOLED": range(POOLED, ROUNDS),
     "ROUNDS": range(ROUNDS, VALIDATION),
-    "VALIDATION": range(VALIDATION, SECOND_VALIDATION),
-    "SECOND_VALIDATION": range(SECOND_VALIDATION, SECOND_VALIDATION + MOST_VALIDATION),
+    "VALIDATION": range(VALIDATION, VALIDATION + MOST_VALIDATION),
     "REFINEMENT": range(REFINEMENT, REPORT),
     "REPORT": range(REPORT, REPORT + MOST_VALIDATION),
 }
@@ -115,16 +112,14 @@ class RunSeeds(NamedTuple):
 
     Attributes:
         rounds: The rules act, the expert answers.
-        validation: The best round was chosen.
+        validation: The best round, or the best point of the refinement, was chosen.
         refinement: Queries, labels and thresholds were changed.
-        second_validation: The best point of the refinement was chosen.
         report: What came of it, on episodes that nothing was chosen by.
     """
 
     rounds: int
     validation: int | None = None
     refinement: int | None = None
-    second_validation: int | None = None
     report: int | None = None
 
 

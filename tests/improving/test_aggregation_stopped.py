@@ -21,7 +21,7 @@ from sarl_core.progress import CancelledError
 
 PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=32, report=8)
 REFINED = Plan(max_rules=4, rounds=1, episodes=4, validation=4, report=3, turns=1, seed=3)
-SEEDS = ("rounds", "validation", "refinement", "second_validation", "report")
+SEEDS = ("rounds", "validation", "refinement", "report")
 
 
 @pytest.fixture(scope="module")
@@ -76,9 +76,8 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     *others, (_, _, report) = calls
     parts = {
         "rounds": [seeds for module, keeps, seeds in others if keeps and module is aggregation],
-        "validation": [s for _, keeps, s in others[: searched[0]] if not keeps],
         "refinement": [calls[index][2] for index in searched],
-        "second_validation": [s for _, _, s in others[searched[-1] + 1 :]],
+        "validation": [s for _, _, s in others[searched[-1] + 1 :]],
         "report": [report],
     }
     used = {name: {one for part in ranges for one in part} for name, ranges in parts.items()}
@@ -151,7 +150,6 @@ def test_ctrl_c_in_the_report_keeps_the_refinement(cart, small_search, monkeypat
         "rounds": 23_000_000,
         "validation": 33_000_000,
         "refinement": 43_000_000,
-        "second_validation": 33_500_000,
         "report": None,
     }
 
@@ -187,21 +185,24 @@ def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     assert stopped.validation_mean is None
     card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
     assert card["refined"]
-    assert card["seeds"]["validation"] == 33_000_000
     assert card["seeds"]["refinement"] == 43_000_000
-    assert card["seeds"]["second_validation"] is card["seeds"]["report"] is None
-    assert "then by those of a refinement that was not finished" in card["chosen_by"]
+    assert card["seeds"]["validation"] is card["seeds"]["report"] is None
+    assert card["chosen_by"] == "the episodes of a refinement that was not finished"
 
 
-def test_stopped_in_a_refinement_before_anything_came_of_it_the_choice_stands(
+def test_stopped_before_anything_was_refined_what_the_search_began_with_is_given(
     cart, small_search, monkeypatch
 ):
     stopped_after(monkeypatch, 0)
-    stopped = aggregate(cart, replace(REFINED, turns=8))
+    monkeypatch.setattr(
+        refinement.Refinement, "_ranking", lambda self, tried, pairs, episodes: [1, 0, 2]
+    )
+    stopped = aggregate(cart, replace(REFINED, rounds=3, turns=8))
     assert not stopped.refined
-    assert stopped.validation_mean is not None
-    assert stopped.seeds.validation == 33_000_000
-    assert stopped.seeds.refinement is None
+    assert stopped.chosen == 2
+    assert stopped.validation_mean is None
+    assert stopped.seeds.validation is None
+    assert stopped.seeds.refinement == 43_000_000
 
 
 # --- what it leaves on disk --------------------------------------------------------------------

@@ -15,7 +15,6 @@ def test_parts_of_one_run_cannot_meet_however_large_it_is():
     ends = {
         seeds.ROUNDS: seeds.MOST_ROUNDS * seeds.SEEDS_A_ROUND,
         seeds.VALIDATION: seeds.MOST_VALIDATION,
-        seeds.SECOND_VALIDATION: seeds.MOST_VALIDATION,
     }
     later = sorted([*ends, seeds.REFINEMENT])
     for first, count in ends.items():
