@@ -44,7 +44,6 @@ _SHAPES = 4  # that are moved: which has most in it is not seen before
 _EARLY = 4  # generations for each of them
 _LATE = 8  # further ones for the best
 _COMPARED_EPISODES = 128  # by which it is the best
-_STARTS = 8  # that are neighbours of the first turn, of all that the search may begin with
 GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
 
 
@@ -148,14 +147,11 @@ class Refinement:
         return marks
 
     def _begin(self) -> None:
-        """Begin with what achieves most; the next best are tried as its neighbours are."""
+        """Begin with what achieves most."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
-        starts, self._starts = self._starts, []
-        if len(starts) > 1:
-            ranking = self._ranking(starts, self._start, _COMPARED_EPISODES)
-            self.begun, self.start = ranking[0], starts[ranking[0]]
-            self.here = self._compared = self.start
-            self._starts = [starts[place] for place in ranking[1 : 1 + _STARTS]]
+        if len(self._starts) > 1:
+            self.begun = self._ranking(self._starts, self._start, _COMPARED_EPISODES)[0]
+            self.here = self._compared = self.start = self._starts[self.begun]
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
@@ -252,9 +248,6 @@ class Refinement:
             count=_NEIGHBOURS,
             generator=self._generator,
         )
-        # In the first turn, what else it might have begun with, in place of the unlikeliest.
-        others = [*others[: max(_NEIGHBOURS - len(self._starts), 0)], *self._starts]
-        self._starts = []
         if not others:
             return []
         return [others[one] for one in self._ranking(others, met.pairs, _SHAPE_EPISODES)[:_SHAPES]]
