@@ -35,6 +35,7 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path | str) ->
     Returns:
         A document for JSON.
     """
+    from sarl_core.demonstrations.derived import formula_texts
     from sarl_core.explaining.words.states import word_shares
     from sarl_core.mining.validation.contradictions import identical_contradictions
 
@@ -62,6 +63,7 @@ def describe_demonstrations(demonstrations: Demonstrations, path: Path | str) ->
             )
         ],
         "words": word_shares(demonstrations),
+        "formulas": list(formula_texts(demonstrations.derived)),
         "actions": [
             _describe_action(dimension, column)
             for dimension, column in zip(
@@ -256,6 +258,7 @@ def _facts(document: dict[str, Any]) -> list[tuple[str, str]]:
             f"{document['contradictions']:,} states were shown with another action too",
         )
     )
+    facts += [("formula", text) for text in document["formulas"]]
     return [*facts, ("digest", document["digest"])]
 
 

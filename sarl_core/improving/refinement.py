@@ -206,6 +206,9 @@ class Refinement:
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
         rows = with_values(table.observation, self.here.derived)
+        if not len(rows):  # nothing of what it asks about has a value where it leads
+            shown = self._start.deriving(self.here.derived)
+            return MetStates(shown, scores(self._expert, shown.raw_observations))
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
         pairs = answered(

@@ -130,6 +130,9 @@ def test_demonstrations_that_were_saved_with_formulas_keep_them(run, tmp_path):
     made = load_demonstrations(LUNAR)
     made = made.deriving([formula_feature("fall = vertical velocity * 2", made.observed)])
     save_demonstrations(made, tmp_path / "lunar.parquet")
+    assert "fall = vertical velocity * 2" in run("check", tmp_path / "lunar.parquet")
+    (told,) = json.loads(run("check", tmp_path / "lunar.parquet", "--json"))["formulas"]
+    assert told == "fall = vertical velocity * 2"
     run("mine", tmp_path / "lunar.parquet", "--setting", "filtered", "--out", tmp_path / "r.json")
     assert [one.name for one in derived_of(tmp_path / "r.json")] == ["fall"]
 

@@ -302,6 +302,18 @@ def test_what_takes_much_longer_than_the_expert_is_tried_no_further(
     assert set(limits) == {int(np.ceil(2 * np.quantile(lengths, 0.9)))}
 
 
+def test_where_nothing_has_a_value_in_the_met_states_the_shown_ones_serve(
+    small_search, monkeypatch
+) -> None:
+    monkeypatch.setattr(
+        "sarl_core.improving.refinement.with_values",
+        lambda observations, derived: np.zeros(0, dtype=np.int64),
+    )
+    begun = search()
+    assert begun._met().pairs.digest == CARTPOLE.digest
+    assert len(begun.run(1)) == 2
+
+
 def test_it_can_be_stopped_after_any_candidate(small_search) -> None:
     ticks: list[int] = []
     with pytest.raises(CancelledError):
