@@ -15,6 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import sarl_core
+from docs.scripts import compact_table
 from sarl_core import load_demonstrations, mine_rules, with_combinations
 
 from .examples import ROOT, run
@@ -119,6 +120,11 @@ def test_a_sentence_that_the_guide_quotes_is_one_of_the_product(page, confidence
     if pairs != []:
         demonstrations = with_combinations(demonstrations, pairs=pairs)
     assert quoted in mine_rules(demonstrations, supp_min=0.005, conf_min=confidence).to_text()
+
+
+def test_the_table_of_the_compact_sets_is_that_of_what_was_measured():
+    page = compact_table.PAGE.read_text(encoding="utf-8")
+    assert compact_table.with_table(page) == page
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):

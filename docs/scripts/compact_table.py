@@ -20,7 +20,8 @@ from sarl_core.explaining.figures.rule_budgets import (
     budget_points,
 )
 from sarl_core.files import whole_file
-from sarl_core.mining.language import share_text
+from sarl_core.mining.language import sentence, share_text
+from sarl_core.mining.rule_set import load_rules
 
 FOLDER = Path(__file__).resolve().parents[2]
 PAGE = FOLDER / "docs" / "results" / "compact_rules.md"
@@ -43,6 +44,10 @@ PUBLISHED = {
     ),
 }
 LANDING = ("lunar_lander", "lunar_lander_continuous")  # of which 200 counts as solved
+IN_FULL = {
+    "cartpole_combined": "The rules of Cart Pole:",
+    "lunar_lander_few_combined": "The rules of Lunar Lander with the fewest:",
+}
 HEAD = (
     "| task | rules | features a query | mean return, 95 % interval | 200 or more | failures, "
     "95 % interval | each of five learning seeds: mean (failures) |",
@@ -60,10 +65,18 @@ def main() -> None:
 
 
 def with_table(page: str) -> str:
-    """A page with the table of what is known between its marks."""
+    """A page with the table of what is known, and the smallest sets, between its marks."""
     table = compact_table(json.loads(SEEDS.read_text(encoding="utf-8")))
+    rules = "\n\n".join(f"{title}\n\n{rule_list(name)}" for name, title in IN_FULL.items())
     before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{table}\n\n{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n\n{table}\n\n{rules}\n\n{END}{rest.split(END)[1]}"
+
+
+def rule_list(name: str) -> str:
+    """The sentences of a set, the rule that applies to most states first."""
+    rules = load_rules(RULES / f"{name}.json")
+    ranked = sorted(rules.rules, key=lambda rule: -rule.samples)
+    return "\n".join(f"- {sentence(rule, rules, evidence=False)}" for rule in ranked)
 
 
 def compact_table(known: dict[str, list[dict[str, Any]]]) -> str:

@@ -207,8 +207,8 @@ class Refinement:
         wanted = ask(self._expert, table.observation, table.episode)
         rows = with_values(table.observation, self.here.derived)
         if not len(rows):  # nothing of what it asks about has a value where it leads
-            shown = self._start.deriving(self.here.derived)
-            return MetStates(shown, scores(self._expert, shown.raw_observations))
+            demonstrated = self._start.deriving(self.here.derived)
+            return MetStates(demonstrated, scores(self._expert, demonstrated.raw_observations))
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
         pairs = answered(

@@ -15,6 +15,7 @@ from sarl_core.documents import Count, MisfitError, NotNegative, Number, Share, 
 from sarl_core.errors import InputError
 from sarl_core.explaining.colours import LABEL_COLOURS, MARKER_COLOUR
 from sarl_core.explaining.layouts import figure_layout
+from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import share_text
 
 _COLOURS = {False: LABEL_COLOURS[0], True: LABEL_COLOURS[2]}
@@ -163,9 +164,10 @@ def budget_figure(
     if known:
         figure.update_yaxes(
             title={"text": "failures", "standoff": 4},
-            tickformat=".0%",
             rangemode="tozero",
-            nticks=4,
+            **share_ticks(
+                0.0, max(point.failure_high for point in points if point.failures is not None), 3
+            ),
             row=2,
             col=1,
         )
