@@ -107,21 +107,23 @@ def rules_for(
     return fitted
 
 
-def fits(rule_set: RuleSet, demonstrations: Demonstrations) -> bool:
-    """Whether demonstrations are of the features and actions that rules speak of.
+def fitting(rule_set: RuleSet, demonstrations: Demonstrations) -> Demonstrations | None:
+    """Demonstrations with what rules derive, where they are of the same features and actions.
 
     Args:
         rule_set: The rules.
         demonstrations: Any.
 
     Returns:
-        Whether `rules_for` takes them.
+        Such as `rules_for` takes; None where they are of others.
     """
     try:
+        features = rule_set.source.features
+        demonstrations = recoded(demonstrations, features, called="the demonstrations")
         rules_for(rule_set, demonstrations)
     except InputError:
-        return False
-    return True
+        return None
+    return demonstrations
 
 
 def without_idle(rule_set: RuleSet) -> RuleSet:

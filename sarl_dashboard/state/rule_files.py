@@ -9,7 +9,7 @@ from sarl_core.demonstrations.names import Names
 from sarl_core.errors import InputError
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
-from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_order import rules_for as rules_of
 from sarl_core.mining.rule_set import RuleSet, rules_from_json
 from sarl_core.mining.rules import FILTERED, UNFILTERED
@@ -56,9 +56,10 @@ def as_named(rule_set: RuleSet) -> RuleSet:
         The same where they do not fit these.
     """
     raw = raw_demonstrations()
-    if raw is None or not fits(rule_set, raw):
+    fitted = None if raw is None else fitting(rule_set, raw)
+    if fitted is None:
         return rule_set
-    return _renamed(_ordered(rule_set, raw), given_names.given_names(raw))
+    return _renamed(_ordered(rule_set, fitted), given_names.given_names(raw))
 
 
 @cached()

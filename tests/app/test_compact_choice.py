@@ -179,6 +179,9 @@ def test_rules_about_two_features_are_in_force_on_every_page(page: str) -> None:
     assert "**Compact rules, two features** in force" in texts(app)
     if page == "export":
         assert app.selectbox(key="carry").value == "compact, two features"
+    if page == "edit":
+        assert "The chosen demonstrations are of something else" not in texts(app)
+        assert metrics(app)["Fidelity"].endswith("%")
     if page in ("rules", "what_if"):
         assert "pole angle plus 0.2 s of pole angular velocity" in html(app) + texts(app)
 

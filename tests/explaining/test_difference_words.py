@@ -26,7 +26,7 @@ from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Change, Move, Pin, Remove, Switch, Unpin, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.tree import Source
 from sarl_core.shielding.decisions import ground_of
@@ -204,10 +204,10 @@ def test_the_table_tells_agreement_from_disagreement_by_colour():
 
 def test_demonstrations_fit_rules_of_their_features_and_actions():
     mined = mine_rules(SHOWN, supp_min=0.0, conf_min=1.0)
-    assert fits(mined, SHOWN)
+    assert fitting(mined, SHOWN) is SHOWN
     renamed = replace(SOURCE, features=(Feature("tilt", ""),))
-    assert fits(replace(RULES, source=renamed), SHOWN)
-    assert not fits(replace(RULES, source=replace(renamed, env_id="")), SHOWN)
-    assert not fits(replace(RULES, actions=ACTIONS * 2), SHOWN)
+    assert fitting(replace(RULES, source=renamed), SHOWN)
+    assert fitting(replace(RULES, source=replace(renamed, env_id="")), SHOWN) is None
+    assert fitting(replace(RULES, actions=ACTIONS * 2), SHOWN) is None
     torque = (LabelledDimension.of_edges("push", (-1, 0, 1)),)
-    assert not fits(replace(RULES, actions=torque), SHOWN)
+    assert fitting(replace(RULES, actions=torque), SHOWN) is None

@@ -183,6 +183,7 @@ def _add_line(figure: go.Figure, points: Sequence[BudgetPoint], known: bool) -> 
         "mode": "markers" if first.refined else "lines+markers",
         "name": name,
         "legendgroup": name,
+        "cliponaxis": False,
         "line": {"color": colour, "width": 2.2},
         "marker": {
             "color": colour,
@@ -234,6 +235,6 @@ def _spaced(rules: Sequence[int]) -> list[int]:
     """Numbers of rules that can be written beside each other on an axis of powers of two."""
     spaced = [rules[0]]
     for count in rules[1:]:
-        if count >= 1.4 * spaced[-1]:
+        if count >= 1.25 * spaced[-1]:
             spaced.append(count)
     return spaced

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +10,14 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.recoding import recoded
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import SarlError
 from sarl_core.explaining.html.confusion import confusion_html
 from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
 from sarl_core.explaining.words.difference import decided_text, rows_text
 from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.language import counted
-from sarl_core.mining.rule_order import fits
+from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
@@ -87,11 +85,8 @@ def _compare(first: Side, second: Side) -> RuleSetComparison:
     notes_notice(notes)
     demonstrations = chosen_demonstrations()
     if demonstrations is not None:
-        with suppress(InputError):  # of other features, which are asked about next
-            demonstrations = recoded(
-                demonstrations, one.source.features, called="the demonstrations"
-            )
-        if not (fits(one, demonstrations) and fits(other, demonstrations)):
+        demonstrations = fitting(one, demonstrations)
+        if demonstrations is not None and fitting(other, demonstrations) is None:
             demonstrations = None
     return RuleSetComparison(one, other, demonstrations, names)
 

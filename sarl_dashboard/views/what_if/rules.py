@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rule_order import fits, rules_for
+from sarl_core.mining.rule_order import fitting, rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.settings import notes_notice
@@ -55,8 +55,9 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
     ):
         return in_force
     edited = edits.edited_rules()
-    if fits(edited, demonstrations):
-        edited, notes = rules_for(edited, demonstrations)
+    fitted = fitting(edited, demonstrations)
+    if fitted is not None:
+        edited, notes = rules_for(edited, fitted)
         notes_notice(notes)
         return RulesOnTrees(edited, in_force.trees, in_force.leaves)
     st.info(
