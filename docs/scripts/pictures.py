@@ -56,7 +56,7 @@ def render(env_id: str, rules: str, out: Path, *options: str, seed: int = 100_00
         "--agent",
         "novice",
         "--rules",
-        f"data/rules/{rules}_compact.json",
+        f"data/rules/{rules}.json",
         "--seed",
         str(seed),
         "--out",
@@ -67,20 +67,20 @@ def render(env_id: str, rules: str, out: Path, *options: str, seed: int = 100_00
 
 def replay() -> None:
     """The GIF: a novice in Lunar Lander, side by side."""
-    render("LunarLander-v3", "lunar_lander", PICTURES / "replay.gif", "--side-by-side")
+    render("LunarLander-v3", "lunar_lander_few_combined", PICTURES / "replay.gif", "--side-by-side")
 
 
 def driving() -> None:
     """The GIF of the motorway, side by side, on the first seed on which the novice crashes."""
     out = PICTURES / "driving.gif"
-    render("Driving-v0", "driving", out, "--side-by-side", seed=100_001)
+    render("Driving-v0", "driving_compact", out, "--side-by-side", seed=100_001)
 
 
 def walker() -> None:
     """The GIF of Bipedal Walker: the first ten seconds, every third picture, made smaller."""
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "walker.gif"
-        render("BipedalWalker-v3", "bipedal_walker", whole)
+        render("BipedalWalker-v3", "bipedal_walker_compact", whole)
         with Image.open(whole) as film:
             pictures = []
             for number in range(0, 500, 3):
