@@ -17,6 +17,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "data" / "rules"
 SHIPPED = {
     "cartpole_combined.json": ("CartPole-v1", 2, 500.0),
     "cartpole_compact.json": ("CartPole-v1", 4, 500.0),
+    "lunar_lander_combined.json": ("LunarLander-v3", 24, 265.0),
     "lunar_lander_few_combined.json": ("LunarLander-v3", 8, 240.0),
     "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
     "bipedal_walker_compact.json": ("BipedalWalker-v3", 128, 250.0),
