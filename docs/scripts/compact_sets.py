@@ -33,6 +33,7 @@ OPTIONS = {
     "episodes": "episodes",
     "divider": "divider",
     "turns": "refine",
+    "search_episodes": "search-episodes",
     "validation": "validation",
     "report": "report-episodes",
     "choose": "choose",

@@ -100,6 +100,14 @@ def aggregate(
             "achieve more; 0 for none.",
         ),
     ] = 0,
+    search_episodes: Annotated[
+        int,
+        typer.Option(
+            "--search-episodes",
+            help="With --refine: episodes for each neighbour that is tried; fewer where they "
+            "take long.",
+        ),
+    ] = 16,
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
@@ -142,6 +150,7 @@ def aggregate(
             divider=divider,
             projection=projection,
             turns=refine,
+            search_episodes=search_episodes,
             validation=validation,
             report=report,
             seed=seed,

@@ -280,7 +280,9 @@ class _Run:
 
     def planned_units(self) -> int:
         plan = self.plan
-        refined = refinement_cost(plan.turns, plan.rounds) if plan.turns else 0
+        refined = 0
+        if plan.turns:
+            refined = refinement_cost(plan.turns, plan.search_episodes, plan.rounds)
         tried = 2 * plan.turns + 1 if plan.turns else plan.rounds
         chosen = planned_episodes(tried, _first_validation(plan), plan.validation)
         return plan.rounds * plan.episodes + refined + chosen + plan.report
@@ -418,6 +420,7 @@ class _Run:
             expert=self.expert,
             combined=plan.combined,
             max_rules=plan.max_rules,
+            episodes=plan.search_episodes,
             first=first,
             seed=plan.seed,
             jobs=self.jobs,

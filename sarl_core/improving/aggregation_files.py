@@ -125,6 +125,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         **({"combined": _combined(aggregation)} if plan.combined else {}),
         "episodes_a_round": plan.episodes,
         "turns": plan.turns,
+        **({"search_episodes": plan.search_episodes} if plan.turns else {}),
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,
         "refined": aggregation.refined,

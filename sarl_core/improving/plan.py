@@ -19,7 +19,7 @@ from sarl_core.rollouts.seeds import (
 )
 from sarl_core.shielding.projection import Projection
 
-_MOST_TURNS = SEEDS_A_RUN // refinement_seeds(1)
+_MOST_SEARCH_EPISODES = 1_000
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Plan:
         divider: Number of intervals of continuous dimensions.
         projection: How the shield replaces a continuous action.
         turns: Of the refinement that follows; 0 for none.
+        search_episodes: For each neighbour that it tries.
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
@@ -51,6 +52,7 @@ class Plan:
     divider: int = 2
     projection: Projection = "centre"
     turns: int = 0
+    search_episodes: int = 16
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -78,7 +80,8 @@ class Plan:
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),
             ("number of episodes a round", self.episodes, 1, MOST_EPISODES_A_ROUND),
-            ("number of turns", self.turns, 0, _MOST_TURNS),
+            ("number of search episodes", self.search_episodes, 1, _MOST_SEARCH_EPISODES),
+            ("number of turns", self.turns, 0, self._most_turns()),
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),
@@ -89,3 +92,8 @@ class Plan:
             if most is not None and value > most:
                 # Beyond, what is chosen by would be what it is reported on.
                 raise InputError(f"the {name} is {value:,}; give {most:,} or fewer")
+
+    def _most_turns(self) -> int:
+        """Of which the seeds of one run are enough."""
+        each = refinement_seeds(1, self.search_episodes) - refinement_seeds(0, self.search_episodes)
+        return (SEEDS_A_RUN - refinement_seeds(0, self.search_episodes)) // max(each, 1)

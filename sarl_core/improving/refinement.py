@@ -30,36 +30,47 @@ from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.shielding.shield import Shield
 
-EPISODES = 16  # for each neighbour, the same for all of a generation
-
-_EXPERT_EPISODES = 32  # in which it is seen how long the expert takes
-_LONG = 0.9  # quantile of their lengths
+_LONG = 0.9  # quantile of the expert's lengths
 _PATIENCE = 2  # times as long: what takes longer is tried no further
-_MET_EPISODES = 32  # in which it is seen where the rules lead
 _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
 _NEIGHBOURS = 60  # in shape
-_SHAPE_EPISODES = 64  # for the best of them
 _SHAPES = 4  # that are moved: which has most in it is not seen before
 _EARLY = 4  # generations for each of them
 _LATE = 8  # further ones for the best
-_COMPARED_EPISODES = 128  # by which it is the best
 GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
 
-
-def refinement_cost(turns: int, starts: int = 1) -> int:
-    """Most episodes of a refinement that may begin with one of so many."""
-    shapes = planned_episodes(_NEIGHBOURS, EPISODES, _SHAPE_EPISODES)
-    compared = planned_episodes(_SHAPES + 2, EPISODES, _COMPARED_EPISODES)
-    moved = GENERATIONS * POPULATION * EPISODES
-    begun = planned_episodes(starts, EPISODES, _COMPARED_EPISODES) if starts > 1 else 0
-    return _EXPERT_EPISODES + begun + turns * (_MET_EPISODES + shapes + moved + compared)
+# Times the episodes of a neighbour:
+_EXPERT = 2  # in which it is seen how long the expert takes
+_MET = 2  # in which it is seen where the rules lead
+_RANKED = 4  # for the best shapes
+_COMPARED = 8  # for what is compared at the end of a turn
 
 
-def refinement_seeds(turns: int) -> int:
-    """Most seeds of a refinement: all that are compared play the same episodes."""
-    compared = _MET_EPISODES + _SHAPE_EPISODES + _COMPARED_EPISODES
-    return _EXPERT_EPISODES + _COMPARED_EPISODES + turns * (compared + GENERATIONS * EPISODES)
+def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
+    """Most episodes of a refinement.
+
+    Args:
+        turns: How many.
+        episodes: Of each neighbour.
+        starts: What it may begin with.
+    """
+    shapes = planned_episodes(_NEIGHBOURS, episodes, _RANKED * episodes)
+    compared = planned_episodes(_SHAPES + 2, episodes, _COMPARED * episodes)
+    moved = GENERATIONS * POPULATION * episodes
+    begun = planned_episodes(starts, episodes, _COMPARED * episodes) if starts > 1 else 0
+    return _EXPERT * episodes + begun + turns * (_MET * episodes + shapes + moved + compared)
+
+
+def refinement_seeds(turns: int, episodes: int) -> int:
+    """Most seeds of a refinement: all that are compared play the same episodes.
+
+    Args:
+        turns: How many.
+        episodes: Of each neighbour.
+    """
+    each = _MET + _RANKED + _COMPARED + GENERATIONS
+    return episodes * (_EXPERT + _COMPARED + turns * each)
 
 
 class Refinement:
@@ -74,6 +85,7 @@ class Refinement:
         expert: Agent,
         combined: Sequence[Pair] = (),
         max_rules: int,
+        episodes: int,
         first: int,
         seed: int = 0,
         jobs: int = 1,
@@ -89,6 +101,7 @@ class Refinement:
             expert: Who is asked about the states that they lead to.
             combined: Pairs of features of which new queries may ask about combinations.
             max_rules: Most leaves of each tree.
+            episodes: For each neighbour, the same for all of a generation.
             first: Seed of the first episode.
             seed: Another one gives another way.
             jobs: Processes; changes the speed, never the result.
@@ -102,7 +115,7 @@ class Refinement:
         self._progress: Progress | None = None
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
-        self._combined, self._max_rules = combined, max_rules
+        self._combined, self._max_rules, self._episodes = combined, max_rules, episodes
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
 
@@ -130,27 +143,30 @@ class Refinement:
             WorkError: If a process ended in the middle of its work.
             CancelledError: If `progress` returned False.
         """
-        self._progress, self._total = progress, refinement_cost(turns, len(self._starts))
+        self._progress, self._total = progress, self._cost(turns, len(self._starts))
         self._begin()
         if better is not None:
             better(self.start)
-        begun = self._done - refinement_cost(0)
+        begun = self._done - self._cost(0)
         marks = []
         for turn in range(1, turns + 1):
             before = self._compared
             self._turn()
             # Some had fewer neighbours.
-            self._tell(begun + refinement_cost(turn) - self._done)
+            self._tell(begun + self._cost(turn) - self._done)
             marks += [self._compared, self.here]
             if better is not None and self._compared is not before:
                 better(self._compared)
         return marks
 
+    def _cost(self, turns: int, starts: int = 1) -> int:
+        return refinement_cost(turns, self._episodes, starts)
+
     def _begin(self) -> None:
         """Begin with what achieves most."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) > 1:
-            self.begun = self._ranking(self._starts, self._start, _COMPARED_EPISODES)[0]
+            self.begun = self._ranking(self._starts, self._start, _COMPARED)[0]
             self.here = self._compared = self.start = self._starts[self.begun]
 
     def _patience(self) -> int:
@@ -162,13 +178,13 @@ class Refinement:
         played = rollout(
             self._evaluator.env_id,
             self._expert,
-            episodes=_EXPERT_EPISODES,
-            seed=self._take(_EXPERT_EPISODES),
+            episodes=_EXPERT * self._episodes,
+            seed=self._take(_EXPERT * self._episodes),
             keep_steps=False,
             max_steps=self._evaluator.max_steps,
             executor=self._workers,
         )
-        self._tell(_EXPERT_EPISODES)
+        self._tell(_EXPERT * self._episodes)
         long = math.ceil(_PATIENCE * float(np.quantile(played.lengths, _LONG)))
         return min(long, self._evaluator.max_steps or long)
 
@@ -181,7 +197,7 @@ class Refinement:
         # What was best before it was moved further on, too: it may have been led astray.
         unmoved = [self.here] if self._compared is self.here else [self.here, self._compared]
         compared = [*unmoved, *(one.here for one in moving)]
-        best = self._ranking(compared, met.pairs, _COMPARED_EPISODES)[0]
+        best = self._ranking(compared, met.pairs, _COMPARED)[0]
         self._compared = compared[best]
         place = best - len(unmoved)
         one = moving[place] if place >= 0 else self._movement(self._compared, met)
@@ -195,13 +211,13 @@ class Refinement:
             self._evaluator.env_id,
             self._evaluator.agent,
             shield=Shield(rules, projection=self._evaluator.projection),
-            episodes=_MET_EPISODES,
-            seed=self._take(_MET_EPISODES),
+            episodes=_MET * self._episodes,
+            seed=self._take(_MET * self._episodes),
             keep_steps=True,
             max_steps=self._evaluator.max_steps,
             executor=self._workers,
         )
-        self._tell(_MET_EPISODES)
+        self._tell(_MET * self._episodes)
         table = played.steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
@@ -253,19 +269,19 @@ class Refinement:
         )
         if not others:
             return []
-        return [others[one] for one in self._ranking(others, met.pairs, _SHAPE_EPISODES)[:_SHAPES]]
+        return [others[one] for one in self._ranking(others, met.pairs, _RANKED)[:_SHAPES]]
 
     def _ranking(
-        self, tried: Sequence[Candidate], pairs: Demonstrations, episodes: int
+        self, tried: Sequence[Candidate], pairs: Demonstrations, times: int
     ) -> Sequence[int]:
-        """Candidates by what they achieve, the best first."""
+        """Candidates by what they achieve in so many times the episodes, the best first."""
 
         def achieved(left: Sequence[int], seed: int, count: int) -> list[NDArray[np.float64]]:
             return self._scores([tried[place] for place in left], pairs, seed=seed, episodes=count)
 
-        first = self._take(episodes)
+        most = times * self._episodes
         return successive_halving(
-            len(tried), achieved, seed=first, first=EPISODES, most=episodes
+            len(tried), achieved, seed=self._take(most), first=self._episodes, most=most
         ).ranking
 
     def _movement(self, candidate: Candidate, met: MetStates) -> Movement:
@@ -277,7 +293,7 @@ class Refinement:
         """Move thresholds in the direction that brings more."""
         for _ in range(generations if movement.count else 0):
             achieved = self._scores(
-                movement.ask(), met.pairs, seed=self._take(EPISODES), episodes=EPISODES
+                movement.ask(), met.pairs, seed=self._take(self._episodes), episodes=self._episodes
             )
             movement.tell(np.array([one.mean() for one in achieved]))
 

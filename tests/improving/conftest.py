@@ -9,15 +9,14 @@ import pytest
 from sarl_core.improving import movement, refinement
 
 SMALL = {
-    "EPISODES": 2,
-    "_EXPERT_EPISODES": 2,
-    "_MET_EPISODES": 3,
+    "_EXPERT": 1,
+    "_MET": 2,
     "_NEIGHBOURS": 3,
-    "_SHAPE_EPISODES": 3,
+    "_RANKED": 2,
     "_SHAPES": 2,
     "_EARLY": 1,
     "_LATE": 1,
-    "_COMPARED_EPISODES": 4,
+    "_COMPARED": 2,
     "GENERATIONS": 3,
 }
 

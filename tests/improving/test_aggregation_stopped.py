@@ -20,7 +20,9 @@ from sarl_core.mining.envelope import with_boxes
 from sarl_core.progress import CancelledError
 
 PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=32, report=8)
-REFINED = Plan(max_rules=4, rounds=1, episodes=4, validation=4, report=3, turns=1, seed=3)
+REFINED = Plan(
+    max_rules=4, rounds=1, episodes=4, validation=4, report=3, turns=1, search_episodes=2, seed=3
+)
 SEEDS = ("rounds", "validation", "refinement", "report")
 
 
@@ -70,7 +72,7 @@ def stop_in(monkeypatch, part):
 @pytest.mark.parametrize("seed", [0, 3])
 def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatch, seed):
     monkeypatch.setattr(aggregation, "_FIRST_VALIDATION", 2)
-    plan = Plan(4, rounds=2, episodes=3, validation=5, turns=1, report=5, seed=seed)
+    plan = replace(REFINED, rounds=2, episodes=3, validation=5, report=5, seed=seed)
     found = aggregate(cart, plan)
     searched = [index for index, (module, *_) in enumerate(calls) if module is not aggregation]
     *others, (_, _, report) = calls
@@ -85,7 +87,8 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
     # None of the rounds shares an episode with another, nor any part of the search.
     assert len(used["rounds"]) == 2 * 3
-    assert len(used["refinement"]) == refinement.refinement_seeds(1) == 2 + 4 + 3 + 3 + 4 + 3 * 2
+    each = 2 * (1 + 2 + 2 + 2 + 2 + 3)
+    assert len(used["refinement"]) == refinement.refinement_seeds(1, 2) == each
     assert len(used["report"]) == 5
     # And the record says where each begins.
     assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}

@@ -9,6 +9,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
+from sarl_core.improving.plan import Plan
 from sarl_core.improving.refinement import refinement_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
@@ -140,7 +141,7 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                         0,
                         "Afterwards the rules' queries, numbers and actions are changed to where "
                         f"they achieve more, so many times. Each turn takes up to "
-                        f"{refinement_cost(1):,} episodes. 0: not at all.",
+                        f"{refinement_cost(1, Plan.search_episodes):,} episodes. 0: not at all.",
                     )
             seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
             if not demonstrations.is_discrete:
