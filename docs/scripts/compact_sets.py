@@ -65,14 +65,14 @@ _CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)
 _PENDULUM = Plan(16, rounds=16, episodes=20, divider=16, turns=3, validation=512, report=1_000)
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
-    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=3)),
+    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=4)),
     "lunar_lander_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=24, turns=3, validation=1_024), "every"
     ),
     "lunar_lander_few_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=8), "every"
     ),
-    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=3)),
+    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=12)),
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
     ),

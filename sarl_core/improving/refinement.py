@@ -168,6 +168,7 @@ class Refinement:
         if len(self._starts) > 1:
             self.begun = self._ranking(self._starts, self._start, _COMPARED)[0]
             self.here = self._compared = self.start = self._starts[self.begun]
+            self._starts = [self.start]  # who searches on begins where this has come to
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
