@@ -90,17 +90,20 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     for name in arguments.sets or SETS:
-        make(name, arguments.work, arguments.jobs)
         measure_expert(SETS[name], arguments.jobs)
+        make(name, arguments.work, arguments.jobs)
 
 
 def make(name: str, work: Path, jobs: int) -> None:
     """One rule set over all seeds, of which the median is copied to data/rules."""
     for seed in LEARNING_SEEDS:
-        if any(one["seed"] == seed for one in _known().get(name, [])):
-            continue
         one = SETS[name]
         plan = replace(one.plan, seed=seed)
+        known = [each for each in _known().get(name, []) if each["seed"] == seed]
+        if any(each["command"] != command(name, plan) for each in known):
+            raise SystemExit(f"the plan of {name} has changed; delete it from {SEEDS}")
+        if known:
+            continue
         start = load_demonstrations(FOLDER / "data" / "demonstrations" / f"{one.task}.parquet")
         if one.combine:
             every = one.combine == "every"
@@ -110,7 +113,7 @@ def make(name: str, work: Path, jobs: int) -> None:
         if not aggregation.is_finished:
             raise SystemExit(f"stopped; what was finished before is in {SEEDS}")
         save_aggregation(aggregation, work / f"{name}_{seed}.json", command=command(name, plan))
-        _add(name, {"seed": seed, **achieved(aggregation)})
+        _add(name, {"seed": seed, "command": command(name, plan), **achieved(aggregation)})
     middle = median(_known()[name])
     made = work / f"{name}_{middle['seed']}.json"
     if not made.is_file():

@@ -50,7 +50,7 @@ IN_FULL = {
 }
 HEAD = (
     "| task | rules | features a query | mean return, 95 % interval | 200 or more | failures, "
-    "95 % interval | each of five learning seeds: mean (failures) |",
+    "95 % interval | each of five learning seeds, rules: mean (failures) |",
     "| --- | --- | --- | --- | --- | --- | --- |",
 )
 
@@ -109,9 +109,9 @@ def outcome_text(task: str, one: dict[str, Any]) -> str:
 
 
 def seed_text(one: dict[str, Any]) -> str:
-    """What the rules of one learning seed achieve."""
+    """What the rules of one learning seed achieve, and how many they are."""
     failures = "" if one["failures"] is None else f" ({one['failures']:,})"
-    return f"{one['mean']:,.1f}{failures}"
+    return f"{one['rules']}: {one['mean']:,.1f}{failures}"
 
 
 def mean_text(one: dict[str, Any]) -> str:

@@ -104,8 +104,8 @@ def aggregate(
         int,
         typer.Option(
             "--search-episodes",
-            help="With --refine: episodes for each neighbour that is tried; fewer where they "
-            "take long.",
+            help="With --refine: episodes for each neighbour that is tried, at most 1,000; take "
+            "fewer where an episode takes long.",
         ),
     ] = 16,
     validation: Annotated[

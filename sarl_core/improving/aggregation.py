@@ -1,8 +1,9 @@
 """Demonstrations where they are missing (the paper's Prospects): dataset aggregation for rules.
 
 The rules act, the expert says what it would have done in the states they lead to, and rules are
-grown again from all answers (DAgger, Ross et al. 2011). Of all rounds the best is found by
-successive halving, and reported on episodes that nothing was chosen by.
+grown again from all answers (DAgger, Ross et al. 2011). Of all rounds, or of all that a refinement
+of the best of them came to, the best is found by successive halving, and reported on episodes that
+nothing was chosen by.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ class Aggregation:
         rule_set: The best that was found.
         trees: Of its rules, one an action dimension, with the pairs it was grown from.
         rounds: All that were finished.
-        chosen: Number of the round whose rules are the best.
+        chosen: Number of the round whose rules are the best, or were before they were refined.
         validation_mean: Mean return in the episodes by which these very rules were chosen; too good
             by what luck they had. None where the run was stopped before.
         refined: Whether its queries, labels or thresholds were changed afterwards.
@@ -192,7 +193,7 @@ def aggregate(
 
     Returns:
         The best rules. Stopped after a first round (by `progress`, or by Ctrl-C), every part
-        that was finished counts: the choice among the rounds, the refinement as far as it went.
+        that was finished counts: the rounds, the refinement as far as it went, the choice.
 
     Raises:
         InputError: If agent, expert and environment do not fit, or the expert acts at random.
@@ -433,7 +434,7 @@ class _Run:
             return _Choice(search.begun, trees, refined=candidate is not search.start)
 
         def better(candidate: Candidate) -> None:
-            # By the episodes of the search only: for who stops before the second validation.
+            # By the episodes of the search only: for who stops before the validation.
             self.choice = moved(candidate)
             self.seeds = self.seeds._replace(refinement=first)
 
@@ -446,7 +447,7 @@ class _Run:
         self.seeds = self.seeds._replace(validation=chosen_by)
 
     def worth(self) -> float:
-        """What a failure counts in a search: as much as returns differ where failures do."""
+        """What a failure counts in a search: as much as the returns of the rounds differ."""
         if self.plan.choose == "return":
             return 0.0
         low, high = np.quantile(np.concatenate([one.returns for one in self.rounds]), _USUAL)

@@ -27,7 +27,7 @@ from sarl_core.mining.combining.candidates import Pair, candidates
 from sarl_core.mining.tree import PolicyTree, count_tree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.episodes import MAX_STEPS, rollout
 from sarl_core.shielding.shield import Shield
 
 _LONG = 0.9  # quantile of the expert's lengths
@@ -168,7 +168,6 @@ class Refinement:
         if len(self._starts) > 1:
             self.begun = self._ranking(self._starts, self._start, _COMPARED)[0]
             self.here = self._compared = self.start = self._starts[self.begun]
-            self._starts = [self.start]  # who searches on begins where this has come to
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
@@ -184,10 +183,10 @@ class Refinement:
             keep_steps=False,
             max_steps=self._evaluator.max_steps,
             executor=self._workers,
+            progress=self._ticks(),
         )
-        self._tell(_EXPERT * self._episodes)
         long = math.ceil(_PATIENCE * float(np.quantile(played.lengths, _LONG)))
-        return min(long, self._evaluator.max_steps or long)
+        return min(long, self._evaluator.max_steps or MAX_STEPS)
 
     def _turn(self) -> None:
         """Change the shape, if that is better, and move the thresholds."""
@@ -217,14 +216,16 @@ class Refinement:
             keep_steps=True,
             max_steps=self._evaluator.max_steps,
             executor=self._workers,
+            progress=self._ticks(),
         )
-        self._tell(_MET * self._episodes)
         table = played.steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
-        rows = with_values(table.observation, self.here.derived)
+        # What was best before is compared with what comes of this, and may ask about more.
+        queried = [*dict.fromkeys([*self.here.derived, *self._compared.derived])]
+        rows = with_values(table.observation, queried)
         if not len(rows):  # nothing of what it asks about has a value where it leads
-            demonstrated = self._start.deriving(self.here.derived)
+            demonstrated = self._start.deriving(queried)
             return MetStates(demonstrated, scores(self._expert, demonstrated.raw_observations))
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
@@ -311,6 +312,11 @@ class Refinement:
             workers=self._workers,
             progress=lambda done, _: self._tell(before + done * episodes - self._done),
         )
+
+    def _ticks(self) -> Progress:
+        """Tells the progress of work that counts its own episodes from 0."""
+        before = self._done
+        return lambda done, _: self._tell(before + done - self._done)
 
     def _take(self, episodes: int) -> int:
         """Seed of episodes that are used for nothing else."""

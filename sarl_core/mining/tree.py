@@ -8,7 +8,6 @@ a node a slice.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
@@ -366,6 +365,7 @@ def grow_policy_trees(
     Raises:
         InputError: If the divider or the depth is out of range.
     """
+    from loky import cpu_count
     from sklearn.tree import DecisionTreeClassifier
 
     must = "what trees are grown from must be Demonstrations"
@@ -380,8 +380,10 @@ def grow_policy_trees(
         structure = fitted(learner, demonstrations.observations, labels)
         return count_tree(structure, demonstrations, index, divider=divider)
 
+    if len(dimensions) == 1:
+        return (grown(0),)
     # scikit-learn lets other threads run while it grows a tree.
-    with ThreadPoolExecutor(min(len(dimensions), os.cpu_count() or 1)) as threads:
+    with ThreadPoolExecutor(min(len(dimensions), cpu_count())) as threads:
         return tuple(threads.map(grown, range(len(dimensions))))
 
 

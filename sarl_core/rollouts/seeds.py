@@ -41,6 +41,7 @@ They stay as they are, because shipped files name them. Besides:
   chosen by no episode.
 - Runs of `aggregate` whose seeds are ten apart: the rounds of one are the validation of the other.
   They share no rules.
+- Cards of older rule sets name a second validation, half a `SEEDS_A_RUN` behind the first.
 - `FRESH` serves all pages, the search for gaps included. Nothing that is shipped is chosen by it.
 """
 

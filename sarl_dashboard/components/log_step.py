@@ -10,12 +10,12 @@ from sarl_core.explaining.figures.audit import step_texts
 from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.state_path import PathFinder
 from sarl_core.mining.language import sentence
-from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.sampling import feature_spans, within
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.text import escaped
 
 
@@ -58,7 +58,7 @@ def show_step(held: Audit, row: int, choice: str) -> None:
 def _link_what_if(held: Audit, row: int, choice: str) -> None:
     """A way to this state on the page What if, where that page asks about the same features."""
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or fitting(held.rule_set, demonstrations) is None:
+    if demonstrations is None or fitting_demonstrations(held.rule_set, demonstrations) is None:
         return
     names = [feature.name for feature in observed_features(held.rule_set.source.features)]
     if names != [feature.name for feature in demonstrations.observed]:

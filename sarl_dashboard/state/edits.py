@@ -18,7 +18,6 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
-from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.holding_out import with_untried_held_out
 from sarl_core.shielding.decisions import Ground, ground_of
@@ -35,6 +34,7 @@ from sarl_dashboard.state.rule_files import (
     as_named,
     compact_rules,
     compact_sets,
+    fitting_demonstrations,
     rules_in_file,
     unnamed_compact_rules,
 )
@@ -222,7 +222,7 @@ def edited_rules() -> RuleSet:
 def demonstrations_for(rule_set: RuleSet) -> Demonstrations | None:
     """The chosen demonstrations with what the rules derive, where they are of their features."""
     demonstrations = chosen_demonstrations()
-    return fitting(rule_set, demonstrations) if demonstrations else None
+    return fitting_demonstrations(rule_set, demonstrations) if demonstrations else None
 
 
 @cached(show_spinner="Looking which rule decides which state …")

@@ -27,7 +27,7 @@ OWN_FILE = "own file"
 CHOSEN, NO_RULES = "at the thresholds", "none"
 COMPACT, COMBINED, FEWEST = "compact", "compact, two features", "fewest, two features"
 COMPACT_ENDINGS = {COMPACT: "compact", COMBINED: "combined", FEWEST: "few_combined"}
-"""The compact sets that there may be for some data: their names, and how their files' end."""
+"""The compact sets that there may be for some data: their names, and how their files end."""
 PAPERS = {"filtered": FILTERED, "unfiltered": UNFILTERED}
 RULES_FOLDER = DATA / "rules"
 
@@ -46,6 +46,14 @@ def rules_in_file(content: bytes, name: str) -> RuleSet:
     return rules_from_json(content, name=name)
 
 
+@cached()
+def fitting_demonstrations(
+    rule_set: RuleSet, demonstrations: Demonstrations
+) -> Demonstrations | None:
+    """As `rule_order.fitting`, worked out once: what rules derive is worked out of every step."""
+    return fitting(rule_set, demonstrations)
+
+
 def as_named(rule_set: RuleSet) -> RuleSet:
     """Rules from a file, in the order and under the names of the chosen demonstrations.
 
@@ -56,7 +64,7 @@ def as_named(rule_set: RuleSet) -> RuleSet:
         The same where they do not fit these.
     """
     raw = raw_demonstrations()
-    fitted = None if raw is None else fitting(rule_set, raw)
+    fitted = None if raw is None else fitting_demonstrations(rule_set, raw)
     if fitted is None:
         return rule_set
     return _renamed(_ordered(rule_set, fitted), given_names.given_names(raw))

@@ -17,7 +17,6 @@ from sarl_core.explaining.words.difference import decided_text, rows_text
 from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.language import counted
-from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
@@ -25,6 +24,7 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.components.settings import notes_notice, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
 
@@ -85,8 +85,8 @@ def _compare(first: Side, second: Side) -> RuleSetComparison:
     notes_notice(notes)
     demonstrations = chosen_demonstrations()
     if demonstrations is not None:
-        demonstrations = fitting(one, demonstrations)
-        if demonstrations is not None and fitting(other, demonstrations) is None:
+        demonstrations = fitting_demonstrations(one, demonstrations)
+        if demonstrations is not None and fitting_demonstrations(other, demonstrations) is None:
             demonstrations = None
     return RuleSetComparison(one, other, demonstrations, names)
 

@@ -135,10 +135,10 @@ def how_chosen(improved: Aggregation) -> str:
             "They were chosen by episodes played for that alone, with a mean return of "
             f"{improved.validation_mean:,.1f}; that number is flattered by being the best."
         )
-    if improved.refined:
+    if improved.seeds.refinement is not None:
         return (
-            "The round was chosen by episodes played for that alone. How far its rules were "
-            "refined was judged by the episodes of the refinement: that is little."
+            "They are judged by the episodes of the refinement alone: that is little, and they "
+            "were compared by them more than once."
         )
     best = improved.rounds[improved.chosen - 1]
     return (

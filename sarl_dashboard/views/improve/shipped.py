@@ -19,7 +19,7 @@ from sarl_core.rollouts.statistics import Rate
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state.data import SHIPPED_SETS
-from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, RULES_FOLDER, compact_file
+from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file, compact_sets
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
@@ -60,7 +60,7 @@ def show_shipped(*, gaps: bool) -> None:
 
 def _show_cards() -> None:
     """What the compact sets of the chosen data have achieved, one at a time."""
-    names = [name for name in COMPACT_ENDINGS if card_path(compact_file(name)).is_file()]
+    names = [name for name in compact_sets() if card_path(compact_file(name)).is_file()]
     if not names:
         return
     st.subheader("The compact rules that are shipped")

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rule_order import fitting, rules_for
+from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.state import compact_set, edits
 from sarl_dashboard.state.mined import grown_trees, rules_at
+from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
 
 IN_FORCE, EDITED = "as mined", "edited"
@@ -55,7 +56,7 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
     ):
         return in_force
     edited = edits.edited_rules()
-    fitted = fitting(edited, demonstrations)
+    fitted = fitting_demonstrations(edited, demonstrations)
     if fitted is not None:
         edited, notes = rules_for(edited, fitted)
         notes_notice(notes)
