@@ -11,7 +11,7 @@ from sarl_core.explaining.exports.export import prepare
 from sarl_core.explaining.report.tally import tally
 from sarl_core.mining.editing.difference import comparable
 from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.rule_order import fits, rules_for
+from sarl_core.mining.rule_order import fitting, rules_for
 from sarl_core.mining.validation.holding_out import with_held_out, with_untried_held_out
 from sarl_core.mining.validation.stability import rule_stability
 from sarl_core.shielding.disagreement import disagreement
@@ -104,7 +104,7 @@ def test_two_rule_sets_are_compared_by_name():
 
 def test_other_names_do_not_fit():
     other = replace(SHOWN, feature_names=("a", "b", "c", "d"))
-    assert not fits(RULES, other)
+    assert fitting(RULES, other) is None
     with pytest.raises(InputError, match=r"height, speed, tilt, load.*a, b, c, d"):
         tally(RULES, other)
     with pytest.raises(InputError, match="action dimensions"):
