@@ -185,10 +185,9 @@ def ranks(means: NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         Shape (n,). Equal means share theirs, so that nothing is followed where all do alike.
     """
-    _, group, size = np.unique(means, return_inverse=True, return_counts=True)
-    last = np.cumsum(size) - 1
-    middle = last - 0.5 * (size - 1)
-    places: NDArray[np.float64] = middle[group] / max(len(means) - 1, 1) - 0.5
+    from scipy.stats import rankdata
+
+    places: NDArray[np.float64] = (rankdata(means) - 1) / max(len(means) - 1, 1) - 0.5
     return places
 
 

@@ -27,7 +27,7 @@ from sarl_core.mining.combining.candidates import Pair, candidates
 from sarl_core.mining.tree import PolicyTree, count_tree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
-from sarl_core.rollouts.episodes import MAX_STEPS, rollout
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, rollout
 from sarl_core.shielding.shield import Shield
 
 _LONG = 0.9  # quantile of the expert's lengths
@@ -111,7 +111,7 @@ class Refinement:
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
         self.here = self._compared = self.start
-        self._start = pairs
+        self._pairs = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
@@ -166,7 +166,7 @@ class Refinement:
         """Begin with what achieves most."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) > 1:
-            self.begun = self._ranking(self._starts, self._start, _COMPARED)[0]
+            self.begun = self._ranking(self._starts, self._pairs, _COMPARED)[0]
             self.here = self._compared = self.start = self._starts[self.begun]
 
     def _patience(self) -> int:
@@ -175,16 +175,7 @@ class Refinement:
         Rules that never come to an end would cost most of the time, and what they do so long is
         not what the expert does.
         """
-        played = rollout(
-            self._evaluator.env_id,
-            self._expert,
-            episodes=_EXPERT * self._episodes,
-            seed=self._take(_EXPERT * self._episodes),
-            keep_steps=False,
-            max_steps=self._evaluator.max_steps,
-            executor=self._workers,
-            progress=self._ticks(),
-        )
+        played = self._play(self._expert, None, _EXPERT)
         long = math.ceil(_PATIENCE * float(np.quantile(played.lengths, _LONG)))
         return min(long, self._evaluator.max_steps or MAX_STEPS)
 
@@ -206,26 +197,16 @@ class Refinement:
 
     def _met(self) -> MetStates:
         """Where the rules lead now, and what the expert says there."""
-        rules = leaf_rules(self.here.trees(self._start, self._evaluator.divider))
-        played = rollout(
-            self._evaluator.env_id,
-            self._evaluator.agent,
-            shield=Shield(rules, projection=self._evaluator.projection),
-            episodes=_MET * self._episodes,
-            seed=self._take(_MET * self._episodes),
-            keep_steps=True,
-            max_steps=self._evaluator.max_steps,
-            executor=self._workers,
-            progress=self._ticks(),
-        )
-        table = played.steps
+        rules = leaf_rules(self.here.trees(self._pairs, self._evaluator.divider))
+        shield = Shield(rules, projection=self._evaluator.projection)
+        table = self._play(self._evaluator.agent, shield, _MET).steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
         # What was best before is compared with what comes of this, and may ask about more.
         queried = [*dict.fromkeys([*self.here.derived, *self._compared.derived])]
         rows = with_values(table.observation, queried)
         if not len(rows):  # nothing of what it asks about has a value where it leads
-            demonstrated = self._start.deriving(queried)
+            demonstrated = self._pairs.deriving(queried)
             return MetStates(demonstrated, scores(self._expert, demonstrated.raw_observations))
         if len(rows) > _MET_STATES:
             rows = np.sort(self._generator.choice(rows, _MET_STATES, replace=False))
@@ -240,9 +221,9 @@ class Refinement:
         # Where the space has no bounds, what was shown is divided; labels stay what they are.
         pairs = replace(
             pairs,
-            action_low=self._start.action_low,
-            action_high=self._start.action_high,
-            bounds_from=self._start.bounds_from,
+            action_low=self._pairs.action_low,
+            action_high=self._pairs.action_high,
+            bounds_from=self._pairs.bounds_from,
         )
         offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
         # What the trees ask about stands first, where they look for it.
@@ -313,10 +294,20 @@ class Refinement:
             progress=lambda done, _: self._tell(before + done * episodes - self._done),
         )
 
-    def _ticks(self) -> Progress:
-        """Tells the progress of work that counts its own episodes from 0."""
-        before = self._done
-        return lambda done, _: self._tell(before + done - self._done)
+    def _play(self, agent: Agent, shield: Shield | None, times: int) -> Episodes:
+        """So many times the episodes of an agent, with every step."""
+        before, episodes = self._done, times * self._episodes
+        return rollout(
+            self._evaluator.env_id,
+            agent,
+            shield=shield,
+            episodes=episodes,
+            seed=self._take(episodes),
+            keep_steps=True,
+            max_steps=self._evaluator.max_steps,
+            executor=self._workers,
+            progress=lambda done, _: self._tell(before + done - self._done),
+        )
 
     def _take(self, episodes: int) -> int:
         """Seed of episodes that are used for nothing else."""
