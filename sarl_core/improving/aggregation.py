@@ -21,10 +21,11 @@ from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
-from sarl_core.improving.candidate import Candidate, Evaluator
+from sarl_core.improving.alternation import alternated, label_scores
+from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
-from sarl_core.improving.questions import scores as label_scores_of
+from sarl_core.improving.questions import scores as expert_scores
 from sarl_core.improving.refinement import Refinement, refinement_cost
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -32,7 +33,7 @@ from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.queries import trees_over_used
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import PolicyTree, count_tree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.choices import check_choice, mean_score, scores
@@ -43,6 +44,7 @@ from sarl_core.rollouts.statistics import Rate
 from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
+_ALTERNATED = 10_000  # pairs by which queries are chosen anew
 _FIRST_VALIDATION = 16
 _USUAL = (0.05, 0.95)  # quantiles between which most returns lie
 _FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
@@ -284,18 +286,17 @@ class _Run:
         refined = 0
         if plan.turns:
             refined = refinement_cost(plan.turns, plan.search_episodes, plan.rounds)
-        tried = 2 * plan.turns + 1 if plan.turns else plan.rounds
-        chosen = planned_episodes(tried, _first_validation(plan), plan.validation)
+        chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
 
     def grow(self, index: int) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
         pairs = self.answers.pairs(index)
-        label_scores = label_scores_of(self.expert, pairs.raw_observations)
+        known = expert_scores(self.expert, pairs.raw_observations)
         ways: dict[str, Any] = {}
-        if label_scores is not None:
+        if known is not None:
             # Two ways to say what matters, in turns; which is better is seen, not known.
-            ways = {"scores": label_scores} if index % 2 else {"weights": importance(label_scores)}
+            ways = {"scores": known} if index % 2 else {"weights": importance(known)}
         trees = grow_budgeted_trees(
             pairs,
             max_rules=self.plan.max_rules,
@@ -303,7 +304,33 @@ class _Run:
             seed=self.plan.seed + index,
             **ways,
         )
-        return trees_over_used(trees, pairs)
+        return trees_over_used(self.alternated(trees, pairs, known, index), pairs)
+
+    def alternated(
+        self,
+        trees: tuple[PolicyTree, ...],
+        pairs: Demonstrations,
+        known: NDArray[np.float64] | None,
+        index: int,
+    ) -> tuple[PolicyTree, ...]:
+        """Trees of a round with their queries chosen anew, each by what the others make of it."""
+        rows = np.arange(len(pairs))
+        if len(rows) > _ALTERNATED:
+            generator = np.random.default_rng((self.plan.seed, index))
+            rows = np.sort(generator.choice(rows, _ALTERNATED, replace=False))
+        result = []
+        for tree in trees:
+            scores = known
+            if scores is None:
+                scores = label_scores(pairs, tree.dimension, tree.index)
+            changed = alternated(
+                structure_of(tree),
+                pairs.observations[rows],
+                scores[rows],
+                max_rules=self.plan.max_rules,
+            )
+            result.append(count_tree(changed, pairs, tree.index, divider=self.plan.divider))
+        return tuple(result)
 
     def pairs(self, choice: _Choice) -> Demonstrations:
         """What the trees of a choice were grown from, with what they derive."""
@@ -439,8 +466,9 @@ class _Run:
             self.seeds = self.seeds._replace(refinement=first)
 
         marks = search.run(plan.turns, progress=clock.of(), better=better)
+        clock.tick(_choice_cost(plan, _most_choices(plan)) - _choice_cost(plan, len(marks)))
         self.seeds = self.seeds._replace(refinement=first)
-        choices = [moved(search.start), *map(moved, marks)]
+        choices = [moved(one) for one in marks]
         chosen_by = self.seed(seeds.VALIDATION)
         index, mean = self.best_of([self.rules(one.trees) for one in choices], chosen_by, clock)
         self.choice = replace(choices[index], mean=mean)
@@ -480,6 +508,16 @@ class _Run:
             demonstrations=pairs,
             seeds=self.seeds,
         )
+
+
+def _most_choices(plan: Plan) -> int:
+    """What may be left to choose from: all rounds, or all that turns came to."""
+    return 2 * plan.turns + 1 if plan.turns else plan.rounds
+
+
+def _choice_cost(plan: Plan, choices: int) -> int:
+    """Episodes by which one of so many is chosen."""
+    return planned_episodes(choices, _first_validation(plan), plan.validation)
 
 
 def _first_validation(plan: Plan) -> int:

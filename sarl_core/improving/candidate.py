@@ -15,7 +15,7 @@ from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.combining.queries import over_queried
-from sarl_core.mining.tree import PolicyTree, TreeStructure, count_tree
+from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 from sarl_core.rollouts.choices import weighed
@@ -67,6 +67,23 @@ class Candidate:
         derived = derived_features(features)
         return cls.of(
             [structure_of(tree) for tree in trees], derived, observed=len(features) - len(derived)
+        )
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What it has in common with those that act alike, node for node."""
+        return (
+            self.derived,
+            *(
+                np.asarray(values).tobytes()
+                for one in self.structures
+                # What is said at queries is never heard.
+                for values in (
+                    one.feature,
+                    one.threshold,
+                    np.where(one.feature == LEAF, np.asarray(one.label), LEAF),
+                )
+            ),
         )
 
     def trees(self, pairs: Demonstrations, divider: int) -> tuple[PolicyTree, ...]:

@@ -34,7 +34,7 @@ _LONG = 0.9  # quantile of the expert's lengths
 _PATIENCE = 2  # times as long: what takes longer is tried no further
 _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
-_NEIGHBOURS = 60  # in shape
+_NEIGHBOURS = 80  # in shape
 _SHAPES = 4  # that are moved: which has most in it is not seen before
 _EARLY = 4  # generations for each of them
 _LATE = 8  # further ones for the best
@@ -136,8 +136,9 @@ class Refinement:
                 not gone to its end.
 
         Returns:
-            Two for each turn, what was best in it and where its thresholds were moved then.
-            Which is best of all is not known: choose by episodes.
+            What it began with, and of each turn what was best in it and where its thresholds were
+            moved then, no two of them alike. Which is best of all is not known: choose by
+            episodes.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
@@ -148,7 +149,7 @@ class Refinement:
         if better is not None:
             better(self.start)
         begun = self._done - self._cost(0)
-        marks = []
+        marks = [self.start]
         for turn in range(1, turns + 1):
             before = self._compared
             self._turn()
@@ -157,7 +158,10 @@ class Refinement:
             marks += [self._compared, self.here]
             if better is not None and self._compared is not before:
                 better(self._compared)
-        return marks
+        different: dict[tuple[object, ...], Candidate] = {}
+        for one in marks:
+            different.setdefault(one.key, one)
+        return list(different.values())
 
     def _cost(self, turns: int, starts: int = 1) -> int:
         return refinement_cost(turns, self._episodes, starts)
