@@ -63,6 +63,22 @@ _CARTPOLE = Plan(
 _LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
 _CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)
 _PENDULUM = Plan(16, rounds=16, episodes=20, divider=16, turns=3, validation=512, report=1_000)
+_BODY = (
+    "hull angle, hull angular velocity, horizontal velocity, vertical velocity, hip 1 angle, "
+    "hip 1 speed, knee 1 angle, knee 1 speed, leg 1 ground contact, hip 2 angle, hip 2 speed, "
+    "knee 2 angle, knee 2 speed, leg 2 ground contact"
+)
+_WALKER = Plan(
+    32,
+    rounds=16,
+    episodes=12,
+    divider=15,
+    turns=4,
+    search_episodes=4,
+    validation=256,
+    report=1_000,
+    choose="failures",
+)
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
     "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=4)),
@@ -76,6 +92,7 @@ SETS = {
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
     ),
+    "bipedal_walker_combined": RuleSetPlan("bipedal_walker", _WALKER, _BODY),
     "pendulum_combined": RuleSetPlan("pendulum", _PENDULUM, "every"),
     "pendulum_compact": RuleSetPlan("pendulum", _PENDULUM),
 }

@@ -20,6 +20,7 @@ from sarl_core.rollouts.seeds import (
 from sarl_core.shielding.projection import Projection
 
 _MOST_SEARCH_EPISODES = 1_000
+_USUAL_SEARCH_EPISODES = 16
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Plan:
     divider: int = 2
     projection: Projection = "centre"
     turns: int = 0
-    search_episodes: int = 16
+    search_episodes: int = _USUAL_SEARCH_EPISODES
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -76,6 +77,8 @@ class Plan:
                 "rules that thresholds cut are not refined; give --refine without --support and "
                 "--confidence, or these without it"
             )
+        if self.search_episodes != _USUAL_SEARCH_EPISODES and not self.turns:
+            raise InputError("--search-episodes are those of a refinement; give --refine, too")
         for name, value, least, most in (
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),

@@ -15,11 +15,31 @@ from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, pol
 from sarl_dashboard.state.edits import offered as edits_offered
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, OWN_FILE, compact_sets
+from sarl_dashboard.state.rule_files import (
+    CHOSEN,
+    COMBINED,
+    COMPACT,
+    COMPACT_ENDINGS,
+    FEWEST,
+    NO_RULES,
+    OWN_FILE,
+    compact_sets,
+)
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import in_full
 
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
+_RULE_SETS = {
+    CHOSEN: "those in the sidebar",
+    "filtered": "support 0.005, confidence 0.95",
+    "unfiltered": "support 0, confidence 1",
+    COMPACT: "a small set that is shipped, every condition about one feature",
+    COMBINED: "one that is shipped and asks about two features at once",
+    FEWEST: "the same with as few rules as do it",
+    EDITED: "what you made of them on the page Edit",
+    OWN_FILE: "rules you saved",
+    NO_RULES: "the agent alone",
+}
 Width = Literal["stretch"] | int
 
 
@@ -69,6 +89,15 @@ def offered_rule_sets(names: Sequence[str]) -> list[str]:
     """Those of some rule sets that can be had now."""
     missing = COMPACT_ENDINGS.keys() - compact_sets()
     return [name for name in names if name not in missing and (name != EDITED or edits_offered())]
+
+
+def rule_sets_help(offered: Sequence[str]) -> str:
+    """What the offered rule sets are."""
+    return " ".join(
+        f"{name[0].upper()}{name[1:]}: {_RULE_SETS[name]}."
+        for name in offered
+        if name in _RULE_SETS
+    )
 
 
 def projection_choice(width: Width = "stretch") -> Projection:

@@ -14,6 +14,7 @@ from gymnasium.envs.classic_control import CartPoleEnv
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
+from sarl_core.demonstrations.names import names_of
 from sarl_core.improving.aggregation import Aggregation, aggregate
 from sarl_core.improving.aggregation_files import save_aggregation
 from sarl_core.improving.gaps import gaps_so_far
@@ -202,6 +203,16 @@ def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
     assert commands[-1][-3:] == ["--combine", "--out", "rules.json"]
     open_page("improve", data="cartpole", **small)
     assert "--combine" not in commands[-1]
+
+
+def test_the_command_calls_features_as_the_file_does(commands: list[list[str]]) -> None:
+    given = names_of(CARTPOLE)._replace(features=("place", "speed", "lean", "turning"))
+    app = open_page("names", data="cartpole", combine="2,3")
+    app.session_state["_names"] = {CARTPOLE.digest: given}
+    app.switch_page("improve.py").run()
+    assert not app.exception
+    assert not errors(app)
+    assert commands[-1][-4:-2] == ["--combine", "pole angle, pole angular velocity"]
 
 
 def test_the_command_has_the_formulas_of_the_page_names(commands: list[list[str]]) -> None:

@@ -13,11 +13,14 @@ from sarl_core.agents.agent import EXPERT_FOLDER
 from sarl_core.demonstrations.dataset import with_formulas
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
+from sarl_core.improving.alternation import alternated
+from sarl_core.improving.candidate import structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import count_tree
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import REPORT, ROUNDS
 from sarl_core.rollouts.trial import make_agent
@@ -71,7 +74,11 @@ def test_what_is_told_of_a_round_can_be_checked_by_hand(cart, small, found):
         max_rules=5,
         weights=importance(scores(make_agent("expert", CART), cart.observations)),
     )
-    rules = leaf_rules([tree])
+    expert = make_agent("expert", CART)
+    changed = alternated(
+        structure_of(tree), cart.observations, scores(expert, cart.observations), max_rules=5
+    )
+    rules = leaf_rules([count_tree(changed, cart_answers(cart), 0, divider=2)])
     run = rollout(CART, "novice", shield=Shield(rules), episodes=4, seed=ROUNDS)
     first = found.rounds[0]
     assert (first.returns == run.returns).all()
@@ -153,6 +160,7 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"validation": 500_001}, "validation episodes is 500,001; give 500,000 or fewer"),
         ({"turns": 10**6}, "the number of turns is 1,000,000; give"),
         ({"turns": -1}, "the number of turns is -1"),
+        ({"search_episodes": 4}, "those of a refinement; give --refine, too"),
         ({"seed": -1}, "the seed is -1"),
     ],
 )

@@ -18,6 +18,7 @@ from sarl_dashboard.components.settings import (
     notes_notice,
     offered_rule_sets,
     own_files,
+    rule_sets_help,
     shield_choice,
 )
 from sarl_dashboard.jobs.ablation import Wanted
@@ -62,6 +63,7 @@ def settings() -> AblationChoice:
     Raises:
         SarlError: If it cannot be had.
     """
+    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         with st.grid(4, min_column_width=150, gap="small"):
             env = environment_choice()
@@ -75,12 +77,10 @@ def settings() -> AblationChoice:
             )
             rules = st.selectbox(
                 "Rules",
-                offered_rule_sets(RULE_SETS),
+                offered,
                 key="rules",
                 bind="query-params",
-                help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets "
-                "that are shipped for this environment. Own file: rules you saved.",
+                help=rule_sets_help(offered),
             )
             most = st.number_input(
                 "Rules to take out",

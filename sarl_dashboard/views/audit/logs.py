@@ -16,7 +16,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.column_form import ColumnForm
-from sarl_dashboard.components.settings import offered_rule_sets
+from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
@@ -54,7 +54,14 @@ class Logs:
 def chosen_rules() -> ChosenRules:
     """The widgets for the rules; where there are none, the page says so and stops."""
     offered = offered_rule_sets([CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE])
-    choice = st.selectbox("Rules", offered, key="audited", bind="query-params", width=320)
+    choice = st.selectbox(
+        "Rules",
+        offered,
+        key="audited",
+        bind="query-params",
+        width=320,
+        help=rule_sets_help(offered),
+    )
     file = None
     if choice == OWN_FILE:
         file = st.file_uploader("Rule file (.json)", key="audited_file")

@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.components.settings import offered_rule_sets
+from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
@@ -59,7 +59,14 @@ def _offered() -> list[str]:
 
 def _side(key: str, label: str, default: str) -> Side:
     offered = _offered()
-    choice = st.selectbox(label, offered, offered.index(default), key=key, bind="query-params")
+    choice = st.selectbox(
+        label,
+        offered,
+        offered.index(default),
+        key=key,
+        bind="query-params",
+        help=rule_sets_help(offered),
+    )
     file = None
     if choice == OWN_FILE:
         file = st.file_uploader("Rule file (.json)", key=f"{key}_file")

@@ -10,7 +10,7 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
-from sarl_dashboard.components.settings import offered_rule_sets, projection_choice
+from sarl_dashboard.components.settings import offered_rule_sets, projection_choice, rule_sets_help
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
@@ -77,9 +77,7 @@ def chosen_rules() -> RuleSet:
         index=choices.index(default),
         key="carry",
         bind="query-params",
-        help="At the thresholds: those in the sidebar. Compact, fewest: small sets that are "
-        "shipped for this environment. Edited: as they stand on the Edit page. Own file: rules "
-        "you saved.",
+        help=rule_sets_help(choices),
     )
     uploaded = None
     if choice == OWN_FILE:

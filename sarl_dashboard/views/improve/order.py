@@ -162,10 +162,19 @@ def command_for(
     raw = raw_demonstrations()
     for formula in () if raw is None else formulas.texts_beside(raw):
         words += ["--feature", formula]
-    names = [feature.name for feature in demonstrations.features]
+    names = _names_in_file(demonstrations)
     if combined and not combining.chosen().features:
         words.append("--combine")
     else:
         for first, second in combined:
             words += ["--combine", f"{names[first]}, {names[second]}"]
     return shlex.join([*words, "--out", "rules.json"])
+
+
+def _names_in_file(demonstrations: Demonstrations) -> list[str]:
+    """What the file itself calls the features of demonstrations, whatever a visitor does."""
+    raw, named = raw_demonstrations(), uncombined_demonstrations()
+    given = [] if named is None else [feature.name for feature in named.observed]
+    own = [] if raw is None else [feature.name for feature in raw.observed]
+    before = dict(zip(given, own, strict=False))
+    return [before.get(feature.name, feature.name) for feature in demonstrations.features]

@@ -10,12 +10,12 @@ from sarl_core.learning.arms import ARMS
 from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
 from sarl_core.rollouts.choices import CHOICE_TEXTS
-from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.components.settings import notes_notice, offered_rule_sets, rule_sets_help
 from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, OWN_FILE, compact_sets
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 from sarl_dashboard.text import refuse
 
 MOST_STEPS, MOST_SEEDS, MOST_EPISODES = 500_000, 5, 500
@@ -24,18 +24,17 @@ NOBODY = "nobody"
 
 def settings() -> LearningOrder | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
+    offered = offered_rule_sets([*reversed(PAPERS), CHOSEN, *COMPACT_ENDINGS, OWN_FILE])
     with st.container(border=True):
         discrete = is_discrete()
         with st.grid(3 if discrete else 4, min_column_width=150, gap="small"):
             rules = st.selectbox(
                 "Rules",
-                ["unfiltered", "filtered", CHOSEN, *compact_sets(), OWN_FILE],
+                offered,
                 key="learn_rules",
                 bind="query-params",
                 persist_state="session",
-                help="In force while learning. Unfiltered: support 0, confidence 1. Filtered: "
-                "support 0.005, confidence 0.95. At the thresholds: those in the sidebar. "
-                "Compact, fewest: small sets that are shipped. Own file: rules you saved.",
+                help=f"In force while learning. {rule_sets_help(offered)}",
             )
             steps = st.number_input(
                 "Steps",

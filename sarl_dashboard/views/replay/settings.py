@@ -16,6 +16,7 @@ from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
     own_files,
+    rule_sets_help,
     shield_choice,
 )
 from sarl_dashboard.jobs.replays import ReplayOrder
@@ -74,6 +75,7 @@ class ReplaySettings:
 
 def settings() -> ReplaySettings:
     """The widgets."""
+    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         in_a_row = 6 if continuous(st.session_state.get("env")) else 5
         with st.grid(in_a_row, min_column_width=150, gap="small"):
@@ -89,13 +91,10 @@ def settings() -> ReplaySettings:
             )
             rules = st.selectbox(
                 "Rules",
-                offered_rule_sets(RULE_SETS),
+                offered,
                 key="rules",
                 bind="query-params",
-                help="At the thresholds: those in the sidebar. Filtered: support 0.005, "
-                "confidence 0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets "
-                "that are shipped for this environment. Edited: what you made of them on the Edit "
-                "page. Own file: rules you saved. None: the agent alone.",
+                help=rule_sets_help(offered),
             )
             seed = st.number_input(
                 "Seed",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-from sarl_dashboard.components.settings import offered_rule_sets
+from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
 from sarl_dashboard.state.rule_choice import EDITED
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 
@@ -32,17 +32,15 @@ def settings(has_comparison: bool) -> ReportChoices:
     Args:
         has_comparison: Whether this visitor has run one on the page Shield.
     """
+    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         with st.grid(3, min_column_width=150, gap="small"):
             rules = st.selectbox(
                 "Rules",
-                offered_rule_sets(RULE_SETS),
+                offered,
                 key="report_rules",
                 bind="query-params",
-                help="At the thresholds: those in the sidebar. Filtered: support 0.005, confidence "
-                "0.95. Unfiltered: support 0, confidence 1. Compact, fewest: small sets that are "
-                "shipped for this task. Edited: those you changed on the page Edit. Own file: "
-                "rules you saved.",
+                help=rule_sets_help(offered),
             )
             in_full = st.number_input(
                 "Rules in full",

@@ -14,6 +14,7 @@ from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
     own_rule_file,
+    rule_sets_help,
     shield_choice,
 )
 from sarl_dashboard.state.agents import (
@@ -110,10 +111,7 @@ def settings() -> ShieldChoices:
             default=[NO_SHIELD, *PAPERS],
             key="shields",
             bind="query-params",
-            help="Filtered: support 0.005, confidence 0.95. Unfiltered: support 0, confidence 1. "
-            "At the thresholds: those in the sidebar. Compact, fewest: small sets that are "
-            "shipped for this environment. Edited: what you made of them on the Edit page. Own "
-            "file: rules you saved.",
+            help=rule_sets_help(offered),
         )
         rule_file = own_rule_file() if OWN_FILE in shields else None
     return ShieldChoices(
