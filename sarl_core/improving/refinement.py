@@ -95,7 +95,8 @@ class Refinement:
 
         Args:
             starts: Where it may begin, each one tree an action dimension; every leaf is a rule.
-                What achieves most of them is where it does begin.
+                Of those that achieve most, the one that achieves most when its thresholds were
+                moved is where it does begin.
             pairs: What trees are counted over where no others are known.
             evaluator: How candidates are tried.
             expert: Who is asked about the states that they lead to.
@@ -111,6 +112,7 @@ class Refinement:
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
         self.here = self._compared = self.start
+        self._rivals: Sequence[int] = ()  # where it might begin as well
         self._pairs = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
@@ -149,7 +151,7 @@ class Refinement:
         if better is not None:
             better(self.start)
         begun = self._done - self._cost(0)
-        marks = [self.start]
+        marks = []
         for turn in range(1, turns + 1):
             before = self._compared
             self._turn()
@@ -159,7 +161,7 @@ class Refinement:
             if better is not None and self._compared is not before:
                 better(self._compared)
         different: dict[tuple[object, ...], Candidate] = {}
-        for one in marks:
+        for one in (self.start, *marks):
             different.setdefault(one.key, one)
         return list(different.values())
 
@@ -170,8 +172,13 @@ class Refinement:
         """Begin with what achieves most."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) > 1:
-            self.begun = self._ranking(self._starts, self._pairs, _COMPARED)[0]
-            self.here = self._compared = self.start = self._starts[self.begun]
+            ranking = self._ranking(self._starts, self._pairs, _COMPARED)
+            self._begin_with(ranking[0])
+            self.here = self._compared = self.start
+            self._rivals = ranking[:_SHAPES]
+
+    def _begin_with(self, index: int) -> None:
+        self.begun, self.start = index, self._starts[index]
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
@@ -186,7 +193,9 @@ class Refinement:
     def _turn(self) -> None:
         """Change the shape, if that is better, and move the thresholds."""
         met = self._met()
-        moving = [self._movement(shape, met) for shape in self._shapes(met)]
+        rivals, self._rivals = self._rivals, ()
+        shapes = [self._starts[index] for index in rivals] or self._shapes(met)
+        moving = [self._movement(shape, met) for shape in shapes]
         for one in moving:
             self._move(one, _EARLY, met)
         # What was best before it was moved further on, too: it may have been led astray.
@@ -195,6 +204,8 @@ class Refinement:
         best = self._ranking(compared, met.pairs, _COMPARED)[0]
         self._compared = compared[best]
         place = best - len(unmoved)
+        if rivals and place >= 0:
+            self._begin_with(rivals[place])
         one = moving[place] if place >= 0 else self._movement(self._compared, met)
         self._move(one, _LATE, met)
         self.here = one.here

@@ -16,6 +16,8 @@ from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tre
 
 # States walked together: few enough for the processor's cache, enough to be worth a call.
 _BLOCK = 32_768
+# States that are sooner walked one by one than made ready to be walked together.
+_FEW = 24
 # Levels they walk before those that have reached a leaf are taken out.
 _LEVELS = 4
 
@@ -127,6 +129,11 @@ class Matcher:
         """
         rules = np.full(len(states), NO_RULE, dtype=np.int64)
         margins = np.full(len(states), np.inf)
+        if len(states) <= _FEW:
+            for row, state in enumerate(states.tolist()):
+                rule, margins[row] = self.match(state)
+                rules[row] = NO_RULE if rule is None else rule
+            return rules, margins
         for start in range(0, len(states), _BLOCK):
             block = slice(start, start + _BLOCK)
             rows = self._scan(states[block], rules[block], margins[block])

@@ -227,15 +227,22 @@ def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) 
     assert met.action_dimensions == shown.action_dimensions
 
 
-def test_it_begins_with_what_achieves_most(small_search, monkeypatch) -> None:
+@pytest.mark.parametrize("winner", [0, 1, 2])
+def test_it_begins_with_what_achieves_most_when_it_was_moved(
+    winner, small_search, monkeypatch
+) -> None:
     better = grow_budgeted_trees(CARTPOLE, max_rules=8)
     worse = grow_budgeted_trees(CARTPOLE, max_rules=3)
     compared: list[list[Candidate]] = []
+    ranks: list[tuple[int, ...]] = []
     ranked = Refinement._ranking
 
     def ranking(self, tried, pairs, episodes):
         compared.append(list(tried))
-        return ranked(self, tried, pairs, episodes)
+        if len(compared) == 2:  # the best one unmoved, and all moved
+            return (winner, *(place for place in range(len(tried)) if place != winner))
+        ranks.append(ranked(self, tried, pairs, episodes))
+        return ranks[-1]
 
     monkeypatch.setattr(Refinement, "_ranking", ranking)
     begun = search(worse, better)
@@ -243,11 +250,13 @@ def test_it_begins_with_what_achieves_most(small_search, monkeypatch) -> None:
     ticks: list[tuple[int, int]] = []
     begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
     assert ticks[-1] == (refinement_cost(2, 2, 3), refinement_cost(2, 2, 3))
-    first, _, end, *_ = compared
+    first, end, *_ = compared
     best = max(first, key=lambda one: mean_return(leaf_rules(one.trees(CARTPOLE, 2))))
     assert best.structures[0].threshold.tolist() == starts[1].structures[0].threshold.tolist()
-    assert end[0] is best is begun.start
-    assert begun.begun == 2
+    assert end[0] is best is first[ranks[0][0]]
+    assert 1 + winner <= len(end) <= 1 + len(first)
+    assert begun.begun == ranks[0][max(winner - 1, 0)]
+    assert begun.start is first[begun.begun]
 
 
 def played(returns: list[float], failed: list[bool]) -> Episodes:

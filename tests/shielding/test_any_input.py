@@ -18,9 +18,18 @@ from sarl_core.explaining.exports.code_python import rules_to_python
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import Source
+from sarl_core.shielding import matching
 from tests.shielding.any_inputs import ACTIONS, observations, proposals, rule_sets
 
 PROJECTIONS = ("centre", "clip", "expert")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def few_are_walked_together_too():
+    """Else a small batch would be matched as single states are, and compared with itself."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(matching, "_FEW", 0)
+        yield
 
 
 @st.composite

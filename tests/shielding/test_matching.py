@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sarl_core import InputError, Shield, mine_rules
+from sarl_core.shielding import matching
 
 
 def test_a_state_with_a_missing_number_has_no_rule(lander_like):
@@ -58,3 +59,17 @@ def test_mined_rules_of_no_tree_are_all_scanned(lander_like):
     turned = replace(mined.rules[1], id="x", conditions=mined.rules[1].conditions[::-1][:1])
     rules = (turned, *mined.rules)
     assert Shield(replace(mined, rules=rules)).scanned == tuple(range(len(rules)))
+
+
+def test_few_states_and_many_are_matched_alike(lander_like, monkeypatch):
+    mined = mine_rules(lander_like, supp_min=0.0, conf_min=1.0)
+    first = replace(mined.rules[4], pinned=True)
+    shield = Shield(replace(mined, rules=(*mined.rules[:4], first, *mined.rules[5:])))
+    states, actions = lander_like.observations[:200], np.zeros(200, dtype=np.int64)
+    together = shield.decide_batch(states, actions)
+    assert len(states) > matching._FEW
+    monkeypatch.setattr(matching, "_FEW", len(states))
+    one_by_one = shield.decide_batch(states, actions)
+    assert len(np.unique(together.rules)) > 20
+    np.testing.assert_array_equal(one_by_one.rules, together.rules)
+    np.testing.assert_array_equal(one_by_one.margin, together.margin)
