@@ -98,5 +98,5 @@ class Plan:
 
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
-        each = refinement_seeds(1, self.search_episodes) - refinement_seeds(0, self.search_episodes)
-        return (SEEDS_A_RUN - refinement_seeds(0, self.search_episodes)) // max(each, 1)
+        none, one = (refinement_seeds(n, self.search_episodes, self.rounds) for n in range(2))
+        return (SEEDS_A_RUN - none) // max(one - none, 1)

@@ -36,15 +36,29 @@ _MET_STATES = 10_000
 _PAIRS = 20  # of features that new queries may combine, others each time
 _NEIGHBOURS = 80  # in shape
 _SHAPES = 4  # that are moved: which has most in it is not seen before
-_EARLY = 4  # generations for each of them
-_LATE = 8  # further ones for the best
-GENERATIONS = _SHAPES * _EARLY + _LATE  # of one turn
+_STARTS = 8  # of which one is moved before the first turn, `_SHAPES` at least
+_EARLY = 4  # generations for each of them, before the worse half is left
+_LATE = 16  # further ones for the best
 
 # Times the episodes of a neighbour:
 _EXPERT = 2  # in which it is seen how long the expert takes
 _MET = 2  # in which it is seen where the rules lead
 _RANKED = 4  # for the best shapes
-_COMPARED = 8  # for what is compared at the end of a turn
+_COMPARED = 16  # for what is compared at the end of a turn
+
+
+def _halvings(ways: int) -> list[int]:
+    """How many ways are gone on with before each halving, of so many."""
+    left = []
+    while ways > 1:
+        left.append(ways)
+        ways = (ways + 1) // 2
+    return left
+
+
+def _ways_of(starts: int) -> int:
+    """How many of so many starts are moved."""
+    return min(starts, max(_SHAPES, starts // _STARTS))
 
 
 def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
@@ -55,22 +69,38 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
         episodes: Of each neighbour.
         starts: What it may begin with.
     """
-    shapes = planned_episodes(_NEIGHBOURS, episodes, _RANKED * episodes)
-    compared = planned_episodes(_SHAPES + 2, episodes, _COMPARED * episodes)
-    moved = GENERATIONS * POPULATION * episodes
-    begun = planned_episodes(starts, episodes, _COMPARED * episodes) if starts > 1 else 0
-    return _EXPERT * episodes + begun + turns * (_MET * episodes + shapes + moved + compared)
+
+    def ranked(count: int, times: int) -> int:
+        return planned_episodes(count, episodes, times * episodes)
+
+    def halved(ways: int) -> int:
+        return sum(
+            left * _EARLY * POPULATION * episodes + ranked(left, _RANKED)
+            for left in _halvings(ways)
+        )
+
+    met = _MET * episodes
+    begun = ranked(starts, _COMPARED) + met + halved(_ways_of(starts)) + ranked(2, _COMPARED)
+    late = _LATE * POPULATION * episodes
+    turn = met + ranked(_NEIGHBOURS, _RANKED) + halved(_SHAPES) + late + ranked(3, _COMPARED)
+    return _EXPERT * episodes + (begun if starts > 1 else 0) + turns * turn
 
 
-def refinement_seeds(turns: int, episodes: int) -> int:
+def refinement_seeds(turns: int, episodes: int, starts: int = 1) -> int:
     """Most seeds of a refinement: all that are compared play the same episodes.
 
     Args:
         turns: How many.
         episodes: Of each neighbour.
+        starts: What it may begin with.
     """
-    each = _MET + _RANKED + _COMPARED + GENERATIONS
-    return episodes * (_EXPERT + _COMPARED + turns * each)
+
+    def halved(ways: int) -> int:
+        return sum(left * _EARLY + _RANKED for left in _halvings(ways))
+
+    begun = _COMPARED + _MET + halved(_ways_of(starts)) + _COMPARED
+    turn = _MET + _RANKED + halved(_SHAPES) + _LATE + _COMPARED
+    return episodes * (_EXPERT + (begun if starts > 1 else 0) + turns * turn)
 
 
 class Refinement:
@@ -112,7 +142,7 @@ class Refinement:
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
         self.here = self._compared = self.start
-        self._rivals: Sequence[int] = ()  # where it might begin as well
+        self._way: Movement | None = None  # that led here
         self._pairs = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
@@ -147,21 +177,20 @@ class Refinement:
             CancelledError: If `progress` returned False.
         """
         self._progress, self._total = progress, self._cost(turns, len(self._starts))
+        self._better = better or (lambda _: None)
         self._begin()
-        if better is not None:
-            better(self.start)
         begun = self._done - self._cost(0)
-        marks = []
+        marks = [self.start, self.here]
         for turn in range(1, turns + 1):
             before = self._compared
             self._turn()
             # Some had fewer neighbours.
             self._tell(begun + self._cost(turn) - self._done)
             marks += [self._compared, self.here]
-            if better is not None and self._compared is not before:
-                better(self._compared)
+            if self._compared is not before:
+                self._better(self._compared)
         different: dict[tuple[object, ...], Candidate] = {}
-        for one in (self.start, *marks):
+        for one in marks:
             different.setdefault(one.key, one)
         return list(different.values())
 
@@ -169,16 +198,30 @@ class Refinement:
         return refinement_cost(turns, self._episodes, starts)
 
     def _begin(self) -> None:
-        """Begin with what achieves most."""
+        """Begin with what achieves most when it is moved."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
-        if len(self._starts) > 1:
-            ranking = self._ranking(self._starts, self._pairs, _COMPARED)
-            self._begin_with(ranking[0])
-            self.here = self._compared = self.start
-            self._rivals = ranking[:_SHAPES]
+        if len(self._starts) == 1:
+            self._better(self.start)
+            return
+        before = self._done
+        ranking = self._ranking(self._starts, self._pairs, _COMPARED)
+        self._begin_with(ranking[0])
+        self._better(self.start)
+        met = self._met()
+        best = ranking[: _ways_of(len(self._starts))]
+        ways = [self._movement(self._starts[index], met) for index in best]
+        place = self._halved(ways, met)
+        if self._ranking([self.start, ways[place].here], met.pairs, _COMPARED)[0]:
+            self._begin_with(best[place])
+            self._way, self.here = ways[place], ways[place].here
+            self._compared = self.here
+            self._better(self.here)
+        cost = self._cost(0, len(self._starts)) - self._cost(0)
+        self._tell(before + cost - self._done)
 
     def _begin_with(self, index: int) -> None:
         self.begun, self.start = index, self._starts[index]
+        self.here = self._compared = self.start
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
@@ -193,22 +236,32 @@ class Refinement:
     def _turn(self) -> None:
         """Change the shape, if that is better, and move the thresholds."""
         met = self._met()
-        rivals, self._rivals = self._rivals, ()
-        shapes = [self._starts[index] for index in rivals] or self._shapes(met)
-        moving = [self._movement(shape, met) for shape in shapes]
-        for one in moving:
-            self._move(one, _EARLY, met)
+        ways = [self._movement(shape, met) for shape in self._shapes(met)]
         # What was best before it was moved further on, too: it may have been led astray.
         unmoved = [self.here] if self._compared is self.here else [self.here, self._compared]
-        compared = [*unmoved, *(one.here for one in moving)]
+        changed = [ways[self._halved(ways, met)]] if ways else []
+        compared = [*unmoved, *(one.here for one in changed)]
         best = self._ranking(compared, met.pairs, _COMPARED)[0]
         self._compared = compared[best]
-        place = best - len(unmoved)
-        if rivals and place >= 0:
-            self._begin_with(rivals[place])
-        one = moving[place] if place >= 0 else self._movement(self._compared, met)
-        self._move(one, _LATE, met)
-        self.here = one.here
+        if best == len(unmoved):
+            (self._way,) = changed
+        elif self._way is None or self._compared is not self.here:
+            self._way = self._movement(self._compared, met)
+        self._move(self._way, _LATE, met)  # what it has learned of the way serves on
+        self.here = self._way.here
+
+    def _halved(self, ways: Sequence[Movement], met: MetStates) -> int:
+        """Move all a little, the better half on, and so forth; the place of the one that is left.
+
+        What achieves most before it is moved need not be what achieves most then.
+        """
+        left = list(range(len(ways)))
+        while len(left) > 1:
+            for place in left:
+                self._move(ways[place], _EARLY, met)
+            ranking = self._ranking([ways[place].here for place in left], met.pairs, _RANKED)
+            left = [left[rank] for rank in ranking[: (len(left) + 1) // 2]]
+        return left[0]
 
     def _met(self) -> MetStates:
         """Where the rules lead now, and what the expert says there."""

@@ -17,7 +17,6 @@ SMALL = {
     "_EARLY": 1,
     "_LATE": 1,
     "_COMPARED": 2,
-    "GENERATIONS": 3,
 }
 
 

@@ -87,8 +87,9 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
     # None of the rounds shares an episode with another, nor any part of the search.
     assert len(used["rounds"]) == 2 * 3
-    each = 2 * (1 + 2 + 2 + 2 + 2 + 3)
-    assert len(used["refinement"]) == refinement.refinement_seeds(1, 2) == each
+    begun, turn = 2 + 2 + (2 + 2) + 2, 2 + 2 + (2 + 2) + 1 + 2
+    each = 2 * (1 + begun + turn)
+    assert len(used["refinement"]) == refinement.refinement_seeds(1, 2, 2) == each
     assert len(used["report"]) == 5
     # And the record says where each begins.
     assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}
@@ -198,7 +199,9 @@ def test_stopped_before_anything_was_refined_what_the_search_began_with_is_given
 ):
     stopped_after(monkeypatch, 0)
     monkeypatch.setattr(
-        refinement.Refinement, "_ranking", lambda self, tried, pairs, episodes: [1, 0, 2]
+        refinement.Refinement,
+        "_ranking",
+        lambda self, tried, pairs, episodes: [1, 0, 2] if len(tried) == 3 else [0, 1],
     )
     stopped = aggregate(cart, replace(REFINED, rounds=3, turns=8))
     assert not stopped.refined

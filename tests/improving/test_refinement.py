@@ -193,7 +193,6 @@ def test_two_rules_over_two_features_balance_the_pole(sized_search) -> None:
         _LATE=4,
         _MET=1,
         _COMPARED=4,
-        GENERATIONS=10,
     )
     ticks: list[tuple[int, int]] = []
     last = search(episodes=12).run(
@@ -227,9 +226,9 @@ def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) 
     assert met.action_dimensions == shown.action_dimensions
 
 
-@pytest.mark.parametrize("winner", [0, 1, 2])
-def test_it_begins_with_what_achieves_most_when_it_was_moved(
-    winner, small_search, monkeypatch
+@pytest.mark.parametrize("moved", [False, True])
+def test_it_begins_with_what_achieves_most_when_it_is_moved(
+    moved, small_search, monkeypatch
 ) -> None:
     better = grow_budgeted_trees(CARTPOLE, max_rules=8)
     worse = grow_budgeted_trees(CARTPOLE, max_rules=3)
@@ -239,24 +238,32 @@ def test_it_begins_with_what_achieves_most_when_it_was_moved(
 
     def ranking(self, tried, pairs, episodes):
         compared.append(list(tried))
-        if len(compared) == 2:  # the best one unmoved, and all moved
-            return (winner, *(place for place in range(len(tried)) if place != winner))
+        if len(compared) == 2:  # of what was moved, the second is gone on with
+            return (1, 0)
+        if len(compared) == 3:  # the best as it was, and the other when it was moved
+            return (1, 0) if moved else (0, 1)
         ranks.append(ranked(self, tried, pairs, episodes))
         return ranks[-1]
 
     monkeypatch.setattr(Refinement, "_ranking", ranking)
     begun = search(worse, better)
-    starts = [Candidate.of_trees(trees) for trees in (worse, better)]
     ticks: list[tuple[int, int]] = []
-    begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
+    told: list[Candidate] = []
+    marks = begun.run(
+        2, progress=lambda done, total: ticks.append((done, total)) or True, better=told.append
+    )
     assert ticks[-1] == (refinement_cost(2, 2, 3), refinement_cost(2, 2, 3))
-    first, end, *_ = compared
+    first, halved, end, *_ = compared
+    order = ranks[0]
     best = max(first, key=lambda one: mean_return(leaf_rules(one.trees(CARTPOLE, 2))))
-    assert best.structures[0].threshold.tolist() == starts[1].structures[0].threshold.tolist()
-    assert end[0] is best is first[ranks[0][0]]
-    assert 1 + winner <= len(end) <= 1 + len(first)
-    assert begun.begun == ranks[0][max(winner - 1, 0)]
-    assert begun.start is first[begun.begun]
+    assert best is first[order[0]] is end[0] is told[0]
+    assert len(halved) == 2
+    assert end[1] is halved[1]
+    shape = first[order[1]].structures[0].feature
+    np.testing.assert_array_equal(end[1].structures[0].feature, shape)
+    assert begun.begun == order[int(moved)]
+    assert begun.start is marks[0] is first[begun.begun]
+    assert (end[1] in told) == moved
 
 
 def played(returns: list[float], failed: list[bool]) -> Episodes:
