@@ -147,21 +147,23 @@ class UniformAgent:
         return self._continuous(uniforms)
 
     def _continuous(self, uniforms: NDArray[np.float64]) -> NDArray[np.float32]:
-        from scipy.special import ndtri
-
-        inner = np.clip(uniforms, _SMALLEST_UNIFORM, 1.0 - _SMALLEST_UNIFORM)
         below, above = np.isfinite(self.low), np.isfinite(self.high)
         low = np.where(below, self.low, 0.0).astype(np.float64)
         high = np.where(above, self.high, 0.0).astype(np.float64)
         amounts = uniforms * (high - low)
         if self.whole:
             amounts = np.floor(uniforms * (high - low + 1.0))
-        actions = np.select(
-            [below & above, below, above],
-            [low + amounts, low - np.log(inner), high + np.log(inner)],
-            ndtri(inner),
-        ).astype(np.float32)
-        return cast(NDArray[np.float32], np.clip(actions, self.low, self.high))
+        actions = low + amounts
+        if not (below & above).all():
+            from scipy.special import ndtri
+
+            inner = np.clip(uniforms, _SMALLEST_UNIFORM, 1.0 - _SMALLEST_UNIFORM)
+            actions = np.select(
+                [below & above, below, above],
+                [actions, low - np.log(inner), high + np.log(inner)],
+                ndtri(inner),
+            )
+        return cast(NDArray[np.float32], np.clip(actions.astype(np.float32), self.low, self.high))
 
 
 @needing_extras()
