@@ -124,7 +124,9 @@ def test_a_sentence_that_the_guide_quotes_is_one_of_the_product(page, confidence
 
 def test_the_table_of_the_compact_sets_is_that_of_what_was_measured():
     page = compact_table.PAGE.read_text(encoding="utf-8")
-    assert compact_table.with_table(page) == page
+    assert compact_table.with_rules(page) == page
+    readme = compact_table.README.read_text(encoding="utf-8")
+    assert compact_table.with_table(readme) == readme
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):

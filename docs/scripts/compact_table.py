@@ -24,7 +24,7 @@ from sarl_core.mining.language import sentence, share_text
 from sarl_core.mining.rule_set import load_rules
 
 FOLDER = Path(__file__).resolve().parents[2]
-PAGE = FOLDER / "docs" / "results" / "compact_rules.md"
+PAGE, README = FOLDER / "docs" / "results" / "compact_rules.md", FOLDER / "README.md"
 BEGIN = "<!-- made by: python -m docs.scripts.compact_table -->"
 END = "<!-- end of what is made -->"
 TASKS = {
@@ -49,27 +49,41 @@ IN_FULL = {
     "lunar_lander_few_combined": "The rules of Lunar Lander with the fewest:",
 }
 HEAD = (
-    "| task | rules | features a query | mean return, 95 % interval | 200 or more | failures, "
-    "95 % interval | each of five learning seeds, rules: mean (failures) |",
-    "| --- | --- | --- | --- | --- | --- | --- |",
+    *("task", "rules", "features a query", "mean return, 95 % interval", "200 or more"),
+    "failures, 95 % interval",
 )
+SEEDS_HEAD = "each of five learning seeds, rules: mean (failures)"
 
 
 def main() -> None:
-    """Write the table into the page, and the pictures."""
-    written = with_table(PAGE.read_text(encoding="utf-8"))
-    with whole_file(PAGE) as unfinished:
-        unfinished.write_text(written, encoding="utf-8")
+    """Write the table into the page and the README, and the pictures."""
+    for path, written in ((PAGE, with_rules), (README, with_table)):
+        text = written(path.read_text(encoding="utf-8"))
+        with whole_file(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
     for task in TASKS:
         front(task)
 
 
 def with_table(page: str) -> str:
-    """A page with the table of what is known, and the smallest sets, between its marks."""
-    table = compact_table(json.loads(SEEDS.read_text(encoding="utf-8")))
+    """A page with the table of what is known between its marks."""
+    return _between_marks(page, compact_table(_known(), every_seed=False))
+
+
+def with_rules(page: str) -> str:
+    """A page with the table, every seed in it, and the smallest sets between its marks."""
     rules = "\n\n".join(f"{title}\n\n{rule_list(name)}" for name, title in IN_FULL.items())
+    return _between_marks(page, f"{compact_table(_known(), every_seed=True)}\n\n{rules}")
+
+
+def _between_marks(page: str, text: str) -> str:
     before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{table}\n\n{rules}\n\n{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.split(END)[1]}"
+
+
+def _known() -> dict[str, list[dict[str, Any]]]:
+    known: dict[str, list[dict[str, Any]]] = json.loads(SEEDS.read_text(encoding="utf-8"))
+    return known
 
 
 def rule_list(name: str) -> str:
@@ -79,9 +93,10 @@ def rule_list(name: str) -> str:
     return "\n".join(f"- {sentence(rule, rules, evidence=False)}" for rule in ranked)
 
 
-def compact_table(known: dict[str, list[dict[str, Any]]]) -> str:
+def compact_table(known: dict[str, list[dict[str, Any]]], *, every_seed: bool) -> str:
     """The sets of which every seed is known, each task's expert and what others have published."""
-    rows = list(HEAD)
+    head = [*HEAD, *([SEEDS_HEAD] if every_seed else [])]
+    rows = [head, ["---"] * len(head)]
     for task, (title, _) in TASKS.items():
         sets = [
             (name, known[name])
@@ -92,20 +107,20 @@ def compact_table(known: dict[str, list[dict[str, Any]]]) -> str:
             chosen = median(seeds)
             features = "two" if SETS[name].combine else "one"
             every = ", ".join(map(seed_text, sorted(seeds, key=lambda one: int(one["seed"]))))
-            achieved = outcome_text(task, chosen)
-            rows.append(f"| {title} | {chosen['rules']} | {features} | {achieved} | {every} |")
+            achieved = outcome_cells(task, chosen)
+            rows.append([title, str(chosen["rules"]), features, *achieved, every])
         if sets:
             for point, mean, solved in PUBLISHED.get(task, ()):
-                rows.append(f"| *{point.name}* | {point.rules} | one | {mean} | {solved} | – | – |")
+                rows.append([f"*{point.name}*", str(point.rules), "one", mean, solved, "–", "–"])
             (expert,) = known[f"{task}_expert"]
-            rows.append(f"| *the expert* | – | – | {outcome_text(task, expert)} | – |")
-    return "\n".join(rows)
+            rows.append(["*the expert*", "–", "–", *outcome_cells(task, expert), "–"])
+    return "\n".join(f"| {' | '.join(row[: len(head)])} |" for row in rows)
 
 
-def outcome_text(task: str, one: dict[str, Any]) -> str:
-    """Return and failures, as three cells."""
+def outcome_cells(task: str, one: dict[str, Any]) -> tuple[str, str, str]:
+    """Return, how often it is solved, and failures."""
     solved = share_text(one["solved"]) if task in LANDING else "–"
-    return f"{mean_text(one)} | {solved} | {failure_text(one)}"
+    return mean_text(one), solved, failure_text(one)
 
 
 def seed_text(one: dict[str, Any]) -> str:
@@ -133,7 +148,7 @@ def front(task: str) -> None:
     """The picture of return and failures against the number of rules."""
     env_id = TASKS[task][1]
     points = budget_points(json.loads((RULES / "budgets.json").read_text("utf-8")), env_id)
-    known = json.loads(SEEDS.read_text(encoding="utf-8"))
+    known = _known()
     refined = [
         BudgetPoint(
             rules=chosen["rules"],
