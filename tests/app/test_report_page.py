@@ -92,3 +92,10 @@ def test_results_come_from_files_and_wrong_ones_are_named() -> None:
     results.set_value([("r.csv", b"arm,episodes\n", "")]).run()
     (sentence,) = errors(app)
     assert "no column 'mean'" in sentence
+
+
+def test_shipped_rules_about_two_features_are_reported() -> None:
+    app = open_page("report", data="cartpole", report_rules="compact, two features", frames="1")
+    assert not errors(app)
+    assert "2 rules, 2 of them in full" in texts(app)
+    assert "pole angle plus 0.2 s of pole angular velocity" in shown(made(app))

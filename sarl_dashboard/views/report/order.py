@@ -22,7 +22,12 @@ from sarl_dashboard.state.data import (
 from sarl_dashboard.state.environments import offers
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import COMPACT_ENDINGS, OWN_FILE, compact_file
+from sarl_dashboard.state.rule_files import (
+    COMPACT_ENDINGS,
+    OWN_FILE,
+    compact_file,
+    fitting_demonstrations,
+)
 from sarl_dashboard.views.report.settings import ReportChoices
 
 
@@ -48,6 +53,8 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     rule_set = rules_for(choices.rules, choices.rule_file)
     if rule_set is None:
         raise InputError("there are no rules to report; choose some")
+    # With what the rules derive; where they are of others, what is wrong is said.
+    demonstrations = fitting_demonstrations(rule_set, demonstrations) or demonstrations
     report_rules(rule_set, demonstrations)
     results, files = results_of_choices(choices, demonstrations)
     named = Named(*file_names(choices), files)
