@@ -7,7 +7,6 @@ combinations the two that are combined, their order, and the labels of discrete 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,9 +23,7 @@ from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
 
 POPULATION = 20  # neighbours a generation
 
-# How far all that is moved goes at first, taken together, in units of half the spread of a feature
-# where it is asked about.
-_SHAKE = 0.3
+_SHAKE = 0.15  # at first, in units of half the spread of a feature where it is asked about
 _WIDER = 1.5  # times, where all neighbours do alike
 _MANY = 120  # numbers to move: of more, which move together takes longer to learn than there is
 _SPREAD = (0.1, 0.9)  # quantiles
@@ -167,7 +164,7 @@ def _evolution_strategy(count: int, seed: int) -> Any:
     generator = np.random.default_rng(seed)
     return cma.CMAEvolutionStrategy(
         np.zeros(count),
-        _SHAKE / math.sqrt(count),
+        _SHAKE,
         {
             "popsize": POPULATION,
             "CMA_diagonal": count > _MANY,

@@ -37,7 +37,7 @@ _PAIRS = 20  # of features that new queries may combine, others each time
 _NEIGHBOURS = 80  # in shape
 _SHAPES = 4  # that are moved: which has most in it is not seen before
 _STARTS = 8  # of which one is moved before the first turn, `_SHAPES` at least
-_EARLY = 4  # generations for each of them, before the worse half is left
+_EARLY = 4  # generations for each of them before the worse half is left, then twice as many, ...
 _LATE = 16  # further ones for the best
 
 # Times the episodes of a neighbour:
@@ -47,13 +47,13 @@ _RANKED = 4  # for the best shapes
 _COMPARED = 16  # for what is compared at the end of a turn
 
 
-def _halvings(ways: int) -> list[int]:
-    """How many ways are gone on with before each halving, of so many."""
-    left = []
+def _halvings(ways: int) -> list[tuple[int, int]]:
+    """How many ways are gone on with before each halving, of so many, and how far each."""
+    stages, generations = [], _EARLY
     while ways > 1:
-        left.append(ways)
-        ways = (ways + 1) // 2
-    return left
+        stages.append((ways, generations))
+        ways, generations = (ways + 1) // 2, 2 * generations
+    return stages
 
 
 def _ways_of(starts: int) -> int:
@@ -75,8 +75,8 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
 
     def halved(ways: int) -> int:
         return sum(
-            left * _EARLY * POPULATION * episodes + ranked(left, _RANKED)
-            for left in _halvings(ways)
+            left * generations * POPULATION * episodes + ranked(left, _RANKED)
+            for left, generations in _halvings(ways)
         )
 
     met = _MET * episodes
@@ -96,7 +96,7 @@ def refinement_seeds(turns: int, episodes: int, starts: int = 1) -> int:
     """
 
     def halved(ways: int) -> int:
-        return sum(left * _EARLY + _RANKED for left in _halvings(ways))
+        return sum(left * generations + _RANKED for left, generations in _halvings(ways))
 
     begun = _COMPARED + _MET + halved(_ways_of(starts)) + _COMPARED
     turn = _MET + _RANKED + halved(_SHAPES) + _LATE + _COMPARED
@@ -255,10 +255,10 @@ class Refinement:
 
         What achieves most before it is moved need not be what achieves most then.
         """
-        left = list(range(len(ways)))
-        while len(left) > 1:
+        left: Sequence[int] = range(len(ways))
+        for _, generations in _halvings(len(ways)):
             for place in left:
-                self._move(ways[place], _EARLY, met)
+                self._move(ways[place], generations, met)
             ranking = self._ranking([ways[place].here for place in left], met.pairs, _RANKED)
             left = [left[rank] for rank in ranking[: (len(left) + 1) // 2]]
         return left[0]
