@@ -101,13 +101,14 @@ def aggregate(
         ),
     ] = 0,
     search_episodes: Annotated[
-        int,
+        int | None,
         typer.Option(
             "--search-episodes",
             help="With --refine: episodes for each neighbour that is tried, at most 1,000; take "
             "fewer where an episode takes long.",
+            show_default="16",
         ),
-    ] = 16,
+    ] = None,
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
@@ -142,6 +143,8 @@ def aggregate(
         from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
 
+        if search_episodes is not None and not refine:
+            raise InputError("--search-episodes are those of a refinement; give --refine, too")
         plan = Plan(
             max_rules=max_rules,
             rounds=rounds,
@@ -150,7 +153,7 @@ def aggregate(
             divider=divider,
             projection=projection,
             turns=refine,
-            search_episodes=search_episodes,
+            search_episodes=Plan.search_episodes if search_episodes is None else search_episodes,
             validation=validation,
             report=report,
             seed=seed,

@@ -21,7 +21,7 @@ from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
-from sarl_core.improving.alternation import alternated, label_scores
+from sarl_core.improving.alternation import achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
@@ -44,7 +44,8 @@ from sarl_core.rollouts.statistics import Rate
 from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
-_ALTERNATED = 10_000  # pairs by which queries are chosen anew
+_ALTERNATED = 10_000  # pairs by which queries are chosen anew, or of many rules
+_A_RULE = 100  # for each of them
 _FIRST_VALIDATION = 16
 _USUAL = (0.05, 0.95)  # quantiles between which most returns lie
 _FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
@@ -314,22 +315,24 @@ class _Run:
         index: int,
     ) -> tuple[PolicyTree, ...]:
         """Trees of a round with their queries chosen anew, each by what the others make of it."""
-        rows = np.arange(len(pairs))
-        if len(rows) > _ALTERNATED:
+        rows, most = np.arange(len(pairs)), max(_ALTERNATED, _A_RULE * self.plan.max_rules)
+        if len(rows) > most:
             generator = np.random.default_rng((self.plan.seed, index))
-            rows = np.sort(generator.choice(rows, _ALTERNATED, replace=False))
+            rows = np.sort(generator.choice(rows, most, replace=False))
         result = []
         for tree in trees:
             scores = known
             if scores is None:
                 scores = label_scores(pairs, tree.dimension, tree.index)
-            changed = alternated(
-                structure_of(tree),
-                pairs.observations[rows],
-                scores[rows],
-                max_rules=self.plan.max_rules,
+            before = structure_of(tree)
+            after = alternated(
+                before, pairs.observations[rows], scores[rows], max_rules=self.plan.max_rules
             )
-            result.append(count_tree(changed, pairs, tree.index, divider=self.plan.divider))
+            # Of many rules some are met by few of the chosen pairs.
+            every = pairs.observations, scores
+            better = achieved(after, *every) > achieved(before, *every)
+            changed = count_tree(after, pairs, tree.index, divider=self.plan.divider)
+            result.append(changed if better else tree)
         return tuple(result)
 
     def pairs(self, choice: _Choice) -> Demonstrations:
@@ -512,7 +515,10 @@ class _Run:
 
 def _most_choices(plan: Plan) -> int:
     """What may be left to choose from: all rounds, or all that turns came to."""
-    return 2 * plan.turns + 1 if plan.turns else plan.rounds
+    if not plan.turns:
+        return plan.rounds
+    begun = 1 if plan.rounds == 1 else 2  # as it was, and when it was moved
+    return begun + 2 * plan.turns
 
 
 def _choice_cost(plan: Plan, choices: int) -> int:

@@ -22,6 +22,7 @@ from sarl_core.mining.tree import LEAF, TreeStructure
 _TURNS = 10
 _FEWEST = 20  # states of a leaf that a query may be looked for in
 _LEAST = 5  # of them on either side
+_ROUNDING = 1e-9  # of a gain, for each state
 
 
 @dataclass(frozen=True)
@@ -120,15 +121,29 @@ def alternated(
     Returns:
         A tree whose labels are at least as good in these states, summed over them.
     """
-    achieved = _achieved(structure, observations, scores)
+    most = achieved(structure, observations, scores)
     for _ in range(_TURNS):
         changed = _without_unmet(_exchanged(structure, observations, scores), observations)
         changed = _grown(_labelled(changed, observations, scores), observations, scores, max_rules)
-        before, achieved = achieved, _achieved(changed, observations, scores)
-        if achieved <= before:
+        before, most = most, achieved(changed, observations, scores)
+        if most <= before:
             break
         structure = changed
-    return without_idle_queries(structure)
+    return _without_unmet(structure, observations)
+
+
+def achieved(
+    structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
+) -> float:
+    """How good the labels are that a tree says, summed over states.
+
+    Args:
+        structure: With labels.
+        observations: Shape (N, d), float32.
+        scores: How good each label is in each state, (N, labels).
+    """
+    labels = _labels(structure, observations)
+    return float(scores[np.arange(len(labels)), labels].sum())
 
 
 def splits_of(
@@ -162,11 +177,14 @@ def splits_of(
             continue
         sums = np.cumsum(scores[rows[order]], axis=0)
         below, above = sums[places], sums[-1] - sums[places]
+        labels = np.column_stack([below.argmax(axis=1), above.argmax(axis=1)])
         gains = below.max(axis=1) + above.max(axis=1) - sums[-1].max()
+        gains[labels[:, 0] == labels[:, 1]] = -np.inf  # then nothing is asked
         best = int(gains.argmax())
-        border = float(ordered[places[best] : places[best] + 2].mean())
-        labels = int(below[best].argmax()), int(above[best].argmax())
-        yield NewQuery(float(gains[best]), leaf, feature, border, labels)
+        if np.isfinite(gains[best]):
+            border = float(ordered[places[best] : places[best] + 2].mean())
+            said = int(labels[best, 0]), int(labels[best, 1])
+            yield NewQuery(float(gains[best]), leaf, feature, border, said)
 
 
 def exchanges_of(
@@ -245,13 +263,6 @@ def _labels(structure: TreeStructure, observations: NDArray[np.float32]) -> NDAr
     return np.asarray(structure.label)[structure.apply(observations)]
 
 
-def _achieved(
-    structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
-) -> float:
-    labels = _labels(structure, observations)
-    return float(scores[np.arange(len(labels)), labels].sum())
-
-
 def _exchanged(
     structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
 ) -> TreeStructure:
@@ -263,7 +274,7 @@ def _exchanged(
             continue
         new = exchanges_of(structure, node, rows, features, observations, scores)
         best = max(new, key=lambda query: query.gain, default=None)
-        if best is not None and best.gain > 0:
+        if best is not None and best.gain > _ROUNDING * len(rows):
             structure = best.put_into(structure)
     return structure
 
@@ -284,10 +295,10 @@ def _without_unmet(structure: TreeStructure, observations: NDArray[np.float32]) 
 def _labelled(
     structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
 ) -> TreeStructure:
-    """Every leaf saying what is best in the states that reach it."""
+    """Every node saying what is best in the states that reach it."""
     labels = np.asarray(structure.label).copy()
     for node, rows in rows_at(structure, observations):
-        if structure.feature[node] == LEAF and len(rows):
+        if len(rows):
             labels[node] = scores[rows].sum(axis=0).argmax()
     return replace(structure, label=labels)
 

@@ -77,10 +77,10 @@ class Candidate:
             *(
                 np.asarray(values).tobytes()
                 for one in self.structures
-                # What is said at queries is never heard.
+                # What is said at queries is never heard, and leaves ask nothing.
                 for values in (
                     one.feature,
-                    one.threshold,
+                    np.where(one.feature == LEAF, 0.0, one.threshold),
                     np.where(one.feature == LEAF, np.asarray(one.label), LEAF),
                 )
             ),

@@ -23,7 +23,10 @@ from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
 
 POPULATION = 20  # neighbours a generation
 
-_SHAKE = 0.15  # at first, in units of half the spread of a feature where it is asked about
+# How far each number goes at first, in units of half the spread of a feature where it is asked
+# about.
+FIRST_STEP = 0.15
+_LEAST_STEP = 0.01
 _WIDER = 1.5  # times, where all neighbours do alike
 _MANY = 120  # numbers to move: of more, which move together takes longer to learn than there is
 _SPREAD = (0.1, 0.9)  # quantiles
@@ -121,19 +124,34 @@ class Parameters:
 class Movement:
     """A search around trees for better ones of the same shape."""
 
-    def __init__(self, trees: Sequence[PolicyTree], pairs: Demonstrations, *, seed: int) -> None:
+    def __init__(
+        self,
+        trees: Sequence[PolicyTree],
+        pairs: Demonstrations,
+        *,
+        step: float = FIRST_STEP,
+        seed: int,
+    ) -> None:
         """Begin where the trees are.
 
         Args:
             trees: One an action dimension, counted over `pairs`.
             pairs: That say how widely features are spread.
+            step: How far each number goes at first.
             seed: Another one gives another way.
         """
         self._parameters = Parameters.of(trees, pairs)
         self.count = self._parameters.count
         self.here = self._parameters.candidate(np.zeros(self.count))
-        self._strategy = _evolution_strategy(self.count, seed) if self.count else None
+        self._begun = step
+        self._strategy = _evolution_strategy(self.count, step, seed) if self.count else None
         self._points: list[NDArray[np.float64]] = []
+
+    @property
+    def step(self) -> float:
+        """How far each number goes now; at most as far as the first step of all."""
+        now = self._begun if self._strategy is None else float(self._strategy.sigma)
+        return min(max(now, _LEAST_STEP), FIRST_STEP)
 
     def ask(self) -> list[Candidate]:
         """`POPULATION` neighbours of where it has come to."""
@@ -157,14 +175,14 @@ class Movement:
         self.here = self._parameters.candidate(self._strategy.mean)
 
 
-def _evolution_strategy(count: int, seed: int) -> Any:
+def _evolution_strategy(count: int, step: float, seed: int) -> Any:
     """A search from 0 in so many dimensions."""
     import cma
 
     generator = np.random.default_rng(seed)
     return cma.CMAEvolutionStrategy(
         np.zeros(count),
-        _SHAKE,
+        step,
         {
             "popsize": POPULATION,
             "CMA_diagonal": count > _MANY,

@@ -20,7 +20,6 @@ from sarl_core.rollouts.seeds import (
 from sarl_core.shielding.projection import Projection
 
 _MOST_SEARCH_EPISODES = 1_000
-_USUAL_SEARCH_EPISODES = 16
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class Plan:
     divider: int = 2
     projection: Projection = "centre"
     turns: int = 0
-    search_episodes: int = _USUAL_SEARCH_EPISODES
+    search_episodes: int = 16
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -77,8 +76,6 @@ class Plan:
                 "rules that thresholds cut are not refined; give --refine without --support and "
                 "--confidence, or these without it"
             )
-        if self.search_episodes != _USUAL_SEARCH_EPISODES and not self.turns:
-            raise InputError("--search-episodes are those of a refinement; give --refine, too")
         for name, value, least, most in (
             ("budget of rules", self.max_rules, MIN_RULES, None),
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),
@@ -99,4 +96,4 @@ class Plan:
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
         none, one = (refinement_seeds(n, self.search_episodes, self.rounds) for n in range(2))
-        return (SEEDS_A_RUN - none) // max(one - none, 1)
+        return max(SEEDS_A_RUN - none, 0) // max(one - none, 1)

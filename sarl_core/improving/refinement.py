@@ -1,7 +1,9 @@
-"""Making a few rules achieve more: their shape, then their thresholds, in turns.
+"""Making a few rules achieve more: their thresholds and their shape, in turns.
 
-A tree that imitates its expert is not yet the best tree of its size. First its neighbours in shape
-are tried, of which the best stays; then thresholds, ratios and intervals are moved; and so on.
+A tree that imitates its expert is not yet the best tree of its size. Of several trees thresholds,
+ratios and intervals are moved, and the one that achieves most then is where the search begins. In
+each turn its likeliest neighbours in shape are moved, and the best of them takes its place if it
+achieves more.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from sarl_core.agents.agent import Agent
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.improving.candidate import Candidate, Evaluator
-from sarl_core.improving.movement import POPULATION, Movement
+from sarl_core.improving.movement import FIRST_STEP, POPULATION, Movement
 from sarl_core.improving.questions import answered, ask, scores, with_values
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
@@ -143,6 +145,7 @@ class Refinement:
         self.begun, self.start = 0, self._starts[0]
         self.here = self._compared = self.start
         self._way: Movement | None = None  # that led here
+        self._step = FIRST_STEP  # how wide its steps were in the end
         self._pairs = pairs
         self._progress: Progress | None = None
         self._done = self._total = 0
@@ -163,9 +166,9 @@ class Refinement:
         Args:
             turns: How often the shape is changed, and thresholds are moved.
             progress: Called with (episodes done, in all); returning False stops.
-            better: Called with what it begins with, and then with what achieved more than what
-                was there before, in the same episodes; so that something is there when the way is
-                not gone to its end.
+            better: Called with the best of all starts, and then with whatever achieved more than
+                what was there before, in the same episodes; so that something is there when the
+                way is not gone to its end.
 
         Returns:
             What it began with, and of each turn what was best in it and where its thresholds were
@@ -182,13 +185,10 @@ class Refinement:
         begun = self._done - self._cost(0)
         marks = [self.start, self.here]
         for turn in range(1, turns + 1):
-            before = self._compared
             self._turn()
             # Some had fewer neighbours.
             self._tell(begun + self._cost(turn) - self._done)
             marks += [self._compared, self.here]
-            if self._compared is not before:
-                self._better(self._compared)
         different: dict[tuple[object, ...], Candidate] = {}
         for one in marks:
             different.setdefault(one.key, one)
@@ -214,7 +214,7 @@ class Refinement:
         if self._ranking([self.start, ways[place].here], met.pairs, _COMPARED)[0]:
             self._begin_with(best[place])
             self._way, self.here = ways[place], ways[place].here
-            self._compared = self.here
+            self._compared, self._step = self.here, self._way.step
             self._better(self.here)
         cost = self._cost(0, len(self._starts)) - self._cost(0)
         self._tell(before + cost - self._done)
@@ -242,18 +242,21 @@ class Refinement:
         changed = [ways[self._halved(ways, met)]] if ways else []
         compared = [*unmoved, *(one.here for one in changed)]
         best = self._ranking(compared, met.pairs, _COMPARED)[0]
+        if compared[best] is not self._compared:
+            self._better(compared[best])
         self._compared = compared[best]
         if best == len(unmoved):
             (self._way,) = changed
         elif self._way is None or self._compared is not self.here:
             self._way = self._movement(self._compared, met)
         self._move(self._way, _LATE, met)  # what it has learned of the way serves on
-        self.here = self._way.here
+        self.here, self._step = self._way.here, self._way.step
 
     def _halved(self, ways: Sequence[Movement], met: MetStates) -> int:
         """Move all a little, the better half on, and so forth; the place of the one that is left.
 
-        What achieves most before it is moved need not be what achieves most then.
+        What achieves most before it is moved need not be what achieves most then. One alone is
+        not moved here: there is nothing to choose.
         """
         left: Sequence[int] = range(len(ways))
         for _, generations in _halvings(len(ways)):
@@ -338,7 +341,9 @@ class Refinement:
     def _movement(self, candidate: Candidate, met: MetStates) -> Movement:
         pairs = met.pairs.deriving(candidate.derived)
         trees = candidate.trees(pairs, self._evaluator.divider)
-        return Movement(trees, pairs, seed=int(self._generator.integers(2**31)))
+        # Wide steps away from what was moved to where it is good lead astray.
+        seed = int(self._generator.integers(2**31))
+        return Movement(trees, pairs, step=self._step, seed=seed)
 
     def _move(self, movement: Movement, generations: int, met: MetStates) -> None:
         """Move thresholds in the direction that brings more."""

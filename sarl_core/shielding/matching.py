@@ -114,7 +114,8 @@ class Matcher:
                 if gap < above:
                     above = gap
                 feature, threshold, left, right = nodes[right]
-        return (left if left >= 0 else None), (above if above < -below else -below)
+        # Plus 0, so that what lies on a threshold is 0 away from it and not -0.
+        return (left if left >= 0 else None), (above if above < -below else -below) + 0.0
 
     def match_batch(
         self, states: NDArray[np.float32]

@@ -22,7 +22,9 @@ from sarl_dashboard.state.rule_files import (
     COMPACT_ENDINGS,
     FEWEST,
     NO_RULES,
+    NO_SHIELD,
     OWN_FILE,
+    UNEDITED,
     compact_sets,
 )
 from sarl_dashboard.state.url import with_own
@@ -34,11 +36,12 @@ _RULE_SETS = {
     "filtered": "support 0.005, confidence 0.95",
     "unfiltered": "support 0, confidence 1",
     COMPACT: "a small set that is shipped, every condition about one feature",
-    COMBINED: "one that is shipped and asks about two features at once",
-    FEWEST: "the same with as few rules as do it",
+    COMBINED: "a set that is shipped and asks about two features at once",
+    FEWEST: "one of that kind with as few rules as do it",
+    UNEDITED: "what was edited, as it was",
     EDITED: "what you made of them on the page Edit",
     OWN_FILE: "rules you saved",
-    NO_RULES: "the agent alone",
+    **dict.fromkeys((NO_RULES, NO_SHIELD), "the agent alone"),
 }
 Width = Literal["stretch"] | int
 
@@ -93,11 +96,7 @@ def offered_rule_sets(names: Sequence[str]) -> list[str]:
 
 def rule_sets_help(offered: Sequence[str]) -> str:
     """What the offered rule sets are."""
-    return " ".join(
-        f"{name[0].upper()}{name[1:]}: {_RULE_SETS[name]}."
-        for name in offered
-        if name in _RULE_SETS
-    )
+    return " ".join(f"{name[0].upper()}{name[1:]}: {_RULE_SETS[name]}." for name in offered)
 
 
 def projection_choice(width: Width = "stretch") -> Projection:

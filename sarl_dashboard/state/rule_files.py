@@ -24,7 +24,8 @@ from sarl_dashboard.state.data import (
 )
 
 OWN_FILE = "own file"
-CHOSEN, NO_RULES = "at the thresholds", "none"
+CHOSEN, UNEDITED = "at the thresholds", "before the edits"
+NO_RULES, NO_SHIELD = "none", "no shield"
 COMPACT, COMBINED, FEWEST = "compact", "compact, two features", "fewest, two features"
 COMPACT_ENDINGS = {COMPACT: "compact", COMBINED: "combined", FEWEST: "few_combined"}
 """The compact sets that there may be for some data: their names, and how their files end."""

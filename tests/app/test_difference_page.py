@@ -85,3 +85,11 @@ def test_one_action_of_several_at_a_time() -> None:
     app.button_group(key="decided").set_value(names[1]).run()
     assert not app.exception
     assert "action" not in app.query_params
+
+
+def test_every_rule_set_that_is_offered_is_explained() -> None:
+    app = open_page("difference", data="lunar_lander")
+    choice = app.selectbox(key="first")
+    assert len(choice.options) > 5
+    for name in choice.options:
+        assert f"{name[0].upper()}{name[1:]}: " in choice.help

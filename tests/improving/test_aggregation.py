@@ -160,7 +160,7 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"validation": 500_001}, "validation episodes is 500,001; give 500,000 or fewer"),
         ({"turns": 10**6}, "the number of turns is 1,000,000; give"),
         ({"turns": -1}, "the number of turns is -1"),
-        ({"search_episodes": 4}, "those of a refinement; give --refine, too"),
+        ({"turns": 1, "rounds": 400, "search_episodes": 1_000}, "turns is 1; give 0 or fewer"),
         ({"seed": -1}, "the seed is -1"),
     ],
 )

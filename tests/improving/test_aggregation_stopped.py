@@ -194,6 +194,53 @@ def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     assert card["chosen_by"] == "the episodes of a refinement that was not finished"
 
 
+def the_last_is_best(monkeypatch):
+    """Whatever was moved or changed achieves more."""
+    monkeypatch.setattr(
+        refinement.Refinement,
+        "_ranking",
+        lambda self, tried, pairs, episodes: range(len(tried))[::-1],
+    )
+
+
+def test_progress_never_runs_back_where_all_that_was_moved_is_better(
+    cart, small_search, monkeypatch
+):
+    the_last_is_best(monkeypatch)
+    ticks = []
+    plan = replace(REFINED, rounds=3)
+    aggregate(cart, plan, progress=lambda done, total: ticks.append((done, total)) or True)
+    assert ticks == sorted(ticks)
+    assert ticks[-1][0] == ticks[-1][1]
+
+
+def test_what_was_better_is_kept_where_it_is_stopped_while_it_is_moved_on(
+    cart, small_search, monkeypatch
+):
+    the_last_is_best(monkeypatch)
+    told = []
+    move = refinement.Refinement._move
+
+    def stop_in_the_end(self, movement, generations, met):
+        if generations == refinement._LATE:
+            raise KeyboardInterrupt
+        return move(self, movement, generations, met)
+
+    monkeypatch.setattr(refinement, "_LATE", 7)
+    monkeypatch.setattr(refinement.Refinement, "_move", stop_in_the_end)
+    run = refinement.Refinement.run
+
+    def noted(self, *given, better, **named):
+        return run(self, *given, better=lambda one: (told.append(one), better(one)), **named)
+
+    monkeypatch.setattr(refinement.Refinement, "run", noted)
+    stopped = aggregate(cart, REFINED)
+    assert stopped.refined
+    assert len(told) == 2
+    (kept,) = (candidate.structure_of(tree) for tree in stopped.trees)
+    np.testing.assert_array_equal(kept.threshold, told[1].structures[0].threshold)
+
+
 def test_stopped_before_anything_was_refined_what_the_search_began_with_is_given(
     cart, small_search, monkeypatch
 ):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -100,23 +102,26 @@ def test_a_query_in_the_place_of_another_gains_what_it_says_and_no_border_gains_
 
 
 def test_a_query_in_the_place_of_a_leaf_gains_what_it_says() -> None:
-    pairs = shown(1, states=300)
+    pairs = shown(1, states=600)
     scores = scores_of(pairs)
-    (tree,) = grow_budgeted_trees(pairs, max_rules=3)
-    # Leaves say what is best, so that all that is gained comes of the query.
-    structure = alternated(structure_of(tree), pairs.observations, scores, max_rules=3)
-    now = achieved(structure, pairs, scores)
-    queries = [
-        query
-        for node, rows in rows_at(structure, pairs.observations)
-        if structure.feature[node] == LEAF
-        for query in splits_of(node, rows, np.arange(3), pairs.observations, scores)
-    ]
-    assert len(queries) > 3
-    for query in queries:
-        grown = query.put_into(structure)
-        assert (grown.feature == LEAF).sum() == (structure.feature == LEAF).sum() + 1
-        assert achieved(grown, pairs, scores) - now == pytest.approx(query.gain)
+    (tree,) = grow_budgeted_trees(pairs, max_rules=5)
+    leaf = np.array([LEAF])
+    alone = TreeStructure(leaf, np.zeros(1), leaf, leaf, scores.sum(axis=0).argmax(keepdims=True))
+    seen = 0
+    for structure in (
+        alone,
+        alternated(structure_of(tree), pairs.observations, scores, max_rules=2),
+    ):
+        now = achieved(structure, pairs, scores)
+        for node, rows in rows_at(structure, pairs.observations):
+            if structure.feature[node] != LEAF:
+                continue
+            for query in splits_of(node, rows, np.arange(3), pairs.observations, scores):
+                grown = query.put_into(structure)
+                assert (grown.feature == LEAF).sum() == (structure.feature == LEAF).sum() + 1
+                assert achieved(grown, pairs, scores) - now == pytest.approx(query.gain)
+                seen += 1
+    assert seen >= 2
 
 
 def test_of_amounts_the_nearest_interval_is_best() -> None:
@@ -134,13 +139,38 @@ def test_of_amounts_the_nearest_interval_is_best() -> None:
     np.testing.assert_array_equal(best, dimension.labels_of(pairs.action_columns[:, 0]))
 
 
-def test_queries_that_nobody_meets_go() -> None:
+@pytest.mark.parametrize("alike", [False, True])
+def test_queries_that_nobody_meets_go(alike: bool) -> None:
     pairs = shown(3)
+    if alike:  # nothing else is to be gained
+        pairs = replace(pairs, actions=(pairs.observations[:, 0] > 2.5).astype(np.int64))
     (tree,) = grow_budgeted_trees(pairs, max_rules=2)
     structure = structure_of(tree)
     lone = NewQuery(0.0, 1, 2, 99.0, (0, 1)).put_into(structure)
     changed = alternated(lone, pairs.observations, scores_of(pairs), max_rules=3)
     assert (np.abs(changed.threshold) < 6).all()
+
+
+def test_every_node_says_what_is_best_where_it_is_met() -> None:
+    pairs = shown(5, states=200)
+    (tree,) = grow_budgeted_trees(pairs, max_rules=6)
+    before = structure_of(tree)
+    changed = alternated(before, pairs.observations, scores_of(pairs), max_rules=6)
+    assert changed.threshold.tolist() != before.threshold.tolist()
+    for node, rows in rows_at(changed, pairs.observations):
+        good = scores_of(pairs)[rows].sum(axis=0)
+        assert good[changed.label[node]] == good.max()
+
+
+def test_where_one_label_is_best_everywhere_nothing_is_asked() -> None:
+    generator = np.random.default_rng(0)
+    observations = generator.random((300, 3), dtype=np.float32)
+    scores = generator.random((300, 15))
+    scores[:, 9] += 2.0
+    leaf = np.array([LEAF])
+    alone = TreeStructure(leaf, np.zeros(1), leaf, leaf, np.array([9]))
+    assert not list(splits_of(0, np.arange(300), np.arange(3), observations, scores))
+    assert len(alternated(alone, observations, scores, max_rules=16).feature) == 1
 
 
 def test_a_child_takes_the_place_of_its_parent() -> None:

@@ -52,6 +52,19 @@ def test_neighbours_differ_from_each_other_in_one_query_or_label(
     answers = {one.label[one.apply(pairs.observations)].tobytes() for one in said}
     assert len(others) > 20
     assert len(answers) > len(others) / 2  # the others differ where nobody was
+    asked = [
+        [
+            (f, None if f == LEAF else t, label if f == LEAF else None)
+            for f, t, label in zip(
+                one.structures[0].feature.tolist(),
+                one.structures[0].threshold.tolist(),
+                one.structures[0].label.tolist(),
+                strict=True,
+            )
+        ]
+        for one in [Candidate.of_trees([tree]), *others]
+    ]
+    assert all(one not in asked[:place] for place, one in enumerate(asked))
     sizes = {int((one.feature == LEAF).sum()) for one in said[1:]}
     assert max(sizes) <= 6
     assert min(sizes) < 6
@@ -75,8 +88,8 @@ def test_the_first_new_query_meets_the_wishes_best() -> None:
         for one in others
         if len(one.structures[0].feature) == 3
     ]
-    # Of a sixtieth of the borders; scikit-learn looks at all of them, and by Gini.
-    assert max(right) >= leaf_rules([tree]).fidelity - 0.02
+    # scikit-learn's is the best by Gini.
+    assert max(right) >= leaf_rules([tree]).fidelity - 0.005
 
 
 def test_thresholds_go_to_where_they_bring_more() -> None:

@@ -65,11 +65,16 @@ def test_few_states_and_many_are_matched_alike(lander_like, monkeypatch):
     mined = mine_rules(lander_like, supp_min=0.0, conf_min=1.0)
     first = replace(mined.rules[4], pinned=True)
     shield = Shield(replace(mined, rules=(*mined.rules[:4], first, *mined.rules[5:])))
-    states, actions = lander_like.observations[:200], np.zeros(200, dtype=np.int64)
-    together = shield.decide_batch(states, actions)
+    (matcher,) = shield._matchers
+    states = lander_like.observations[:200].copy()
+    asked = [one for rule in mined.rules for one in rule.conditions]
+    for row, (feature, _, threshold) in enumerate(asked[:60]):
+        states[row, feature] = threshold  # on it, where it is a float32 number
+    states[60:70, 2], states[70:80, 3] = np.nan, np.inf
+    rules, margins = matcher.match_batch(states)
+    assert (margins == 0).any()
+    assert len(np.unique(rules)) > 20
     assert len(states) > matching._FEW
     monkeypatch.setattr(matching, "_FEW", len(states))
-    one_by_one = shield.decide_batch(states, actions)
-    assert len(np.unique(together.rules)) > 20
-    np.testing.assert_array_equal(one_by_one.rules, together.rules)
-    np.testing.assert_array_equal(one_by_one.margin, together.margin)
+    one_by_one = matcher.match_batch(states)
+    assert [one.tobytes() for one in one_by_one] == [rules.tobytes(), margins.tobytes()]

@@ -11,10 +11,9 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS, UNEDITED
 from sarl_dashboard.text import in_full
 
-UNEDITED = "before the edits"
 SIDES = (("first", "First set", CHOSEN), ("second", "Second set", "unfiltered"))
 
 

@@ -133,6 +133,9 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     "is reported on other episodes.",
                 )
                 if cut == EVERY_LEAF:
+                    none, one = (
+                        refinement_cost(turns, Plan.search_episodes, rounds) for turns in range(2)
+                    )
                     refinement = number(
                         "Refinement turns",
                         "refine",
@@ -140,8 +143,9 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                         MOST,
                         0,
                         "Afterwards the rules' queries, numbers and actions are changed to where "
-                        f"they achieve more, so many times. Each turn takes up to "
-                        f"{refinement_cost(1, Plan.search_episodes):,} episodes. 0: not at all.",
+                        "they achieve more, so many times. Each turn takes up to "
+                        f"{one - none:,} episodes, and before the first one some of the rounds "
+                        f"are moved, which takes {none:,}. 0: not at all.",
                     )
             seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
             if not demonstrations.is_discrete:

@@ -21,9 +21,9 @@ from sarl_dashboard.state.agents import (
     own_agents,
 )
 from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMBINED, COMPACT, FEWEST, OWN_FILE
+from sarl_dashboard.state.rule_files import CHOSEN, COMBINED, COMPACT, FEWEST, NO_SHIELD, OWN_FILE
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.shield.settings import NO_SHIELD, ShieldChoices
+from sarl_dashboard.views.shield.settings import ShieldChoices
 
 # Their places give them their colours, the paper's where it has them.
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)

@@ -26,9 +26,8 @@ from sarl_dashboard.state.agents import (
 )
 from sarl_dashboard.state.environments import continuous, environment_of
 from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, NO_SHIELD, OWN_FILE, PAPERS
 
-NO_SHIELD = "no shield"
 MOST_EPISODES = 1_000
 
 
