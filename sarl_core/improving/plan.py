@@ -81,19 +81,29 @@ class Plan:
             ("number of rounds", self.rounds, 1, MOST_ROUNDS),
             ("number of episodes a round", self.episodes, 1, MOST_EPISODES_A_ROUND),
             ("number of search episodes", self.search_episodes, 1, _MOST_SEARCH_EPISODES),
-            ("number of turns", self.turns, 0, self._most_turns()),
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),
             ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, None),
         ):
-            if value < least:
-                raise InputError(f"the {name} is {value}; give {least} or more")
-            if most is not None and value > most:
-                # Beyond, what is chosen by would be what it is reported on.
-                raise InputError(f"the {name} is {value:,}; give {most:,} or fewer")
+            _check_number(name, value, least, most)
+        _check_number("number of turns", self.turns, 0, self._most_turns())
 
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
         none, one = (refinement_seeds(n, self.search_episodes, self.rounds) for n in range(2))
-        return max(SEEDS_A_RUN - none, 0) // max(one - none, 1)
+        left = SEEDS_A_RUN - none
+        if self.turns and left < one - none:
+            raise InputError(
+                f"what comes before the first turn takes {none:,} episodes of its own, and one run "
+                f"has {SEEDS_A_RUN:,}; give fewer rounds or --search-episodes"
+            )
+        return left // (one - none)
+
+
+def _check_number(name: str, value: int, least: int, most: int | None) -> None:
+    if value < least:
+        raise InputError(f"the {name} is {value}; give {least} or more")
+    if most is not None and value > most:
+        # Beyond, what is chosen by would be what it is reported on.
+        raise InputError(f"the {name} is {value:,}; give {most:,} or fewer")

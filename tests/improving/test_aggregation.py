@@ -160,7 +160,9 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"validation": 500_001}, "validation episodes is 500,001; give 500,000 or fewer"),
         ({"turns": 10**6}, "the number of turns is 1,000,000; give"),
         ({"turns": -1}, "the number of turns is -1"),
-        ({"turns": 1, "rounds": 400, "search_episodes": 1_000}, "turns is 1; give 0 or fewer"),
+        ({"turns": 1, "search_episodes": 0}, "the number of search episodes is 0"),
+        ({"turns": 1, "search_episodes": 10**9}, "give 1,000 or fewer"),
+        ({"turns": 1, "rounds": 400, "search_episodes": 1_000}, "give fewer rounds or"),
         ({"seed": -1}, "the seed is -1"),
     ],
 )
