@@ -518,7 +518,7 @@ def _most_choices(plan: Plan) -> int:
     if not plan.turns:
         return plan.rounds
     begun = 1 if plan.rounds == 1 else 2  # as it was, and when it was moved
-    return begun + 2 * plan.turns
+    return begun + plan.turns
 
 
 def _choice_cost(plan: Plan, choices: int) -> int:

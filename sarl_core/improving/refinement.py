@@ -46,7 +46,8 @@ _LATE = 16  # further ones for the best
 _EXPERT = 2  # in which it is seen how long the expert takes
 _MET = 2  # in which it is seen where the rules lead
 _RANKED = 4  # for the best shapes
-_COMPARED = 16  # for what is compared at the end of a turn
+_CAREFUL = 2  # where what is good already is moved on
+_COMPARED = 32  # for what is to take the place of what is there
 
 
 def _halvings(ways: int) -> list[tuple[int, int]]:
@@ -83,8 +84,8 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
 
     met = _MET * episodes
     begun = ranked(starts, _COMPARED) + met + halved(_ways_of(starts)) + ranked(2, _COMPARED)
-    late = _LATE * POPULATION * episodes
-    turn = met + ranked(_NEIGHBOURS, _RANKED) + halved(_SHAPES) + late + ranked(3, _COMPARED)
+    shapes, late = ranked(_NEIGHBOURS, _RANKED), _LATE * POPULATION * _CAREFUL * episodes
+    turn = met + shapes + halved(_SHAPES) + late + 2 * ranked(2, _COMPARED)
     return _EXPERT * episodes + (begun if starts > 1 else 0) + turns * turn
 
 
@@ -101,7 +102,7 @@ def refinement_seeds(turns: int, episodes: int, starts: int = 1) -> int:
         return sum(left * generations + _RANKED for left, generations in _halvings(ways))
 
     begun = _COMPARED + _MET + halved(_ways_of(starts)) + _COMPARED
-    turn = _MET + _RANKED + halved(_SHAPES) + _LATE + _COMPARED
+    turn = _MET + _RANKED + halved(_SHAPES) + _COMPARED + _LATE * _CAREFUL + _COMPARED
     return episodes * (_EXPERT + (begun if starts > 1 else 0) + turns * turn)
 
 
@@ -143,7 +144,7 @@ class Refinement:
         self._starts = [Candidate.of_trees(trees) for trees in starts]
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
-        self.here = self._compared = self.start
+        self.here = self.start
         self._way: Movement | None = None  # that led here
         self._step = FIRST_STEP  # how wide its steps were in the end
         self._pairs = pairs
@@ -171,9 +172,8 @@ class Refinement:
                 way is not gone to its end.
 
         Returns:
-            What it began with, and of each turn what was best in it and where its thresholds were
-            moved then, no two of them alike. Which is best of all is not known: choose by
-            episodes.
+            What it began with, as it was and when it was moved, and what was best after each
+            turn, no two of them alike. Which is best of all is not known: choose by episodes.
 
         Raises:
             WorkError: If a process ended in the middle of its work.
@@ -188,7 +188,7 @@ class Refinement:
             self._turn()
             # Some had fewer neighbours.
             self._tell(begun + self._cost(turn) - self._done)
-            marks += [self._compared, self.here]
+            marks.append(self.here)
         different: dict[tuple[object, ...], Candidate] = {}
         for one in marks:
             different.setdefault(one.key, one)
@@ -213,15 +213,18 @@ class Refinement:
         place = self._halved(ways, met)
         if self._ranking([self.start, ways[place].here], met.pairs, _COMPARED)[0]:
             self._begin_with(best[place])
-            self._way, self.here = ways[place], ways[place].here
-            self._compared, self._step = self.here, self._way.step
-            self._better(self.here)
+            self._go_on(ways[place])
         cost = self._cost(0, len(self._starts)) - self._cost(0)
         self._tell(before + cost - self._done)
 
     def _begin_with(self, index: int) -> None:
         self.begun, self.start = index, self._starts[index]
-        self.here = self._compared = self.start
+        self.here = self.start
+
+    def _go_on(self, way: Movement) -> None:
+        """From where a way has come to."""
+        self._way, self.here, self._step = way, way.here, way.step
+        self._better(self.here)
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.
@@ -234,23 +237,20 @@ class Refinement:
         return min(long, self._evaluator.max_steps or MAX_STEPS)
 
     def _turn(self) -> None:
-        """Change the shape, if that is better, and move the thresholds."""
+        """Change the shape, if that is better, and move the thresholds, if that is."""
         met = self._met()
         ways = [self._movement(shape, met) for shape in self._shapes(met)]
-        # What was best before it was moved further on, too: it may have been led astray.
-        unmoved = [self.here] if self._compared is self.here else [self.here, self._compared]
-        changed = [ways[self._halved(ways, met)]] if ways else []
-        compared = [*unmoved, *(one.here for one in changed)]
-        best = self._ranking(compared, met.pairs, _COMPARED)[0]
-        if compared[best] is not self._compared:
-            self._better(compared[best])
-        self._compared = compared[best]
-        if best == len(unmoved):
-            (self._way,) = changed
-        elif self._way is None or self._compared is not self.here:
-            self._way = self._movement(self._compared, met)
-        self._move(self._way, _LATE, met)  # what it has learned of the way serves on
-        self.here, self._step = self._way.here, self._way.step
+        if ways:
+            changed = ways[self._halved(ways, met)]
+            if self._ranking([self.here, changed.here], met.pairs, _COMPARED)[0]:
+                self._go_on(changed)
+        # What it has learned of the way serves on.
+        way = self._way or self._movement(self.here, met)
+        self._move(way, _LATE, met, times=_CAREFUL)
+        if self._ranking([self.here, way.here], met.pairs, _COMPARED)[0]:
+            self._go_on(way)
+        else:  # it was led astray
+            self._way, self._step = None, way.step
 
     def _halved(self, ways: Sequence[Movement], met: MetStates) -> int:
         """Move all a little, the better half on, and so forth; the place of the one that is left.
@@ -273,8 +273,7 @@ class Refinement:
         table = self._play(self._evaluator.agent, shield, _MET).steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
-        # What was best before is compared with what comes of this, and may ask about more.
-        queried = [*dict.fromkeys([*self.here.derived, *self._compared.derived])]
+        queried = self.here.derived
         rows = with_values(table.observation, queried)
         if not len(rows):  # nothing of what it asks about has a value where it leads
             demonstrated = self._pairs.deriving(queried)
@@ -345,11 +344,14 @@ class Refinement:
         seed = int(self._generator.integers(2**31))
         return Movement(trees, pairs, step=self._step, seed=seed)
 
-    def _move(self, movement: Movement, generations: int, met: MetStates) -> None:
+    def _move(
+        self, movement: Movement, generations: int, met: MetStates, *, times: int = 1
+    ) -> None:
         """Move thresholds in the direction that brings more."""
+        episodes = times * self._episodes
         for _ in range(generations if movement.count else 0):
             achieved = self._scores(
-                movement.ask(), met.pairs, seed=self._take(self._episodes), episodes=self._episodes
+                movement.ask(), met.pairs, seed=self._take(episodes), episodes=episodes
             )
             movement.tell(np.array([one.mean() for one in achieved]))
 

@@ -87,7 +87,7 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     assert not set.union(*used.values()) & set(range(10_000_000))  # what is typed, experts' own
     # None of the rounds shares an episode with another, nor any part of the search.
     assert len(used["rounds"]) == 2 * 3
-    begun, turn = 2 + 2 + (2 + 2) + 2, 2 + 2 + (2 + 2) + 1 + 2
+    begun, turn = 2 + 2 + (2 + 2) + 2, 2 + 2 + (2 + 2) + 2 + 2 * 1 + 2
     each = 2 * (1 + begun + turn)
     assert len(used["refinement"]) == refinement.refinement_seeds(1, 2, 2) == each
     assert len(used["report"]) == 5
@@ -158,6 +158,15 @@ def test_ctrl_c_in_the_report_keeps_the_refinement(cart, small_search, monkeypat
     }
 
 
+def the_last_is_best(monkeypatch):
+    """Whatever was moved or changed achieves more."""
+    monkeypatch.setattr(
+        refinement.Refinement,
+        "_ranking",
+        lambda self, tried, pairs, episodes: range(len(tried))[::-1],
+    )
+
+
 def stopped_after(monkeypatch, turns):
     """Ctrl-C in a search, after so many turns of it."""
     whole = refinement.Refinement._turn
@@ -167,7 +176,7 @@ def stopped_after(monkeypatch, turns):
         if len(done) == turns:
             raise KeyboardInterrupt
         whole(search)
-        done.append(search._compared)
+        done.append(search.here)
 
     monkeypatch.setattr(refinement.Refinement, "_turn", interrupted)
     return done
@@ -177,10 +186,7 @@ def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     cart, small_search, monkeypatch, tmp_path
 ):
     points = stopped_after(monkeypatch, 2)
-    # What the first turn moved is the best in the second.
-    monkeypatch.setattr(
-        refinement.Refinement, "_ranking", lambda self, tried, met, episodes: range(len(tried))
-    )
+    the_last_is_best(monkeypatch)
     stopped = aggregate(cart, replace(REFINED, turns=8))
     assert stopped.refined
     best = points[-1].trees(stopped.demonstrations, 2)
@@ -192,15 +198,6 @@ def test_stopped_in_the_refinement_the_best_point_so_far_is_given(
     assert card["seeds"]["refinement"] == 43_000_000
     assert card["seeds"]["validation"] is card["seeds"]["report"] is None
     assert card["chosen_by"] == "the episodes of a refinement that was not finished"
-
-
-def the_last_is_best(monkeypatch):
-    """Whatever was moved or changed achieves more."""
-    monkeypatch.setattr(
-        refinement.Refinement,
-        "_ranking",
-        lambda self, tried, pairs, episodes: range(len(tried))[::-1],
-    )
 
 
 def test_progress_never_runs_back_where_all_that_was_moved_is_better(
@@ -221,10 +218,10 @@ def test_what_was_better_is_kept_where_it_is_stopped_while_it_is_moved_on(
     told = []
     move = refinement.Refinement._move
 
-    def stop_in_the_end(self, movement, generations, met):
+    def stop_in_the_end(self, movement, generations, met, **named):
         if generations == refinement._LATE:
             raise KeyboardInterrupt
-        return move(self, movement, generations, met)
+        return move(self, movement, generations, met, **named)
 
     monkeypatch.setattr(refinement, "_LATE", 7)
     monkeypatch.setattr(refinement.Refinement, "_move", stop_in_the_end)

@@ -10,6 +10,7 @@ import pytest
 
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.demonstrations.dataset import with_formulas
+from sarl_core.improving import refinement
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement, ranks
 from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
@@ -354,20 +355,30 @@ def test_it_can_be_stopped_after_any_candidate(small_search) -> None:
     assert ticks[-1] == 2 + 4 + 2
 
 
-def test_where_the_thresholds_were_moved_is_told_once_it_was_compared(
-    small_search, monkeypatch
-) -> None:
-    monkeypatch.setattr(
-        Refinement, "_ranking", lambda self, tried, met, episodes: range(len(tried))
-    )
+@pytest.mark.parametrize("moved", [False, True])
+def test_what_achieves_more_is_told_and_gone_on_with(moved, small_search, monkeypatch) -> None:
+    """And what does not, is not: each turn begins with the best there is."""
+    compared: list[list[Candidate]] = []
+
+    def ranking(self, tried, pairs, times):
+        if times == refinement._COMPARED:
+            compared.append(list(tried))
+            # A neighbour is never better, what was moved is or is not.
+            return (1, 0) if moved and len(compared) % 2 == 0 else (0, 1)
+        return range(len(tried))
+
+    monkeypatch.setattr(Refinement, "_ranking", ranking)
     told: list[Candidate] = []
     begun = search()
+    monkeypatch.setattr(refinement, "_COMPARED", 5)
     marks = begun.run(2, better=told.append)
-    # Nothing was better in the first turn; moved, it was; moved again, it was not compared yet.
-    start, moved, moved_again = marks
-    assert start is begun.start
-    assert told == [start, moved]
-    assert len({one.key for one in (start, moved, moved_again)}) == 3
+    first, second, third, fourth = compared
+    assert first[0] is begun.start is marks[0]
+    assert second[0] is begun.start
+    best = second[1] if moved else begun.start
+    assert third[0] is best
+    assert fourth[0] is best
+    assert told == marks == ([begun.start, second[1], fourth[1]] if moved else [begun.start])
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
