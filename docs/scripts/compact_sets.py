@@ -88,7 +88,9 @@ SETS = {
     "lunar_lander_few_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=8), "every"
     ),
-    "lunar_lander_compact": RuleSetPlan("lunar_lander", replace(_LANDER, max_rules=19, turns=12)),
+    "lunar_lander_compact": RuleSetPlan(
+        "lunar_lander", replace(_LANDER, max_rules=19, rounds=64, turns=10)
+    ),
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
     ),
