@@ -241,16 +241,17 @@ def rows_at(
     Yields:
         A node, and the rows that reach it, ascending.
     """
-    todo = [(0, np.arange(len(observations)))]
-    for node, rows in todo:
-        yield node, rows
-        feature = int(structure.feature[node])
-        if feature != LEAF:
-            left = observations[rows, feature] <= structure.threshold[node]
-            todo += [
-                (int(structure.children_left[node]), rows[left]),
-                (int(structure.children_right[node]), rows[~left]),
-            ]
+    level = [(0, np.arange(len(observations)))]
+    while level:
+        yield from level
+        below = []
+        for node, rows in level:
+            feature = int(structure.feature[node])
+            if feature != LEAF:
+                left = observations[rows, feature] <= structure.threshold[node]
+                below.append((int(structure.children_left[node]), rows[left]))
+                below.append((int(structure.children_right[node]), rows[~left]))
+        level = below
 
 
 def _bounded(values: NDArray[np.float32]) -> NDArray[np.float64]:

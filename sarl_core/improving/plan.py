@@ -98,7 +98,7 @@ class Plan:
                 f"what comes before the first turn takes {none:,} episodes of its own, and one run "
                 f"has {SEEDS_A_RUN:,}; give fewer rounds or --search-episodes"
             )
-        return left // (one - none)
+        return max(left, 0) // (one - none)
 
 
 def _check_number(name: str, value: int, least: int, most: int | None) -> None:

@@ -171,6 +171,10 @@ def test_a_plan_that_cannot_be_done_is_refused(change, sentence):
         Plan(**{"max_rules": 4, **change})
 
 
+def test_rounds_without_turns_need_no_seeds_of_a_search():
+    assert Plan(4, rounds=1_000, search_episodes=1_000).turns == 0
+
+
 def test_who_acts_at_random_cannot_be_asked(cart, small):
     with pytest.raises(InputError, match="'novice' acts at random and cannot be asked"):
         aggregate(cart, small, expert="novice")
