@@ -58,7 +58,7 @@ class RuleSetPlan:
 
 
 _CARTPOLE = Plan(
-    2, rounds=6, episodes=10, turns=2, validation=4_000, report=3_000, choose="failures"
+    2, rounds=24, episodes=10, turns=2, validation=4_000, report=3_000, choose="failures"
 )
 _LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
 _CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)

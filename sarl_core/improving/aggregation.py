@@ -48,7 +48,7 @@ _ALTERNATED = 10_000  # pairs by which queries are chosen anew, or of many rules
 _A_RULE = 100  # for each of them
 _FIRST_VALIDATION = 16
 _USUAL = (0.05, 0.95)  # quantiles between which most returns lie
-_FIRST_SHARE = 4  # failures are rare: their first validation is this part of the whole
+_FIRST_SHARE = 4  # where much must be seen first, the first validation is this part of the whole
 
 
 @dataclass(frozen=True)
@@ -528,6 +528,7 @@ def _choice_cost(plan: Plan, choices: int) -> int:
 
 def _first_validation(plan: Plan) -> int:
     """Episodes that every candidate plays before the worse half of them leaves."""
-    if plan.choose == "return":
+    if plan.choose == "return" and not plan.turns:
         return _FIRST_VALIDATION
+    # Failures are rare, and what a refinement leaves to choose from differs little.
     return max(_FIRST_VALIDATION, plan.validation // _FIRST_SHARE)

@@ -45,9 +45,9 @@ _LATE = 16  # further ones for the best
 # Times the episodes of a neighbour:
 _EXPERT = 2  # in which it is seen how long the expert takes
 _MET = 2  # in which it is seen where the rules lead
-_RANKED = 4  # for the best shapes
+_RANKED = 4  # for the best shapes, and for each way that is gone
 _CAREFUL = 2  # where what is good already is moved on
-_COMPARED = 32  # for what is to take the place of what is there
+_COMPARED = 32  # for the best starts, and for what is to take the place of what is there
 
 
 def _halvings(ways: int) -> list[tuple[int, int]]:
@@ -78,14 +78,14 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
 
     def halved(ways: int) -> int:
         return sum(
-            left * generations * POPULATION * episodes + ranked(left, _RANKED)
+            left * (generations * POPULATION + _RANKED) * episodes
             for left, generations in _halvings(ways)
         )
 
-    met = _MET * episodes
-    begun = ranked(starts, _COMPARED) + met + halved(_ways_of(starts)) + ranked(2, _COMPARED)
+    met, compared = _MET * episodes, 2 * _COMPARED * episodes
+    begun = ranked(starts, _COMPARED) + met + halved(_ways_of(starts)) + compared
     shapes, late = ranked(_NEIGHBOURS, _RANKED), _LATE * POPULATION * _CAREFUL * episodes
-    turn = met + shapes + halved(_SHAPES) + late + 2 * ranked(2, _COMPARED)
+    turn = met + shapes + halved(_SHAPES) + late + 2 * compared
     return _EXPERT * episodes + (begun if starts > 1 else 0) + turns * turn
 
 
@@ -211,7 +211,7 @@ class Refinement:
         best = ranking[: _ways_of(len(self._starts))]
         ways = [self._movement(self._starts[index], met) for index in best]
         place = self._halved(ways, met)
-        if self._ranking([self.start, ways[place].here], met.pairs, _COMPARED)[0]:
+        if self._is_as_good(ways[place].here, self.start, met):
             self._begin_with(best[place])
             self._go_on(ways[place])
         cost = self._cost(0, len(self._starts)) - self._cost(0)
@@ -242,12 +242,12 @@ class Refinement:
         ways = [self._movement(shape, met) for shape in self._shapes(met)]
         if ways:
             changed = ways[self._halved(ways, met)]
-            if self._ranking([self.here, changed.here], met.pairs, _COMPARED)[0]:
+            if self._is_as_good(changed.here, self.here, met):
                 self._go_on(changed)
         # What it has learned of the way serves on.
         way = self._way or self._movement(self.here, met)
         self._move(way, _LATE, met, times=_CAREFUL)
-        if self._ranking([self.here, way.here], met.pairs, _COMPARED)[0]:
+        if self._is_as_good(way.here, self.here, met):
             self._go_on(way)
         else:  # it was led astray
             self._way, self._step = None, way.step
@@ -262,9 +262,18 @@ class Refinement:
         for _, generations in _halvings(len(ways)):
             for place in left:
                 self._move(ways[place], generations, met)
-            ranking = self._ranking([ways[place].here for place in left], met.pairs, _RANKED)
+            moved = [ways[place].here for place in left]
+            ranking = self._ranking(moved, met.pairs, _RANKED, first=_RANKED)
             left = [left[rank] for rank in ranking[: (len(left) + 1) // 2]]
         return left[0]
+
+    def _is_as_good(self, moved: Candidate, there: Candidate, met: MetStates) -> bool:
+        """Whether what was moved achieves as much in all episodes of a comparison.
+
+        Of two that never fail the one that was moved is further from where it would.
+        """
+        both = [moved, there]
+        return not self._ranking(both, met.pairs, _COMPARED, first=_COMPARED)[0]
 
     def _met(self) -> MetStates:
         """Where the rules lead now, and what the expert says there."""
@@ -325,16 +334,19 @@ class Refinement:
         return [others[one] for one in self._ranking(others, met.pairs, _RANKED)[:_SHAPES]]
 
     def _ranking(
-        self, tried: Sequence[Candidate], pairs: Demonstrations, times: int
+        self, tried: Sequence[Candidate], pairs: Demonstrations, times: int, *, first: int = 1
     ) -> Sequence[int]:
-        """Candidates by what they achieve in so many times the episodes, the best first."""
+        """Candidates by what they achieve in so many times the episodes, the best first.
+
+        The worse half is left after `first` times as many; of equals, the first is first.
+        """
 
         def achieved(left: Sequence[int], seed: int, count: int) -> list[NDArray[np.float64]]:
             return self._scores([tried[place] for place in left], pairs, seed=seed, episodes=count)
 
         most = times * self._episodes
         return successive_halving(
-            len(tried), achieved, seed=self._take(most), first=self._episodes, most=most
+            len(tried), achieved, seed=self._take(most), first=first * self._episodes, most=most
         ).ranking
 
     def _movement(self, candidate: Candidate, met: MetStates) -> Movement:

@@ -250,13 +250,13 @@ def test_it_begins_with_what_achieves_most_when_it_is_moved(
     ranks: list[tuple[int, ...]] = []
     ranked = Refinement._ranking
 
-    def ranking(self, tried, pairs, episodes):
+    def ranking(self, tried, pairs, times, **first):
         compared.append(list(tried))
         if len(compared) == 2:  # of what was moved, the second is gone on with
             return (1, 0)
-        if len(compared) == 3:  # the best as it was, and the other when it was moved
-            return (1, 0) if moved else (0, 1)
-        ranks.append(ranked(self, tried, pairs, episodes))
+        if len(compared) == 3:  # the other when it was moved, and the best as it was
+            return (0, 1) if moved else (1, 0)
+        ranks.append(ranked(self, tried, pairs, times, **first))
         return ranks[-1]
 
     monkeypatch.setattr(Refinement, "_ranking", ranking)
@@ -270,14 +270,34 @@ def test_it_begins_with_what_achieves_most_when_it_is_moved(
     first, halved, end, *_ = compared
     order = ranks[0]
     best = max(first, key=lambda one: mean_return(leaf_rules(one.trees(CARTPOLE, 2))))
-    assert best is first[order[0]] is end[0] is told[0]
+    assert best is first[order[0]] is end[1] is told[0]
     assert len(halved) == 2
-    assert end[1] is halved[1]
+    assert end[0] is halved[1]
     shape = first[order[1]].structures[0].feature
-    np.testing.assert_array_equal(end[1].structures[0].feature, shape)
+    np.testing.assert_array_equal(end[0].structures[0].feature, shape)
     assert begun.begun == order[int(moved)]
     assert begun.start is marks[0] is first[begun.begun]
-    assert (end[1] in told) == moved
+    assert (end[0] in told) == moved
+
+
+@pytest.mark.parametrize(
+    ("early", "late", "taken"), [(-90.0, 10.0, True), (90.0, -10.0, False), (0.0, 0.0, True)]
+)
+def test_what_is_compared_plays_all_episodes(early, late, taken, small_search, monkeypatch) -> None:
+    """Few episodes say the contrary; of two that achieve the same, the moved one is taken."""
+    begun = search(episodes=16)
+    (tree,) = grow_budgeted_trees(CARTPOLE, max_rules=2)
+    there = Candidate.of_trees([tree])
+    moved = Candidate.of_trees([count_tree(_asking(threshold=0.5), CARTPOLE, 0, divider=2)])
+    met = MetStates(CARTPOLE, None)
+
+    def achieved(tried, pairs, *, seed, episodes):
+        first = np.arange(seed, seed + episodes) < 1_000 + 2
+        zero = np.zeros(episodes)
+        return [np.where(first, early, late) if one is moved else zero for one in tried]
+
+    monkeypatch.setattr(begun, "_scores", achieved)
+    assert begun._is_as_good(moved, there, met) == taken
 
 
 def played(returns: list[float], failed: list[bool]) -> Episodes:
@@ -360,11 +380,11 @@ def test_what_achieves_more_is_told_and_gone_on_with(moved, small_search, monkey
     """And what does not, is not: each turn begins with the best there is."""
     compared: list[list[Candidate]] = []
 
-    def ranking(self, tried, pairs, times):
+    def ranking(self, tried, pairs, times, **first):
         if times == refinement._COMPARED:
             compared.append(list(tried))
             # A neighbour is never better, what was moved is or is not.
-            return (1, 0) if moved and len(compared) % 2 == 0 else (0, 1)
+            return (0, 1) if moved and len(compared) % 2 == 0 else (1, 0)
         return range(len(tried))
 
     monkeypatch.setattr(Refinement, "_ranking", ranking)
@@ -373,12 +393,12 @@ def test_what_achieves_more_is_told_and_gone_on_with(moved, small_search, monkey
     monkeypatch.setattr(refinement, "_COMPARED", 5)
     marks = begun.run(2, better=told.append)
     first, second, third, fourth = compared
-    assert first[0] is begun.start is marks[0]
-    assert second[0] is begun.start
-    best = second[1] if moved else begun.start
-    assert third[0] is best
-    assert fourth[0] is best
-    assert told == marks == ([begun.start, second[1], fourth[1]] if moved else [begun.start])
+    assert first[1] is begun.start is marks[0]
+    assert second[1] is begun.start
+    best = second[0] if moved else begun.start
+    assert third[1] is best
+    assert fourth[1] is best
+    assert told == marks == ([begun.start, second[0], fourth[0]] if moved else [begun.start])
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
