@@ -21,7 +21,7 @@ from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
-from sarl_core.improving.alternation import achieved, alternated, label_scores
+from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
@@ -324,13 +324,10 @@ class _Run:
             scores = known
             if scores is None:
                 scores = label_scores(pairs, tree.dimension, tree.index)
-            before = structure_of(tree)
-            after = alternated(
-                before, pairs.observations[rows], scores[rows], max_rules=self.plan.max_rules
-            )
+            before, every = structure_of(tree), ScoredStates(pairs.observations, scores)
+            after = alternated(before, every.select(rows), max_rules=self.plan.max_rules)
             # Of many rules some are met by few of the chosen pairs.
-            every = pairs.observations, scores
-            better = achieved(after, *every) > achieved(before, *every)
+            better = achieved(after, every) > achieved(before, every)
             changed = count_tree(after, pairs, tree.index, divider=self.plan.divider)
             result.append(changed if better else tree)
         return tuple(result)

@@ -26,6 +26,23 @@ _ROUNDING = 1e-9  # of a gain, for each state
 
 
 @dataclass(frozen=True)
+class ScoredStates:
+    """States, and what is wished there.
+
+    Attributes:
+        observations: Shape (N, d), float32.
+        scores: How good each label is in each state, (N, labels).
+    """
+
+    observations: NDArray[np.float32]
+    scores: NDArray[np.float64]
+
+    def select(self, rows: NDArray[np.int64]) -> ScoredStates:
+        """These states alone."""
+        return ScoredStates(self.observations[rows], self.scores[rows])
+
+
+@dataclass(frozen=True)
 class NewQuery:
     """A query in the place of a leaf, or of another query.
 
@@ -103,55 +120,41 @@ def without_query(structure: TreeStructure, node: int, child: int) -> TreeStruct
     )
 
 
-def alternated(
-    structure: TreeStructure,
-    observations: NDArray[np.float32],
-    scores: NDArray[np.float64],
-    *,
-    max_rules: int,
-) -> TreeStructure:
+def alternated(structure: TreeStructure, states: ScoredStates, *, max_rules: int) -> TreeStructure:
     """Choose queries and labels anew, in turns, as long as that brings anything.
 
     Args:
         structure: With labels.
-        observations: Shape (N, d), float32.
-        scores: How good each label is in each state, (N, labels).
+        states: N of them.
         max_rules: Most leaves.
 
     Returns:
         A tree whose labels are at least as good in these states, summed over them.
     """
-    most = achieved(structure, observations, scores)
+    most = achieved(structure, states)
     for _ in range(_TURNS):
-        changed = _without_unmet(_exchanged(structure, observations, scores), observations)
-        changed = _grown(_labelled(changed, observations, scores), observations, scores, max_rules)
-        before, most = most, achieved(changed, observations, scores)
+        changed = _without_unmet(_exchanged(structure, states), states)
+        changed = _grown(_labelled(changed, states), states, max_rules)
+        before, most = most, achieved(changed, states)
         if most <= before:
             break
         structure = changed
-    return _without_unmet(structure, observations)
+    return _without_unmet(structure, states)
 
 
-def achieved(
-    structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
-) -> float:
+def achieved(structure: TreeStructure, states: ScoredStates) -> float:
     """How good the labels are that a tree says, summed over states.
 
     Args:
         structure: With labels.
-        observations: Shape (N, d), float32.
-        scores: How good each label is in each state, (N, labels).
+        states: N of them.
     """
-    labels = _labels(structure, observations)
-    return float(scores[np.arange(len(labels)), labels].sum())
+    labels = _labels(structure, states.observations)
+    return float(states.scores[np.arange(len(labels)), labels].sum())
 
 
 def splits_of(
-    leaf: int,
-    rows: NDArray[np.int64],
-    features: NDArray[np.int64],
-    observations: NDArray[np.float32],
-    scores: NDArray[np.float64],
+    leaf: int, rows: NDArray[np.int64], features: NDArray[np.int64], states: ScoredStates
 ) -> Iterator[NewQuery]:
     """For each feature the best query in the place of a leaf.
 
@@ -159,8 +162,7 @@ def splits_of(
         leaf: Its node.
         rows: States that reach it, (n,).
         features: That may be asked about.
-        observations: Shape (N, d), float32.
-        scores: How good each label is in each state, (N, labels).
+        states: N of them.
 
     Yields:
         Queries that leave enough states on either side; none where too few reach the leaf.
@@ -168,14 +170,14 @@ def splits_of(
     if len(rows) < _FEWEST:
         return
     for feature in features.tolist():
-        values = observations[rows, feature]
+        values = states.observations[rows, feature]
         order = np.argsort(values, kind="stable")
         ordered = _bounded(values[order])
         places = np.flatnonzero(ordered[:-1] < ordered[1:])
         places = places[(places >= _LEAST - 1) & (places < len(order) - _LEAST)]
         if not len(places):
             continue
-        sums = np.cumsum(scores[rows[order]], axis=0)
+        sums = np.cumsum(states.scores[rows[order]], axis=0)
         below, above = sums[places], sums[-1] - sums[places]
         labels = np.column_stack([below.argmax(axis=1), above.argmax(axis=1)])
         gains = below.max(axis=1) + above.max(axis=1) - sums[-1].max()
@@ -192,8 +194,7 @@ def exchanges_of(
     node: int,
     rows: NDArray[np.int64],
     features: NDArray[np.int64],
-    observations: NDArray[np.float32],
-    scores: NDArray[np.float64],
+    states: ScoredStates,
 ) -> Iterator[NewQuery]:
     """For each feature the best query in the place of another, below which all stays.
 
@@ -202,16 +203,15 @@ def exchanges_of(
         node: Of the query that is there.
         rows: States that reach it, (n,).
         features: That may be asked about.
-        observations: Shape (N, d), float32.
-        scores: How good each label is in each state, (N, labels).
+        states: N of them.
 
     Yields:
         Queries that send at least one state to either side.
     """
-    values, of_labels = observations[rows], scores[rows]
-    states = np.arange(len(rows))
+    values, of_labels = states.observations[rows], states.scores[rows]
+    every = np.arange(len(rows))
     left, right = (
-        of_labels[states, _labels(without_query(structure, 0, int(side[node])), values)]
+        of_labels[every, _labels(without_query(structure, 0, int(side[node])), values)]
         for side in (structure.children_left, structure.children_right)
     )
     better = left - right  # on the left
@@ -264,27 +264,25 @@ def _labels(structure: TreeStructure, observations: NDArray[np.float32]) -> NDAr
     return np.asarray(structure.label)[structure.apply(observations)]
 
 
-def _exchanged(
-    structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
-) -> TreeStructure:
+def _exchanged(structure: TreeStructure, states: ScoredStates) -> TreeStructure:
     """Every query the best one, given those below, from the leaves up."""
-    features = np.arange(observations.shape[1])
+    features = np.arange(states.observations.shape[1])
     # What is exchanged below changes nothing about who reaches a node.
-    for node, rows in reversed(list(rows_at(structure, observations))):
+    for node, rows in reversed(list(rows_at(structure, states.observations))):
         if structure.feature[node] == LEAF:
             continue
-        new = exchanges_of(structure, node, rows, features, observations, scores)
+        new = exchanges_of(structure, node, rows, features, states)
         best = max(new, key=lambda query: query.gain, default=None)
         if best is not None and best.gain > _ROUNDING * len(rows):
             structure = best.put_into(structure)
     return structure
 
 
-def _without_unmet(structure: TreeStructure, observations: NDArray[np.float32]) -> TreeStructure:
+def _without_unmet(structure: TreeStructure, states: ScoredStates) -> TreeStructure:
     """A child in the place of a query that sends every state to it."""
     nodes = len(structure.feature)
     sizes = np.zeros(nodes, dtype=np.int64)
-    for node, rows in rows_at(structure, observations):
+    for node, rows in rows_at(structure, states.observations):
         sizes[node] = len(rows)
     for node in np.flatnonzero(structure.feature != LEAF).tolist()[::-1]:
         left, right = int(structure.children_left[node]), int(structure.children_right[node])
@@ -293,32 +291,25 @@ def _without_unmet(structure: TreeStructure, observations: NDArray[np.float32]) 
     return without_idle_queries(structure)
 
 
-def _labelled(
-    structure: TreeStructure, observations: NDArray[np.float32], scores: NDArray[np.float64]
-) -> TreeStructure:
+def _labelled(structure: TreeStructure, states: ScoredStates) -> TreeStructure:
     """Every node saying what is best in the states that reach it."""
     labels = np.asarray(structure.label).copy()
-    for node, rows in rows_at(structure, observations):
+    for node, rows in rows_at(structure, states.observations):
         if len(rows):
-            labels[node] = scores[rows].sum(axis=0).argmax()
+            labels[node] = states.scores[rows].sum(axis=0).argmax()
     return replace(structure, label=labels)
 
 
-def _grown(
-    structure: TreeStructure,
-    observations: NDArray[np.float32],
-    scores: NDArray[np.float64],
-    max_rules: int,
-) -> TreeStructure:
+def _grown(structure: TreeStructure, states: ScoredStates, max_rules: int) -> TreeStructure:
     """The tree with the best further queries, as long as there is room."""
-    features = np.arange(observations.shape[1])
+    features = np.arange(states.observations.shape[1])
     known: dict[int, NewQuery | None] = {}
     while (structure.feature == LEAF).sum() < max_rules:
         possible = []
-        for node, rows in rows_at(structure, observations):
+        for node, rows in rows_at(structure, states.observations):
             if structure.feature[node] == LEAF:
                 if node not in known:
-                    new = splits_of(node, rows, features, observations, scores)
+                    new = splits_of(node, rows, features, states)
                     known[node] = max(new, key=lambda query: query.gain, default=None)
                 possible.append(known[node])
         best = max((one for one in possible if one), key=lambda query: query.gain, default=None)

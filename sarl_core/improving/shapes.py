@@ -18,6 +18,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination
 from sarl_core.improving.alternation import (
     NewQuery,
+    ScoredStates,
     exchanges_of,
     label_scores,
     rows_at,
@@ -207,6 +208,7 @@ def _new_queries(
     """
     pairs = met.pairs
     scores = label_scores(pairs, dimension, index) if met.scores is None else met.scores
+    states = ScoredStates(pairs.observations, scores)
     kinds = [feature.derived for feature in pairs.features]
     result: list[tuple[int, NewQuery]] = []
     for node, rows in rows_at(structure, pairs.observations):
@@ -214,9 +216,9 @@ def _new_queries(
             continue
         offered = np.flatnonzero(generator.random(len(kinds)) < _OFFERED)
         if exchanged:
-            possible = exchanges_of(structure, node, rows, offered, pairs.observations, scores)
+            possible = exchanges_of(structure, node, rows, offered, states)
         else:
-            possible = splits_of(node, rows, offered, pairs.observations, scores)
+            possible = splits_of(node, rows, offered, states)
         of_kind: dict[object, NewQuery] = {}
         for query in sorted(possible, key=lambda query: -query.gain):
             derived = kinds[query.feature]

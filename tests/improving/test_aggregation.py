@@ -13,7 +13,7 @@ from sarl_core.agents.agent import EXPERT_FOLDER
 from sarl_core.demonstrations.dataset import with_formulas
 from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import card_path, save_aggregation
-from sarl_core.improving.alternation import alternated
+from sarl_core.improving.alternation import ScoredStates, alternated
 from sarl_core.improving.candidate import structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
@@ -75,9 +75,8 @@ def test_what_is_told_of_a_round_can_be_checked_by_hand(cart, small, found):
         weights=importance(scores(make_agent("expert", CART), cart.observations)),
     )
     expert = make_agent("expert", CART)
-    changed = alternated(
-        structure_of(tree), cart.observations, scores(expert, cart.observations), max_rules=5
-    )
+    states = ScoredStates(cart.observations, scores(expert, cart.observations))
+    changed = alternated(structure_of(tree), states, max_rules=5)
     rules = leaf_rules([count_tree(changed, cart_answers(cart), 0, divider=2)])
     run = rollout(CART, "novice", shield=Shield(rules), episodes=4, seed=ROUNDS)
     first = found.rounds[0]

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from sarl_core import Demonstrations
 from sarl_core.improving.alternation import (
     NewQuery,
+    ScoredStates,
     alternated,
     exchanges_of,
     label_scores,
@@ -43,6 +44,10 @@ def achieved(structure: TreeStructure, pairs: Demonstrations, scores: np.ndarray
     return float(scores[np.arange(len(said)), said].sum())
 
 
+def states_of(pairs: Demonstrations) -> ScoredStates:
+    return ScoredStates(pairs.observations, scores_of(pairs))
+
+
 def scores_of(pairs: Demonstrations) -> np.ndarray:
     return label_scores(pairs, label_dimensions(pairs, 2)[0], 0)
 
@@ -53,7 +58,7 @@ def test_a_tree_never_gets_worse_and_never_larger(seed: int, rules: int) -> None
     pairs = shown(seed)
     (tree,) = grow_budgeted_trees(pairs, max_rules=rules)
     before = structure_of(tree)
-    changed = alternated(before, pairs.observations, scores_of(pairs), max_rules=rules)
+    changed = alternated(before, states_of(pairs), max_rules=rules)
     assert (changed.feature == LEAF).sum() <= rules
     assert achieved(changed, pairs, scores_of(pairs)) >= achieved(before, pairs, scores_of(pairs))
 
@@ -68,7 +73,7 @@ def test_what_a_greedy_tree_misses_comes_in_turns() -> None:
     )
     (tree,) = grow_budgeted_trees(pairs, max_rules=4)
     before = structure_of(tree)
-    changed = alternated(before, observations, scores_of(pairs), max_rules=4)
+    changed = alternated(before, states_of(pairs), max_rules=4)
     assert achieved(before, pairs, scores_of(pairs)) < 0.8 * 400
     assert achieved(changed, pairs, scores_of(pairs)) == 400
     inner = changed.feature != LEAF
@@ -89,7 +94,7 @@ def test_a_query_in_the_place_of_another_gains_what_it_says_and_no_border_gains_
         if structure.feature[node] == LEAF:
             continue
         features = np.arange(3)
-        for query in exchanges_of(structure, node, rows, features, pairs.observations, scores):
+        for query in exchanges_of(structure, node, rows, features, states_of(pairs)):
             put = achieved(query.put_into(structure), pairs, scores)
             assert put - now == pytest.approx(query.gain)
             values = np.unique(pairs.observations[rows, query.feature])
@@ -110,13 +115,13 @@ def test_a_query_in_the_place_of_a_leaf_gains_what_it_says() -> None:
     seen = 0
     for structure in (
         alone,
-        alternated(structure_of(tree), pairs.observations, scores, max_rules=2),
+        alternated(structure_of(tree), states_of(pairs), max_rules=2),
     ):
         now = achieved(structure, pairs, scores)
         for node, rows in rows_at(structure, pairs.observations):
             if structure.feature[node] != LEAF:
                 continue
-            for query in splits_of(node, rows, np.arange(3), pairs.observations, scores):
+            for query in splits_of(node, rows, np.arange(3), states_of(pairs)):
                 grown = query.put_into(structure)
                 assert (grown.feature == LEAF).sum() == (structure.feature == LEAF).sum() + 1
                 assert achieved(grown, pairs, scores) - now == pytest.approx(query.gain)
@@ -147,7 +152,7 @@ def test_queries_that_nobody_meets_go(alike: bool) -> None:
     (tree,) = grow_budgeted_trees(pairs, max_rules=2)
     structure = structure_of(tree)
     lone = NewQuery(0.0, 1, 2, 99.0, (0, 1)).put_into(structure)
-    changed = alternated(lone, pairs.observations, scores_of(pairs), max_rules=3)
+    changed = alternated(lone, states_of(pairs), max_rules=3)
     assert (np.abs(changed.threshold) < 6).all()
 
 
@@ -155,7 +160,7 @@ def test_every_node_says_what_is_best_where_it_is_met() -> None:
     pairs = shown(5, states=200)
     (tree,) = grow_budgeted_trees(pairs, max_rules=6)
     before = structure_of(tree)
-    changed = alternated(before, pairs.observations, scores_of(pairs), max_rules=6)
+    changed = alternated(before, states_of(pairs), max_rules=6)
     assert changed.threshold.tolist() != before.threshold.tolist()
     for node, rows in rows_at(changed, pairs.observations):
         good = scores_of(pairs)[rows].sum(axis=0)
@@ -169,8 +174,9 @@ def test_where_one_label_is_best_everywhere_nothing_is_asked() -> None:
     scores[:, 9] += 2.0
     leaf = np.array([LEAF])
     alone = TreeStructure(leaf, np.zeros(1), leaf, leaf, np.array([9]))
-    assert not list(splits_of(0, np.arange(300), np.arange(3), observations, scores))
-    assert len(alternated(alone, observations, scores, max_rules=16).feature) == 1
+    states = ScoredStates(observations, scores)
+    assert not list(splits_of(0, np.arange(300), np.arange(3), states))
+    assert len(alternated(alone, states, max_rules=16).feature) == 1
 
 
 def test_a_child_takes_the_place_of_its_parent() -> None:
