@@ -228,7 +228,8 @@ _Formulas = Annotated[
         show_default=False,
         help='Let rules ask about a formula of yours as well: "time to collision [s] = gap / '
         '(own_speed - lead_speed)". It may have numbers, names of features, + - * /, min, max, abs '
-        "and parentheses. May be given several times.",
+        "and parentheses. It takes the place of a formula of the file that has its name. May be "
+        "given several times.",
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]

@@ -547,7 +547,8 @@ def with_formulas(demonstrations: Demonstrations, formulas: Sequence[str]) -> De
     """Demonstrations with formulas that a person wrote as further features.
 
     Args:
-        demonstrations: N steps; what they derive already stays.
+        demonstrations: N steps; what they derive already stays, but for a formula of the same
+            name, of which the new one takes the place.
         formulas: Each as "time to collision [s] = gap / (own_speed - lead_speed)": a name, a unit
             in brackets or none, and numbers, names of features, ``+ - * /``, ``min``, ``max``,
             ``abs`` and parentheses.
@@ -564,4 +565,9 @@ def with_formulas(demonstrations: Demonstrations, formulas: Sequence[str]) -> De
     if isinstance(formulas, str):
         raise InputError("the formulas must be a list of texts; put one into a list: [text]")
     added = [formula_feature(text, demonstrations.observed) for text in formulas]
-    return demonstrations.deriving([*demonstrations.derived, *added])
+    known = {one.name for one in demonstrations.derived if isinstance(one.definition, Formula)}
+    changed = {one.name: one for one in added if one.name in known}
+    # Of two new ones with one name the first is here, too, and refused.
+    further = [one for one in added if one is not changed.get(one.name)]
+    stayed = [changed.get(one.name, one) for one in demonstrations.derived]
+    return demonstrations.deriving([*stayed, *further])

@@ -10,7 +10,13 @@ import pytest
 from sarl_core import RuleSet, load_demonstrations
 from sarl_core.cli.app import main
 from sarl_core.cli.options import with_bare_combine
+from sarl_core.demonstrations.dataset import (
+    derived_features,
+    formula_feature,
+    with_formulas,
+)
 from sarl_core.demonstrations.derived import Combination
+from sarl_core.demonstrations.formats import save_demonstrations
 from sarl_core.environments.formulas import Formula
 from tests.cli.conftest import CART, ROOT
 
@@ -124,9 +130,6 @@ def test_a_lone_option_has_a_value_only_with_a_comma():
 
 
 def test_demonstrations_that_were_saved_with_formulas_keep_them(run, tmp_path):
-    from sarl_core.demonstrations.dataset import formula_feature
-    from sarl_core.demonstrations.formats import save_demonstrations
-
     made = load_demonstrations(LUNAR)
     made = made.deriving([formula_feature("fall = vertical velocity * 2", made.observed)])
     save_demonstrations(made, tmp_path / "lunar.parquet")
@@ -135,6 +138,21 @@ def test_demonstrations_that_were_saved_with_formulas_keep_them(run, tmp_path):
     assert told == "fall = vertical velocity * 2"
     run("mine", tmp_path / "lunar.parquet", "--setting", "filtered", "--out", tmp_path / "r.json")
     assert [one.name for one in derived_of(tmp_path / "r.json")] == ["fall"]
+
+
+def test_a_formula_of_the_file_gives_way_to_one_of_the_same_name(run, tmp_path):
+    shown, rules, report = (tmp_path / name for name in ("cart.parquet", "r.json", "r.html"))
+    made = with_formulas(
+        load_demonstrations(CART), ["lean = pole angle * 2", "drift = -pole_angle"]
+    )
+    save_demonstrations(made, shown)
+    changed = "lean = pole angle + 0.5 * pole angular velocity"
+    run("mine", shown, "--feature", changed, "--setting", "filtered", "--out", rules)
+    made_again = with_formulas(load_demonstrations(CART), [changed, "drift = -pole_angle"])
+    assert derived_features(RuleSet.load(rules).source.features) == made_again.derived
+    run("report", rules, "--demonstrations", shown, "--frames", 0, "--out", report)
+    text = html.unescape(report.read_text(encoding="utf-8"))
+    assert f"--feature '{changed}' --out {rules}" in text
 
 
 def test_a_report_says_the_command_that_makes_its_rules_again(run, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sarl_core.demonstrations.dataset import Demonstrations, Feature, formula_feature
+from sarl_core.demonstrations.dataset import Demonstrations, Feature, formula_feature, with_formulas
 from sarl_core.demonstrations.derived import (
     Combination,
     DerivedFeature,
@@ -213,6 +213,19 @@ def test_two_features_of_one_name_are_refused() -> None:
     plain = demonstrations()
     with pytest.raises(InputError, match="stands twice"):
         plain.deriving([formula_feature("gap = own speed", plain.observed)])
+
+
+def test_a_formula_takes_the_place_of_one_with_its_name() -> None:
+    first = with_formulas(demonstrations(), ["a = 1 * gap", "b = 2 * gap"])
+    (_, b), (a, c) = (
+        first.derived,
+        with_formulas(demonstrations(), ["a = 3 * gap", "c = 4 * gap"]).derived,
+    )
+    assert with_formulas(first, ["c = 4 * gap", "a = 3 * gap"]).derived == (a, b, c)
+    assert with_formulas(first, ["b = 2 * gap"]).derived == first.derived
+    for new in ("a", "c"):  # of two, neither is meant
+        with pytest.raises(InputError, match="stands twice"):
+            with_formulas(first, [f"{new} = 3 * gap", f"{new} = 4 * gap"])
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".npz"])

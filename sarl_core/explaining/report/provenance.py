@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, with_formulas
 from sarl_core.demonstrations.derived import formula_texts
 from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
 from sarl_core.demonstrations.formats.missing import Missing
@@ -163,16 +163,15 @@ def _derived_options(
     given: Demonstrations, read: Demonstrations, divider: int
 ) -> dict[str, object] | None:
     """How derived features are asked for; None where no options would give them."""
-    before = len(read.derived)
-    derived = given.derived[before:]
-    formulas = [one for one in derived if isinstance(one.definition, Formula)]
-    combined = [one.definition for one in derived[len(formulas) :]]
-    if given.derived[:before] != read.derived or any(isinstance(o, Formula) for o in combined):
+    formulas = formula_texts([one for one in given.derived if one not in read.derived])
+    base = with_formulas(read, formulas)
+    before = len(base.derived)
+    combined = [one.definition for one in given.derived[before:]]
+    if given.derived[:before] != base.derived or any(isinstance(o, Formula) for o in combined):
         return None
-    options: dict[str, object] = {"--feature": list(formula_texts(formulas))}
+    options: dict[str, object] = {"--feature": list(formulas)}
     if not combined:
         return options
-    base = read.deriving([*read.derived, *formulas])
     names = [feature.name for feature in base.observed]
     pairs = [(first, second) for first, second in dict.fromkeys(o.features for o in combined)]
     named = [f"{names[first]}, {names[second]}" for first, second in pairs]
