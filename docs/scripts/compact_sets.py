@@ -58,7 +58,7 @@ class RuleSetPlan:
 
 
 _CARTPOLE = Plan(
-    2, rounds=24, episodes=10, turns=2, validation=4_000, report=3_000, choose="failures"
+    2, rounds=24, episodes=10, turns=1, validation=4_000, report=3_000, choose="failures"
 )
 _LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
 _CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)
@@ -81,7 +81,7 @@ _WALKER = Plan(
 )
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
-    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=4)),
+    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=2)),
     "lunar_lander_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=24, turns=3, validation=1_024), "every"
     ),
