@@ -6,6 +6,7 @@ VENV := .venv
 PYTHON := $(VENV)/bin/python
 BROWSER := /usr/bin/chromium
 COMPILER := /usr/bin/cc
+DATABASE := /usr/bin/pg_createcluster
 
 # The first interpreter that Box2D has wheels for.
 FIND_PYTHON = for name in python3 python3.13 python3.12 python3.11; do \
@@ -19,7 +20,7 @@ app: $(VENV)/runtime.stamp  ## start the dashboard
 	@echo "The dashboard is at http://localhost:$(PORT) (Ctrl-C ends it)."
 	$(PYTHON) -m streamlit run app.py --server.port $(PORT)
 
-test: $(VENV)/development.stamp $(BROWSER) $(COMPILER)  ## run every test
+test: $(VENV)/development.stamp $(BROWSER) $(COMPILER) $(DATABASE)  ## run every test
 	$(PYTHON) -m pytest --numprocesses 2 --dist loadfile
 
 lint: $(VENV)/development.stamp  ## style, types, and who may import whom
@@ -81,5 +82,11 @@ $(COMPILER):
 	  { echo "error: the tests of exported C code need $(COMPILER); have an administrator install the packages gcc and libc6-dev and run make again" >&2; exit 2; }
 	$(AS_ROOT) apt-get update
 	$(AS_ROOT) apt-get install --yes --no-install-recommends gcc libc6-dev
+
+$(DATABASE):
+	@command -v apt-get >/dev/null && { test "$$(id -u)" = 0 || command -v sudo >/dev/null; } || \
+	  { echo "error: the tests of a library in PostgreSQL need its server; have an administrator install the package postgresql and run make again" >&2; exit 2; }
+	$(AS_ROOT) apt-get update
+	$(AS_ROOT) apt-get install --yes --no-install-recommends postgresql
 
 AS_ROOT = $(shell test "$$(id -u)" = 0 || echo sudo)

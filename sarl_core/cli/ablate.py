@@ -126,7 +126,7 @@ def _document(ablation: Ablation) -> dict[str, Any]:
 
 
 def _print(ablation: Ablation, out: Path | None) -> None:
-    from sarl_core.cli.answers import print_notes
+    from sarl_core.cli.answers.summaries import print_notes
     from sarl_core.explaining.figures.ablation import (
         ablation_text,
         difference_interval_text,

@@ -21,6 +21,7 @@ from sarl_core.cli.diff import diff
 from sarl_core.cli.episodes import evaluate, render
 from sarl_core.cli.export import export
 from sarl_core.cli.learning import learn, train_expert
+from sarl_core.cli.library import CommandGroup, library
 from sarl_core.cli.options import with_bare_combine
 from sarl_core.cli.report import report
 from sarl_core.cli.reproduce import reproduce
@@ -28,6 +29,7 @@ from sarl_core.cli.rules import landscape, mine
 
 app = typer.Typer(
     name="sarl_core",
+    cls=CommandGroup,
     add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
@@ -55,6 +57,7 @@ for command in (
     app.command(command.__name__.replace("_", "-"))(command)
 
 
+app.add_typer(library)
 app.command("app")(dashboard)
 
 

@@ -227,7 +227,7 @@ def _guard(held: Audit, guards: list[GuardCondition]) -> None:
 
 
 def _print(held: Audit, comparison: LogComparison | None, title: str) -> None:
-    from sarl_core.cli.answers import print_notes
+    from sarl_core.cli.answers.summaries import print_notes
     from sarl_core.explaining.words.audit import (
         audit_facts,
         comparison_text,

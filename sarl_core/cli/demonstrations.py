@@ -110,7 +110,7 @@ def check(
 
 def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bool) -> None:
     terminal.check_output(out, (".json",))
-    from sarl_core.cli.answers import print_suggestion
+    from sarl_core.cli.answers.summaries import print_suggestion
     from sarl_core.demonstrations.formats import preview_columns
     from sarl_core.demonstrations.formats.mapping.roles import save_roles
 
@@ -125,7 +125,7 @@ def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bo
 
 
 def _tell_demonstrations(demonstrations: Demonstrations, path: Path | str, as_json: bool) -> None:
-    from sarl_core.cli.answers import describe_demonstrations, print_demonstrations
+    from sarl_core.cli.answers.summaries import describe_demonstrations, print_demonstrations
 
     document = describe_demonstrations(demonstrations, path)
     if as_json:

@@ -81,7 +81,7 @@ def evaluate(
     if as_json:
         terminal.print_json(document)
     else:
-        from sarl_core.cli.answers import print_episodes
+        from sarl_core.cli.answers.summaries import print_episodes
 
         shielded = "unshielded" if rules is None else f"shielded by {rules}"
         print_episodes(document, str(env), f"{played.agent} in {env}, {shielded}", shield)
@@ -134,7 +134,7 @@ def render(
             )
     with terminal.working("Writing") as advance:
         replay.save(out, progress=advance)
-    from sarl_core.cli.answers import describe_replay, print_replay
+    from sarl_core.cli.answers.summaries import describe_replay, print_replay
 
     document = describe_replay(replay, out, [shield is not None, False])
     if as_json:

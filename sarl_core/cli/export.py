@@ -105,7 +105,7 @@ def export(
     if as_json:
         terminal.print_json({**_document(prepared, out, vectors), "notes": list(notes)})
     else:
-        from sarl_core.cli.answers import print_notes
+        from sarl_core.cli.answers.summaries import print_notes
 
         terminal.print_lines(_lines(prepared, out, vectors))
         print_notes(notes)

@@ -141,7 +141,7 @@ def learn(
     if as_json:
         terminal.print_json({**_document(study, summaries, out), "notes": list(notes)})
         return
-    from sarl_core.cli.answers import print_notes
+    from sarl_core.cli.answers.summaries import print_notes
 
     _print_study(study, summaries, out)
     print_notes(notes)

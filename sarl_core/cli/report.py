@@ -182,7 +182,7 @@ def report(
     ]
     if document.without:
         lines.append(f"There are no pictures: {document.without}.")
-    from sarl_core.cli.answers import print_notes
+    from sarl_core.cli.answers.summaries import print_notes
 
     terminal.print_lines(lines)
     print_notes(document.notes)

@@ -124,7 +124,7 @@ def mine(
             "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
             "out; give --hold-out as well, as --hold-out 0.2"
         )
-    from sarl_core.cli.answers import (
+    from sarl_core.cli.answers.summaries import (
         describe_oddities,
         describe_rules,
         print_oddities,
@@ -132,7 +132,7 @@ def mine(
     )
 
     with terminal.working("Mining"):
-        from sarl_core.cli.evidence_answers import Tried
+        from sarl_core.cli.answers.evidence import Tried
         from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.mining.combining.choice import chosen_again
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
@@ -245,7 +245,7 @@ def landscape(
     if as_json:
         terminal.print_json({**landscape_document(plane, names), "notes": list(recorded.notes)})
         return
-    from sarl_core.cli.answers import print_notes
+    from sarl_core.cli.answers.summaries import print_notes
 
     cells = f"{plane.rule_count.size:,} cells"
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)

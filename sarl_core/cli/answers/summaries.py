@@ -14,7 +14,7 @@ from sarl_core.demonstrations.warnings import find_warnings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sarl_core.cli.evidence_answers import Tried
+    from sarl_core.cli.answers.evidence import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview
     from sarl_core.mining.rule_set import RuleSet
@@ -288,7 +288,7 @@ def describe_rules(
     Returns:
         A document for JSON.
     """
-    from sarl_core.cli.evidence_answers import describe_judged, describe_tried
+    from sarl_core.cli.answers.evidence import describe_judged, describe_tried
 
     thresholds = rule_set.thresholds
     return {
@@ -329,7 +329,7 @@ def print_rules(
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
     """
-    from sarl_core.cli.evidence_answers import (
+    from sarl_core.cli.answers.evidence import (
         judged_facts,
         none_left,
         rule_line,

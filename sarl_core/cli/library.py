@@ -1,0 +1,268 @@
+"""Commands around what is kept, and ``library:ID`` in the place of a file."""
+
+from __future__ import annotations
+
+import getpass
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from sarl_core.cli import terminal
+from sarl_core.cli.options import Json, out_option
+from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.library import Item, Library
+
+_PREFIX = "library:"
+_RULES, _BUNDLE = ".json", ".sarl"
+
+library = typer.Typer(
+    name="library",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="What is kept: demonstrations, rule sets, results. `library:ID` stands for a file in "
+    "every command. It is in your data directory, or where the environment variable "
+    "`SARL_LIBRARY` says: a folder, or the address of a PostgreSQL database.",
+)
+
+_Identifier = Annotated[str, typer.Argument(metavar="ID", show_default=False, help="As listed.")]
+
+
+class CommandGroup(typer.core.TyperGroup):
+    """Commands that take ``library:ID`` where they take a file."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As Typer does, with the files in the place of the ids."""
+        if args[:1] != ["library"]:
+            args = [_with_file(argument) for argument in args]
+        return super().parse_args(ctx, args)
+
+
+def _with_file(argument: str) -> str:
+    """An argument, or an option with its value, with the path of a file that is kept."""
+    option, equals, value = (
+        argument.partition("=") if argument.startswith("--") else ("", "", argument)
+    )
+    if not value.startswith(_PREFIX):
+        return argument
+    from sarl_core.library.contents import file_of
+
+    with _opened() as opened:
+        return f"{option}{equals}{file_of(opened, opened.item(value))}"
+
+
+@library.command("list")
+def list_items(
+    kind: Annotated[
+        str | None,
+        typer.Option("--kind", show_default=False, help="demonstrations, rules, result or note."),
+    ] = None,
+    removed: Annotated[
+        bool, typer.Option("--removed", help="What was removed and can be brought back.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """List what is kept, the newest first.
+
+    Example: `python -m sarl_core library list --kind rules`
+    """
+    from sarl_core.library.items import KINDS
+
+    if kind is not None and kind not in KINDS:
+        raise InputError(f"--kind {kind} is no kind of thing; choose from {', '.join(KINDS)}")
+    opened = _opened()
+    items = opened.items(kind=kind, removed=removed)
+    if as_json:
+        terminal.print_json({"items": [item.document for item in items]})
+        return
+    if not items:
+        terminal.print_lines([f"Nothing is kept in {opened.place.said}; `library import` does."])
+        return
+    terminal.print_table(
+        ("id", "kind", "name", "author", "kept", "approved by"),
+        [
+            (
+                item.id,
+                item.kind,
+                item.name,
+                item.author,
+                item.created.astimezone().strftime("%Y-%m-%d %H:%M"),
+                ", ".join(one.author for one in item.approvals),
+            )
+            for item in items
+        ],
+    )
+    usage = opened.usage(_author())
+    if usage.warning:
+        terminal.print_notes([usage.warning])
+
+
+@library.command("show")
+def show_item(identifier: _Identifier, as_json: Json = False) -> None:
+    """Say all that is known of one thing.
+
+    Example: `python -m sarl_core library show ID`
+    """
+    opened = _opened()
+    item = opened.item(identifier)
+    versions = opened.versions(item.id)
+    if as_json:
+        paths = {one.role: str(opened.path(item, one.role)) for one in item.files}
+        terminal.print_json(
+            {**item.document, "paths": paths, "versions": [one.id for one in versions]}
+        )
+        return
+    terminal.print_facts(_facts(opened, item, versions))
+
+
+@library.command("export")
+def export_items(
+    identifiers: Annotated[
+        list[str], typer.Argument(metavar="ID...", show_default=False, help="As listed.")
+    ],
+    out: Annotated[Path, out_option("A .sarl file.")],
+    as_json: Json = False,
+) -> None:
+    """Write things, with all that they came from, into one file for another machine.
+
+    Example: `python -m sarl_core library export ID --out rules.sarl`
+    """
+    terminal.check_output(out, (_BUNDLE,))
+    from sarl_core.library.bundles import export_bundle
+
+    _tell(export_bundle(_opened(), identifiers, out), f"is in {out}", as_json)
+
+
+@library.command("import")
+def import_file(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            show_default=False,
+            help="What `library export` wrote, demonstrations, or a rule file.",
+        ),
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option("--name", show_default=False, help="What to call it; the name of the file."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Keep what was exported, demonstrations, or a rule file.
+
+    Example: `python -m sarl_core library import data/rules/cartpole_compact.json`
+    """
+    from sarl_core.library.bundles import import_bundle
+    from sarl_core.library.contents import add_demonstrations, add_rules
+
+    opened, author = _opened(), _author()
+    if file.suffix.lower() == _BUNDLE:
+        if name is not None:
+            raise InputError("what was exported has names; leave --name out")
+        items = import_bundle(opened, file, author=author)
+    elif file.suffix.lower() == _RULES:
+        from sarl_core.mining.rule_set import RuleSet
+
+        rules = RuleSet.load(file)
+        made_of = opened.with_digest(rules.source.digest, kind="demonstrations")
+        items = [
+            add_rules(
+                opened,
+                rules,
+                name or file.stem,
+                author=author,
+                came_from=[one.id for one in made_of[:1]],
+            )
+        ]
+    else:
+        from sarl_core.demonstrations.formats import load_demonstrations
+
+        items = [
+            add_demonstrations(opened, load_demonstrations(file), name or file.stem, author=author)
+        ]
+    _tell(items, "is kept", as_json)
+
+
+@library.command("remove")
+def remove_item(
+    identifier: _Identifier,
+    undo: Annotated[bool, typer.Option("--undo", help="Bring it back.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Take something out of the list; for 30 days `--undo` brings it back.
+
+    Example: `python -m sarl_core library remove ID`
+    """
+    opened, author = _opened(), _author()
+    if undo:
+        _tell([opened.restore(identifier, author=author)], "is back", as_json)
+        return
+    item = opened.remove(identifier, author=author)
+    opened.sweep()
+    _tell([item], "is removed; --undo brings it back", as_json)
+
+
+@library.command("approve")
+def approve_item(
+    identifier: _Identifier,
+    note: Annotated[str, typer.Option("--note", help="What you say to it.")] = "",
+    as_json: Json = False,
+) -> None:
+    """Approve something by your name; any change of it makes a version that is not approved.
+
+    Example: `python -m sarl_core library approve ID --note "Held against the logs of March."`
+    """
+    author = _author()
+    _tell([_opened().approve(identifier, author=author, note=note)], "is approved", as_json)
+
+
+def _opened() -> Library:
+    from sarl_core.library import Library
+
+    return Library()
+
+
+def _author() -> str:
+    """Who types: on one person's machine nobody has to say."""
+    given = os.environ.get("SARL_AUTHOR", "").strip()
+    if given:
+        return given
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):  # of a number without a name
+        return "somebody"
+
+
+def _tell(items: Sequence[Item], what: str, as_json: bool) -> None:
+    if as_json:
+        terminal.print_json({"items": [item.document for item in items]})
+    else:
+        terminal.print_lines(f"{item.name} ({item.kind}) {what}: {item.id}" for item in items)
+
+
+def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[str, str]]:
+    facts = [
+        ("name", item.name),
+        ("kind", item.kind),
+        ("author", item.author),
+        ("kept", item.created.astimezone().strftime("%Y-%m-%d %H:%M:%S")),
+        ("digest", item.digest),
+        ("command", item.command),
+        *((str(key), str(value)) for key, value in item.details.items()),
+        *(("made of", f"{opened.item(one).name}, {one}") for one in item.came_from),
+        *(
+            ("approved by", f"{one.author}{f': {one.note}' if one.note else ''}")
+            for one in item.approvals
+        ),
+        *(("file", str(opened.path(item, one.role))) for one in item.files),
+    ]
+    if item.removed is not None:
+        facts.append(("removed", item.removed.astimezone().strftime("%Y-%m-%d %H:%M:%S")))
+    others = [one for one in versions if one.id != item.id]
+    facts += [("other version", f"{one.id}, {one.created:%Y-%m-%d %H:%M}") for one in others]
+    return [(name, value) for name, value in facts if value]

@@ -1,0 +1,182 @@
+"""Demonstrations and rule sets as things that are kept, and back."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats import (
+    load_demonstrations,
+    read_demonstrations,
+    save_demonstrations,
+)
+from sarl_core.errors import InputError, quoted
+from sarl_core.library.items import Item, Kind
+from sarl_core.library.library import Library
+from sarl_core.mining.rule_set import RuleSet, rules_digest, rules_from_json
+
+MAIN_FILES = {"demonstrations": ".parquet", "rules": ".json"}
+"""Roles of the files that are demonstrations and rules, and their endings."""
+
+
+def add_demonstrations(
+    library: Library,
+    demonstrations: Demonstrations,
+    name: str,
+    *,
+    author: str,
+    parent: str = "",
+    command: str = "",
+    details: Mapping[str, Any] | None = None,
+    shared: bool = False,
+) -> Item:
+    """Keep demonstrations, with names, units and formulas.
+
+    Args:
+        library: Where.
+        demonstrations: All of them.
+        name: What they are called.
+        author: Whose they are.
+        parent: Id of the version that they were made from.
+        command: That makes them again.
+        details: More about them.
+        shared: Whether they stand in everybody's list.
+
+    Raises:
+        InputError: As of `Library.add`.
+        WorkError: If they cannot be written.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "demonstrations.parquet"
+        save_demonstrations(demonstrations, path)
+        about = {
+            "steps": len(demonstrations),
+            "episodes": demonstrations.n_episodes,
+            "environment": demonstrations.env_id,
+        }
+        return library.add(
+            "demonstrations",
+            name,
+            {"demonstrations": (path, ".parquet")},
+            author=author,
+            digest=demonstrations.digest,
+            parent=parent,
+            command=command,
+            details={**about, **(details or {})},
+            shared=shared,
+        )
+
+
+def add_rules(
+    library: Library,
+    rule_set: RuleSet,
+    name: str,
+    *,
+    author: str,
+    parent: str = "",
+    came_from: Sequence[str] = (),
+    command: str = "",
+    details: Mapping[str, Any] | None = None,
+    shared: bool = False,
+) -> Item:
+    """Keep a rule set, as it is written into a rule file.
+
+    Args:
+        library: Where.
+        rule_set: Whole, with every edit.
+        name: What it is called.
+        author: Whose it is.
+        parent: Id of the version that it was made from.
+        came_from: Ids of the demonstrations that it was mined from.
+        command: That makes it again.
+        details: More about it.
+        shared: Whether it stands in everybody's list.
+
+    Raises:
+        InputError: As of `Library.add`.
+        WorkError: If it cannot be written.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "rules.json"
+        rule_set.save(path)
+        about = {"rules": len(rule_set), "environment": rule_set.source.env_id}
+        return library.add(
+            "rules",
+            name,
+            {"rules": (path, ".json")},
+            author=author,
+            digest=rules_digest(rule_set),
+            parent=parent,
+            came_from=came_from,
+            command=command,
+            details={**about, **(details or {})},
+            shared=shared,
+        )
+
+
+def demonstrations_of(library: Library, item: Item) -> Demonstrations:
+    """The demonstrations that are kept.
+
+    Raises:
+        InputError: If it is something else, or its file is missing or damaged.
+    """
+    return load_demonstrations(file_of(library, item, "demonstrations"))
+
+
+def rules_of(library: Library, item: Item) -> RuleSet:
+    """The rule set that is kept.
+
+    Raises:
+        InputError: If it is something else, or its file is missing or damaged.
+    """
+    return RuleSet.load(file_of(library, item, "rules"))
+
+
+def digest_of_files(kind: Kind, files: Mapping[str, bytes]) -> str | None:
+    """The digest of demonstrations or rules, worked out of their files.
+
+    Args:
+        kind: What they are.
+        files: Contents by role.
+
+    Returns:
+        As `add_demonstrations` and `add_rules` write it down; None of other things.
+
+    Raises:
+        InputError: If a file is missing, or cannot be read.
+    """
+    if kind not in MAIN_FILES:
+        return None
+    if kind not in files:
+        raise InputError(f"it holds no {kind}; export it again")
+    if kind == "rules":
+        return rules_digest(rules_from_json(files[kind], name="the rule file"))
+    return read_demonstrations(files[kind], f"demonstrations{MAIN_FILES[kind]}").digest
+
+
+def file_of(library: Library, item: Item, role: str | None = None) -> Path:
+    """The file that a command takes in the place of a thing.
+
+    Args:
+        library: Where it is.
+        item: The thing.
+        role: What the file has to be; the main one of its kind where not given.
+
+    Raises:
+        InputError: If it holds no such file, or it is missing.
+    """
+    wanted = role or (item.kind if item.kind in MAIN_FILES else None)
+    if role is not None and all(one.role != role for one in item.files):
+        raise InputError(f"{quoted(item.name)} is {_SAID[item.kind]} and holds no {role}")
+    return library.path(item, wanted)
+
+
+_SAID = {
+    "demonstrations": "demonstrations",
+    "rules": "a rule set",
+    "result": "a result",
+    "note": "a note",
+}

@@ -1,0 +1,157 @@
+"""A library's database: opened, brought up to date, read, and written whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+
+from sarl_core.errors import InputError, WorkError
+from sarl_core.library.place import LibraryPlace
+from sarl_core.library.tables import NEWEST
+
+_PATIENCE = 30  # seconds that a writer waits for another
+_WRITERS = 7_205_759_403  # the lock that writers of one PostgreSQL library take, one at a time
+_VERSION = "alembic_version"
+
+
+class Database:
+    """The tables of one library."""
+
+    def __init__(self, place: LibraryPlace) -> None:
+        """Open it, and bring it up to date.
+
+        Args:
+            place: Where it is.
+
+        Raises:
+            InputError: If it was made by a newer version, or is no library.
+            WorkError: If it cannot be reached, read or written.
+        """
+        self._said = place.said
+        self._engine = _engine(place)
+        try:
+            with self._in_words():
+                self._bring_up_to_date()
+        except BaseException:
+            self.close()
+            raise
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """What does not change while it is read.
+
+        Raises:
+            WorkError: If it cannot be read.
+        """
+        with self._in_words(), self._engine.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """One writer at a time; all that is written inside counts, or nothing.
+
+        Raises:
+            WorkError: If it cannot be written.
+        """
+        options = {"sarl_writes": True}
+        with (
+            self._in_words(),
+            self._engine.connect().execution_options(**options) as connection,
+            connection.begin(),
+        ):
+            if connection.dialect.name == "postgresql":
+                connection.execute(text(f"SELECT pg_advisory_xact_lock({_WRITERS})"))
+            yield connection
+
+    def close(self) -> None:
+        """Let go of its connections."""
+        self._engine.dispose()
+
+    def _bring_up_to_date(self) -> None:
+        with self.reading() as connection:
+            version = _version(connection)
+        if version == NEWEST:
+            return
+        from alembic import command
+        from alembic.config import Config
+        from alembic.script import ScriptDirectory
+
+        config = Config()
+        config.set_main_option("script_location", str(Path(__file__).parent / "migrations"))
+        config.set_main_option("path_separator", "os")
+        known = {one.revision for one in ScriptDirectory.from_config(config).walk_revisions()}
+        if version is not None and version not in known:
+            raise InputError(
+                f"the library in {self._said} was made by a newer version of this program; install "
+                "that version, or choose another place with SARL_LIBRARY"
+            )
+        # Another process may do the same: then there is nothing left to do, which Alembic sees.
+        with self.writing() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+
+    @contextmanager
+    def _in_words(self) -> Iterator[None]:
+        """Say in a sentence what a database says in its own words."""
+        try:
+            yield
+        except DBAPIError as error:
+            reason = " ".join(str(error.orig).split())
+            if "not a database" in reason:
+                raise InputError(
+                    f"in {self._said} lies a file that is no library; choose another place with "
+                    "SARL_LIBRARY"
+                ) from error
+            raise WorkError(
+                f"the library in {self._said} cannot be used ({reason}); look after its disk, or "
+                "choose another place with SARL_LIBRARY"
+            ) from error
+        except SQLAlchemyError as error:
+            raise WorkError(
+                f"the library in {self._said} cannot be used ({' '.join(str(error).split())}); "
+                "choose another place with SARL_LIBRARY"
+            ) from error
+
+
+def _engine(place: LibraryPlace) -> Engine:
+    if not place.is_folder:
+        try:
+            return create_engine(place.address, pool_pre_ping=True)
+        except ModuleNotFoundError as error:
+            raise WorkError(
+                "a library in PostgreSQL needs psycopg, which is not installed; run pip install "
+                "'sarl-explorer[server]'"
+            ) from error
+    try:
+        place.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WorkError(
+            f"the library in {place.said} cannot be made ({error.strerror or error}); choose "
+            "another place with SARL_LIBRARY"
+        ) from error
+    engine = create_engine(place.address, connect_args={"timeout": _PATIENCE})
+
+    @event.listens_for(engine, "connect")
+    def _connected(connection: Any, _: object) -> None:
+        connection.isolation_level = None  # else Python begins transactions where it thinks fit
+        connection.execute("PRAGMA foreign_keys=ON")
+
+    @event.listens_for(engine, "begin")
+    def _begun(connection: Connection) -> None:
+        # Who reads first and writes then may find that another has written: writers wait at once.
+        writes = connection.get_execution_options().get("sarl_writes")
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+    return engine
+
+
+def _version(connection: Connection) -> str | None:
+    """The last step that its tables have taken; None where there are none yet."""
+    if not inspect(connection).has_table(_VERSION):
+        return None
+    return connection.execute(text(f"SELECT version_num FROM {_VERSION}")).scalar()
