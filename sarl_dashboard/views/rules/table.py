@@ -1,4 +1,4 @@
-"""The table of rules and the one that is chosen in it."""
+"""The rules, as a table or as dots, and the one that is chosen among them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import streamlit as st
 
 from sarl_core.mining.language import threshold_text
 from sarl_core.mining.rules import Rule, Thresholds
+from sarl_dashboard.components.settings import switch
 from sarl_dashboard.components.tables import column_config, row_height, table_height
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.views.rules.in_force import InForce
 from sarl_dashboard.views.rules.listing import Listed, listed_rules, matching
 from sarl_dashboard.views.rules.rule import make_ready, show_rule
+from sarl_dashboard.views.rules.scatter import axis_choices, show_scatter
 
 TABLE_ROWS = 8
+TABLE, SCATTER = "Table", "Scatter plot"
 
 
 def nothing_in_force(thresholds: Thresholds) -> None:
@@ -43,7 +46,7 @@ def search_and_rules(in_force: InForce) -> None:
 
 @st.fragment
 def table_and_rule(listed: Listed, places: list[int], in_force: InForce) -> None:
-    """The table of rules, and the chosen one: another choice runs this part alone.
+    """The table of rules or their dots, and the chosen one: another choice runs this part alone.
 
     Args:
         listed: All rules.
@@ -58,7 +61,16 @@ def table_and_rule(listed: Listed, places: list[int], in_force: InForce) -> None
     with below:  # the rule is what was asked for, and a large table takes its time
         show_rule(listed.rules[ids.index(chosen_id)], in_force, lambda: walk(rules, row))
     with above:
-        rule_rows(listed, places, in_force, row)
+        with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
+            way = switch(
+                "Show", "show", [TABLE, SCATTER], "The rules as rows, or as dots by two numbers"
+            )
+            axes = axis_choices(in_force.rule_set) if way == SCATTER else None
+        if axes is not None:
+            count = count_text(len(places), listed, in_force)
+            show_scatter(rules, in_force.rule_set, axes, chosen_id, count)
+        else:
+            rule_rows(listed, places, in_force, row)
     # What the buttons lead to is made while nobody waits for it.
     for neighbour in () if row is None else (row + 1, row - 1):
         if 0 <= neighbour < len(rules):
@@ -101,14 +113,18 @@ def rule_rows(listed: Listed, places: list[int], in_force: InForce, row: int | N
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         alt="All rules in force",
     )
+    st.caption(
+        f"{count_text(len(places), listed, in_force)} The most support first. Click a heading to "
+        "sort, the box at the left of a row to see the rule below."
+    )
+
+
+def count_text(matching: int, listed: Listed, in_force: InForce) -> str:
+    """How many rules there are, and how many of them match."""
     total = len(listed.rules)
     kind = "" if in_force.compact is None else "compact "
     count = f"{total:,} {kind}rules" if total > 1 else f"One {kind}rule"
-    st.caption(
-        (f"{len(places):,} of {count.lower()} match. " if len(places) < total else f"{count}. ")
-        + "The most support first. Click a heading to sort, the box at the left of a row to see "
-        "the rule below."
-    )
+    return f"{matching:,} of {count.lower()} match." if matching < total else f"{count}."
 
 
 def pick(listed: Listed, places: list[int]) -> None:

@@ -1,0 +1,1 @@
+"""Figures of the rules of a set, one beside the other."""
