@@ -11,7 +11,9 @@ from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
+from sarl_core.mining.validation.recommendation import Recommendation, recommended
 from sarl_core.progress import Progress
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
@@ -40,11 +42,17 @@ def judged(thresholds: Thresholds) -> Judged | None:
     Returns:
         Of mined rules alone: a compact set was built from other states.
     """
+    fit = known()
+    return None if fit is None else _judged(fit, thresholds)
+
+
+def known() -> CrossFit | None:
+    """The trees without each fold of the chosen demonstrations; None while they are not there."""
     demonstrations = chosen_demonstrations()
     if demonstrations is None or compact_set.in_force():
         return None
     fit = RESULTS.get(key_of(demonstrations, chosen_divider()))
-    return _judged(fit, thresholds) if isinstance(fit, CrossFit) else None
+    return fit if isinstance(fit, CrossFit) else None
 
 
 def _trees_of(fit: CrossFit) -> tuple[str, ...]:
@@ -55,6 +63,19 @@ def _trees_of(fit: CrossFit) -> tuple[str, ...]:
 @cached(hash_funcs={CrossFit: _trees_of})
 def _judged(fit: CrossFit, thresholds: Thresholds) -> Judged:
     return fit.at(thresholds)
+
+
+@cached(hash_funcs={CrossFit: _trees_of})
+def recommendation(
+    trees: tuple[PolicyTree, ...],
+    fit: CrossFit,
+    *,
+    dimension: int | None,
+    lift: float,
+    depth: int | None,
+) -> Recommendation | None:
+    """Few rules that are right in other episodes, too; None where nothing can be recommended."""
+    return recommended(trees, fit, dimension=dimension, lift_min=lift, max_depth=depth)
 
 
 def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:

@@ -50,6 +50,7 @@ def front_figure(
     points: Sequence[ParetoPoint],
     *,
     chosen: tuple[int, float, float] | None = None,
+    recommended: tuple[int, float] | None = None,
     dark: bool = False,
 ) -> go.Figure:
     """The rule sets that no other one beats: few rules, much coverage, much fidelity.
@@ -57,6 +58,7 @@ def front_figure(
     Args:
         points: The front, or some of it.
         chosen: Rules, coverage and fidelity of the rule set in force.
+        recommended: Rules and coverage of the rule set that is recommended.
         dark: Whether it stands on dark ground.
 
     Returns:
@@ -98,6 +100,20 @@ def front_figure(
         ),
         unselected={"marker": {"opacity": 1}},
     )
+    if recommended is not None:
+        figure.add_scatter(
+            x=[recommended[0]],
+            y=[recommended[1]],
+            mode="markers",
+            hoverinfo="skip",
+            name="recommended",
+            marker={
+                "size": 19,
+                "symbol": "diamond-open",
+                "color": MARKER_COLOUR,
+                "line": {"width": 2},
+            },
+        )
     if chosen is not None and chosen[0]:
         figure.add_scatter(
             x=[chosen[0]],

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from sarl_core.explaining.words.evidence import influence_text, range_text, what_tells
-from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.evidence import FEWEST_EPISODES, HeldOut
+from sarl_core.mining.language import counted, share_text, threshold_text
 from sarl_core.mining.validation.cross_fitting import Judged, parts
+from sarl_core.mining.validation.recommendation import COVERAGE, NEAR, Recommendation
 
 
 def elsewhere_text(held_out: HeldOut) -> str:
@@ -107,3 +108,57 @@ def influence_sentences(judged: Judged) -> list[str]:
             f"{share_text(by_states.share)}, and {text}. Therefore each episode counts once."
         )
     return sentences
+
+
+def recommendation_sentences(recommendation: Recommendation, action: str = "") -> str:
+    """Which thresholds to take, why, and what that is worth where it was not chosen.
+
+    Args:
+        recommendation: Thresholds, and what they were compared with.
+        action: Name of the action dimension that alone counts; "" for all.
+
+    Returns:
+        As "Recommended: support 0.02 and confidence 0.78. Elsewhere, these 6 rules apply in 51 % of
+        the states and are right in 86.9 % of them (86.8 % in episodes without a say in this
+        choice): the fewest within 2 points of the best, 87.3 % with 115 rules, of all that apply in
+        at least 50 % of the states."
+    """
+    at, rules = recommendation.thresholds, recommendation.rules
+    few = f"the fewest within {100 * NEAR:g} points of "
+    why = (
+        f"the best, and {few}it,"
+        if recommendation.best_rules == rules
+        else f"{few}the best, {share_text(recommendation.best, decimals=1)} with "
+        f"{counted(recommendation.best_rules, 'rule')},"
+    )
+    fidelity, unseen = (
+        share_text(share, decimals=1) for share in (recommendation.fidelity, recommendation.unseen)
+    )
+    subject = "this rule applies" if rules == 1 else f"these {rules:,} rules apply"
+    return (
+        f"Recommended{f' for {action}' if action else ''}: support {threshold_text(at.support)} "
+        f"and confidence {threshold_text(at.confidence)}. Elsewhere, {subject} in "
+        f"{share_text(recommendation.coverage)} of the states and {'is' if rules == 1 else 'are'} "
+        f"right in {fidelity} of them ({unseen} in episodes without a say in this choice): {why} "
+        f"of all that apply in at least {share_text(COVERAGE)} of the states."
+    )
+
+
+def no_recommendation_text(episodes: int) -> str:
+    """Why no thresholds are recommended.
+
+    Args:
+        episodes: How many there are to judge by.
+
+    Returns:
+        One sentence.
+    """
+    if episodes < FEWEST_EPISODES:
+        return (
+            f"No thresholds are recommended: {counted(episodes, 'episode')} cannot tell which "
+            f"rules are right in others; it takes at least {FEWEST_EPISODES}."
+        )
+    return (
+        "No thresholds are recommended: at none do rules apply in at least "
+        f"{share_text(COVERAGE)} of the states of other episodes."
+    )

@@ -221,7 +221,7 @@ def threshold_landscape(
     sums = [_sums(tree, one, shape) for tree, one in zip(trees, places, strict=True)]
     tried: list[EpisodeSums] | list[None] = [None] * (len(trees) + 1)
     if held_out is not None:
-        tried = _tried(trees, places, held_out, shape)
+        tried = [plane.fidelity for plane in _tried(trees, places, held_out, shape)]
     parts = tuple(
         _layers(supports, confidences, one, tree.source.steps, other)
         for one, tree, other in zip(sums, trees, tried[1:], strict=True)
@@ -231,6 +231,41 @@ def threshold_landscape(
     total = np.sum(sums, axis=0)
     steps = sum(tree.source.steps for tree in trees)
     return replace(_layers(supports, confidences, total, steps, tried[0]), dimensions=parts)
+
+
+def episode_sums(
+    trees: Sequence[PolicyTree],
+    supports: ArrayLike,
+    confidences: ArrayLike,
+    held_out: Sequence[EpisodeCounts],
+    *,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
+) -> list[EpisodePlane]:
+    """Add up what held-out episodes say of the rule sets of every cell of a threshold grid.
+
+    What it is the sum of can be added to that of other trees and other episodes, as a mean cannot.
+
+    Args:
+        trees: One an action dimension.
+        supports: As of `threshold_landscape`, (S,).
+        confidences: Likewise, (C,).
+        held_out: What `count_held_out` counted at the nodes of these trees.
+        lift_min: Minimum lift of a rule.
+        max_depth: Longest rule.
+
+    Returns:
+        Sums of shape (S, C), of all dimensions together, and then of each.
+
+    Raises:
+        InputError: As `threshold_landscape`.
+    """
+    supports, confidences = _axis(supports, "supports"), _axis(confidences, "confidences")
+    places = [
+        _places(tree, supports, confidences, lift_min=lift_min, max_depth=max_depth)
+        for tree in trees
+    ]
+    return _tried(trees, places, held_out, (len(supports), len(confidences)))
 
 
 def _axis(values: ArrayLike, name: str) -> Floats:
@@ -247,6 +282,19 @@ def _axis(values: ArrayLike, name: str) -> Floats:
             "give shares from 0 to 1"
         )
     return axis
+
+
+class EpisodePlane(NamedTuple):
+    """What is added up over episodes at every cell of a grid of S supports and C confidences.
+
+    Attributes:
+        fidelity: Of the shares of an episode's covered pairs that are right, (S, C) each.
+        coverage: Sum of the shares of the episodes' pairs that are covered, (S, C); of all
+            episodes, also of those without any.
+    """
+
+    fidelity: EpisodeSums
+    coverage: Floats
 
 
 class _Places(NamedTuple):
@@ -308,10 +356,13 @@ def _tried(
     places: Sequence[_Places],
     held_out: Sequence[EpisodeCounts],
     shape: tuple[int, int],
-) -> list[EpisodeSums]:
+) -> list[EpisodePlane]:
     """What other episodes say of every cell: of all dimensions together, and of each."""
     layers = [
-        EpisodeSums(*np.zeros((2, *shape), dtype=np.int64), *np.zeros((2, *shape)))
+        EpisodePlane(
+            EpisodeSums(*np.zeros((2, *shape), dtype=np.int64), *np.zeros((2, *shape))),
+            np.zeros(shape),
+        )
         for _ in range(len(trees) + 1)
     ]
     entries = []
@@ -322,7 +373,8 @@ def _tried(
         by_episode = np.flatnonzero(cut_place >= 0)
         by_episode = by_episode[np.argsort(counts.episode[by_episode], kind="stable")]
         entries.append((counts, by_episode, cut_place))
-    count = len(held_out[0].numbers)
+    lengths = held_out[0].lengths
+    count = len(lengths)
     at_once = max(_CELLS_AT_ONCE // (shape[0] * (shape[1] + 1)), 1)
     for start, end in pairwise([*range(0, count, at_once), count]):
         together = np.zeros((2, end - start, *shape), dtype=np.int64)
@@ -331,9 +383,9 @@ def _tried(
         ):
             first, last = np.searchsorted(counts.episode[rows], [start, end])
             planes = _planes(one, counts, rows[first:last], cut_place, start, together.shape)
-            _add(layers[number], planes)
+            _add(layers[number], planes, lengths[start:end])
             together += planes
-        _add(layers[0], together)
+        _add(layers[0], together, len(trees) * lengths[start:end])
     return layers
 
 
@@ -357,13 +409,14 @@ def _planes(
     return _summed(planes)
 
 
-def _add(layer: EpisodeSums, planes: NDArray[np.int64]) -> None:
+def _add(layer: EpisodePlane, planes: NDArray[np.int64], pairs: NDArray[np.int64]) -> None:
     samples, correct = planes
     shares = correct / np.maximum(samples, 1)
-    layer.episodes[...] += (samples > 0).sum(axis=0)
-    layer.samples[...] += samples.sum(axis=0)
-    layer.total[...] += shares.sum(axis=0)
-    layer.squares[...] += np.square(shares).sum(axis=0)
+    layer.fidelity.episodes[...] += (samples > 0).sum(axis=0)
+    layer.fidelity.samples[...] += samples.sum(axis=0)
+    layer.fidelity.total[...] += shares.sum(axis=0)
+    layer.fidelity.squares[...] += np.square(shares).sum(axis=0)
+    layer.coverage[...] += np.tensordot(1.0 / pairs, samples, axes=1)
 
 
 def _layers(

@@ -41,6 +41,7 @@ from sarl_dashboard.views.thresholds.moves import (
     use_compact,
 )
 from sarl_dashboard.views.thresholds.numbers import show_numbers
+from sarl_dashboard.views.thresholds.recommendation import show_recommendation
 
 _SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
 
@@ -105,6 +106,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
+    show_recommendation(display, thresholds)
     across, down = mark_place(landscape, thresholds.support, thresholds.confidence)
     ring = "block" if display.compact is None else "none"
     st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))

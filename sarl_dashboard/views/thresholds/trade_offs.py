@@ -5,12 +5,20 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.explaining.figures.pareto_front import front_figure, thin_front
+from sarl_core.mining.validation.recommendation import Recommendation
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.state.mined import best_trade_offs
 from sarl_dashboard.state.thresholds import chosen_thresholds
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.maps import BARE
 from sarl_dashboard.views.thresholds.moves import take_click
+from sarl_dashboard.views.thresholds.recommendation import recommendation_of
+
+
+def place_of(display: Display, recommendation: Recommendation) -> tuple[int, float]:
+    """Rules and coverage of what is recommended, as the figure has them."""
+    point = display.point(recommendation.thresholds)
+    return int(point.rule_count[0, 0]), float(point.coverage[0, 0])
 
 
 @st.fragment(key="front")
@@ -31,9 +39,11 @@ def show_trade_offs(display: Display) -> None:
             icon=":material/filter_alt_off:",
         )
         return
+    recommendation = recommendation_of(display, thresholds)
     st.caption(
         "No other thresholds give fewer rules, more coverage and more fidelity than these. "
-        "Click a point to use its thresholds."
+        "Click a point to use its thresholds. The ring is the rule set in force"
+        + ("." if recommendation is None else ", the diamond the one recommended above.")
     )
     points = thin_front(front)
     figure = front_figure(
@@ -44,6 +54,7 @@ def show_trade_offs(display: Display) -> None:
             float(point.coverage[0, 0]),
             float(point.fidelity[0, 0]),
         ),
+        recommended=None if recommendation is None else place_of(display, recommendation),
     )
     st.plotly_chart(
         figure,
