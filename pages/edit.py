@@ -1,4 +1,4 @@
-"""Edit: rules switched off, pinned, moved and added by hand, each with what it changes at once."""
+"""Edit: rules switched off, pinned, regrown and added by hand, and what each changes at once."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from sarl_dashboard.views.edit.editing import editing
 
 st.title("Edit")
 st.caption(
-    "Switch rules off, pin them, move them, add your own. Edits lie on top of the rules in force, "
+    "Switch rules off, pin them, move them, add your own, or let a part of the tree grow anew from "
+    "another query. Edits lie on top of the rules in force, "
     "stay while the thresholds move, and last as long as this session: the rule file keeps them."
 )
 base = base_choice()

@@ -19,16 +19,24 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 def commands_page() -> str:
     """Each command with what it takes, as Markdown."""
     group: Any = typer.main.get_command(app)
-    return "\n\n".join(_section(name, command) for name, command in group.commands.items())
+    sections = []
+    for name, command in group.commands.items():
+        within = getattr(command, "commands", None)
+        if within is None:
+            sections.append(_section(name, command))
+        else:
+            sections.append(f"## {name}\n\n{command.help}")
+            sections += [_section(f"{name} {one}", part, "###") for one, part in within.items()]
+    return "\n\n".join(sections)
 
 
-def _section(name: str, command: Any) -> str:
+def _section(name: str, command: Any, level: str = "##") -> str:
     what = command.help.replace("python -m sarl_core", "sarl")
     head = "| takes | | |\n| --- | --- | --- |"
     rows = (
         _row(parameter) for parameter in command.params if not getattr(parameter, "hidden", False)
     )
-    return f"## {name}\n\n{what}\n\n{head}\n" + "\n".join(rows)
+    return f"{level} {name}\n\n{what}\n\n{head}\n" + "\n".join(rows)
 
 
 def _row(parameter: Any) -> str:

@@ -120,6 +120,7 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
         One rule a node, in their order.
     """
     numbers = zip(
+        tree.number[nodes].tolist(),
         nodes.tolist(),
         tree.label[nodes].tolist(),
         tree.support[nodes].tolist(),
@@ -130,7 +131,7 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
     )
     return [
         Rule(
-            id=f"{tree.index}.{node}",
+            id=f"{tree.index}.{number}",
             dimension=tree.index,
             conditions=conditions,
             action=label,
@@ -140,7 +141,7 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
             samples=samples,
             demonstrated_value=_demonstrated(tree, node),
         )
-        for (node, label, support, confidence, lift, samples), conditions in zip(
+        for (number, node, label, support, confidence, lift, samples), conditions in zip(
             numbers, _conditions(tree, nodes), strict=True
         )
     ]

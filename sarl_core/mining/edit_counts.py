@@ -8,13 +8,14 @@ from sarl_core.mining.rules import Rule
 
 
 def is_plain(rules: Sequence[Rule]) -> bool:
-    """Whether nobody edited a rule set: then its rules never overlap, and their counts add up.
+    """Whether the rules of a set are as a tree gives them: they never overlap, counts add up.
 
     Args:
         rules: Of a set.
 
     Returns:
-        True if every rule is switched on and none was written or put in its place by hand.
+        True if every rule is switched on and none was written or put in its place by hand; a part
+        of the tree may have been regrown.
     """
     return all(rule.enabled and not rule.placed for rule in rules)
 
@@ -26,25 +27,41 @@ def edits_counted(rules: Sequence[Rule]) -> str:
         rules: Of a set.
 
     Returns:
-        As "edited by hand: 1 off, 0 pinned, 2 added".
+        As "edited by hand: 1 off, 0 pinned, 2 added"; with ", 3 regrown" where some are of a
+        part of the tree that was.
     """
-    off, pinned, added = edit_counts(rules)
-    return f"edited by hand: {off:,} off, {pinned:,} pinned, {added:,} added"
+    off, pinned, added, regrown = edit_counts(rules)
+    text = f"edited by hand: {off:,} off, {pinned:,} pinned, {added:,} added"
+    return f"{text}, {regrown:,} regrown" if regrown else text
 
 
-def edit_counts(rules: Sequence[Rule]) -> tuple[int, int, int]:
-    """How many rules were switched off, pinned, and written by hand.
+def regrown_text(rules: Sequence[Rule]) -> str:
+    """How many rules are of a part of the tree that was regrown.
 
     Args:
         rules: Of a set.
 
     Returns:
-        The three numbers; one that was written by hand does not count as pinned.
+        As "; regrown by hand: 2 rules", to stand behind other counts; "" where there are none.
+    """
+    regrown = edit_counts(rules)[-1]
+    return f"; regrown by hand: {regrown:,} rule{'' if regrown == 1 else 's'}" if regrown else ""
+
+
+def edit_counts(rules: Sequence[Rule]) -> tuple[int, int, int, int]:
+    """How many rules were switched off, pinned, written by hand, and regrown.
+
+    Args:
+        rules: Of a set.
+
+    Returns:
+        The four numbers; one that was written by hand does not count as pinned.
     """
     return (
         sum(not rule.enabled for rule in rules),
         sum(rule.pinned and rule.origin != "manual" for rule in rules),
         sum(rule.origin == "manual" for rule in rules),
+        sum(rule.regrown for rule in rules),
     )
 
 
@@ -57,7 +74,7 @@ def edits_sentence(rules: Sequence[Rule]) -> str:
     Returns:
         As "2 rules were then switched off, 1 written by hand."; "" for a plain set.
     """
-    done = ("switched off", "pinned", "written by hand")
+    done = ("switched off", "pinned", "written by hand", "regrown with a part of the tree")
     counts = edit_counts(rules)
     parts = [f"{count:,} {what}" for count, what in zip(counts, done, strict=True) if count]
     if not parts:

@@ -14,7 +14,7 @@ import numpy as np
 from sarl_core.errors import InputError
 from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
-from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
+from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     action_text,
@@ -260,7 +260,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
             they, are = ("it covers", "is") if one else ("they cover", "are")
             rest = (
                 f"{they} {share_text(self.coverage)} of the states and {are} right in "
-                f"{share_text(self.fidelity)} of those"
+                f"{share_text(self.fidelity)} of those{regrown_text(self)}"
             )
         return f"{rules}, {length}; {rest}."
 
@@ -286,9 +286,9 @@ class RuleSet(RuleContents, Sequence[Rule]):
 
 
 def _mark(rule: Rule) -> str:
-    """What a person made of a rule, as " (pinned, off)"."""
+    """What a person made of a rule, as " (pinned, off)" or " (regrown)"."""
     marks = ["by hand"] if rule.origin == "manual" else ["pinned"] if rule.pinned else []
-    marks += [] if rule.enabled else ["off"]
+    marks += ["regrown"] * rule.regrown + ["off"] * (not rule.enabled)
     return f" ({', '.join(marks)})" if marks else ""
 
 

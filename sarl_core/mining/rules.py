@@ -16,6 +16,10 @@ from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
 
+FIRST_REGROWN, LAST_REGROWN = 10**15, 9 * 10**15 - 1
+"""Numbers of nodes that were regrown: no tree has as many nodes, and floats hold them exactly."""
+_DIGITS = len(str(FIRST_REGROWN))
+
 
 class Condition(NamedTuple):
     """One query of a rule.
@@ -89,6 +93,14 @@ class Rule:
         return self.pinned or self.origin == "manual"
 
     @property
+    def regrown(self) -> bool:
+        """Whether it is of a part of the tree that a person regrew; its node's number says so."""
+        number = self.id.rpartition(".")[2]
+        # Somebody may have given it a name of their own; Python refuses to read the longest.
+        numbered = number.isascii() and number.isdigit() and len(number) == _DIGITS
+        return self.origin == "mined" and numbered and FIRST_REGROWN <= int(number) <= LAST_REGROWN
+
+    @property
     def length(self) -> int:
         """Number of queries."""
         return len(self.conditions)
@@ -160,7 +172,8 @@ def node_of(rule: Rule) -> int:
         rule: A mined one.
 
     Returns:
-        Node number in the tree of its dimension.
+        Node number in the tree of its dimension; where a part of that was regrown, what its
+        `number` has.
     """
     return int(rule.id.rsplit(".", 1)[1])
 

@@ -110,6 +110,8 @@ class PolicyTree:
         demonstrated: Action of each row in this dimension, (N,); what a projection may use.
         label: What a rule cut at each node says, (n,) int64: the most frequent label, the lowest
             where several are, unless the tree was improved by what it achieves.
+        number: What stands in the id of a rule cut at each node, (n,) int64: its place, unless a
+            part of the tree was regrown; the other nodes then keep theirs.
     """
 
     index: int
@@ -127,6 +129,7 @@ class PolicyTree:
     sample_start: NDArray[np.int64]
     demonstrated: NDArray[np.int64] | NDArray[np.float32]
     label: NDArray[np.int64]
+    number: NDArray[np.int64]
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -207,6 +210,18 @@ class PolicyTree:
         while (above := int(self.parent[nodes[-1]])) >= 0:
             nodes.append(above)
         return tuple(reversed(nodes))
+
+    def place_of(self, number: int) -> int | None:
+        """Where the node is by whose number rules are called.
+
+        Args:
+            number: As `number` has it.
+
+        Returns:
+            Node number; None where there is no such node.
+        """
+        places = np.flatnonzero(self.number == number)
+        return int(places[0]) if len(places) else None
 
     def rows(self, node: int) -> NDArray[np.int64]:
         """Rows of the demonstrations that reach a node.
@@ -539,6 +554,7 @@ def count_tree(
             if structure.label is None
             else np.where(structure.label < 0, frequent, structure.label)
         ),
+        number=np.arange(n, dtype=np.int64),
     )
 
 

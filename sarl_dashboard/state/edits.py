@@ -1,7 +1,8 @@
 """The edits of this session: on which rules, their history, and the set they make.
 
 Edits belong to the rules they were made on: those of the trees, whatever the thresholds are, the
-compact ones, or those of a file. They stay in the session, and an error loses none.
+compact ones, or those of a file. They stay in the session, and an error loses none. Those that
+regrow a part of a tree come first: rules are mined from the trees with them, at any thresholds.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.applications import labels_of
-from sarl_core.mining.editing.edits import Edit, History, apply, check_edit
+from sarl_core.mining.editing.edits import Edit, History, Regrow, apply, check_edit
+from sarl_core.mining.editing.regrowing import regrown_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.holding_out import with_untried_held_out
 from sarl_core.shielding.decisions import Ground, ground_of
@@ -25,8 +27,13 @@ from sarl_core.shielding.disagreement import sampled_states
 from sarl_core.shielding.effects import Verdicts, verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state import compact_set
-from sarl_dashboard.state.data import chosen_demonstrations, data_key, held_out_demonstrations
-from sarl_dashboard.state.mined import rules_at
+from sarl_dashboard.state.data import (
+    chosen_demonstrations,
+    data_key,
+    data_parts,
+    held_out_demonstrations,
+)
+from sarl_dashboard.state.mined import Trees, grown_trees, mined_rules, rules_at
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
     COMPACT_ENDINGS,
@@ -156,6 +163,7 @@ def do(of: Base, edit: Edit) -> None:
     """Make one more edit; for callbacks. What cannot be made is said on the page."""
     try:
         check_edit(edited(of), edit)
+        grown(of, (*history(of).edits, edit))
     except InputError as error:
         st.session_state["_edit_error"] = str(error)
     else:
@@ -174,7 +182,53 @@ def redo(of: Base) -> None:
 
 def edited(of: Base) -> RuleSet:
     """The rules with the edits."""
-    return _edited(of.rule_set, history(of).edits, _tried_on(of))
+    made = history(of).edits
+    return _edited(grown(of, made), made, _tried_on(of))
+
+
+def trees_with(of: Base, edits: tuple[Edit, ...]) -> Trees | None:
+    """The trees that some edits make of those that the rules were mined from.
+
+    Args:
+        of: The rules that are edited.
+        edits: The oldest first.
+
+    Returns:
+        One an action dimension; None for rules that were not mined here, which have none.
+
+    Raises:
+        InputError: If a part cannot be regrown.
+    """
+    demonstrations = chosen_demonstrations()
+    if of.kind != CHOSEN or demonstrations is None:
+        return None
+    trees = grown_trees(demonstrations, of.rule_set.divider)
+    for edit in edits:
+        if isinstance(edit, Regrow):
+            trees = _with_part(trees, edit, demonstrations)
+    return trees
+
+
+@cached(show_spinner="Growing a part of the tree …")
+def _with_part(trees: Trees, edit: Regrow, demonstrations: Demonstrations) -> Trees:
+    return regrown_trees(trees, (edit,), demonstrations)
+
+
+def grown(of: Base, edits: tuple[Edit, ...]) -> RuleSet:
+    """The rules before all other edits: mined from the trees whose parts some edits regrow.
+
+    Raises:
+        InputError: If a part cannot be regrown.
+    """
+    if not any(isinstance(edit, Regrow) for edit in edits):
+        return of.rule_set
+    trees = trees_with(of, edits)
+    if trees is None:
+        raise InputError(
+            "only rules at the thresholds have a tree of which a part can be regrown; choose "
+            "those, or take the edit back"
+        )
+    return mined_rules(trees, of.rule_set.thresholds, data_parts())
 
 
 def _tried_on(of: Base) -> Demonstrations | None:
@@ -216,6 +270,12 @@ def edited_rules() -> RuleSet:
     return edited(of)
 
 
+def edited_trees() -> Trees | None:
+    """The trees of the edited set; None where its rules were not mined here."""
+    of = base()
+    return trees_with(of, history(of).edits)
+
+
 # --- what they change --------------------------------------------------------------------------
 
 
@@ -237,7 +297,8 @@ def _basis(rule_set: RuleSet, demonstrations: Demonstrations | None) -> Basis:
 
 def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:
     """What the rules with some edits say of the states."""
-    return _verdicts(of.rule_set, edits, _tried_on(of), demonstrations_for(of.rule_set))
+    rule_set = grown(of, edits)
+    return _verdicts(rule_set, edits, _tried_on(of), demonstrations_for(rule_set))
 
 
 @cached()

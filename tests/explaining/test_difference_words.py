@@ -88,6 +88,12 @@ def test_a_change_and_a_conflict_in_words():
     assert edits_change_text(change(before, before), before, before, states="state") == (
         "None of 10 states is decided differently."
     )
+    # Shares that look the same in whole percents are told with more digits.
+    many = replace(after, labels=np.r_[np.ones((399, 1), int), [[-1]] * 601])
+    more = replace(many, labels=np.r_[np.ones((400, 1), int), [[-1]] * 600])
+    assert "Coverage rises from 39.9 % to 40.0 %." in edits_change_text(
+        change(many, more), many, more, states="state"
+    )
     assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (
         "R1 (right) takes 2 states from R2 (left); the expert did as R1 says in 0 of them, as R2 "
         "says in 2."

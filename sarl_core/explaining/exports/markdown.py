@@ -8,7 +8,7 @@ from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.words.evidence import held_out_interval_text, held_out_text
 from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.digits import limit_texts
-from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order
+from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.language import (
     action_text,
     counted,
@@ -39,7 +39,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
     # Rules that overlap or are off have counts that do not add up to a share of the states.
     summary = (
         f"They cover {share_text(rule_set.coverage)} of the states and are right in "
-        f"{share_text(rule_set.fidelity)} of those."
+        f"{share_text(rule_set.fidelity)} of those{regrown_text(rule_set)}."
         if is_plain(rule_set)
         else f"The set was {edits_counted(rule_set)}."
     )
@@ -93,6 +93,8 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
         name += ", by hand"
     elif rule.pinned:
         name += ", pinned"
+    if rule.regrown:
+        name += ", regrown"
     cells = [
         f"{name}{'' if rule.enabled else ', off'}",
         " and ".join(intervals) or "always",

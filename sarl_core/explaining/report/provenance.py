@@ -129,7 +129,10 @@ def mining_command(
         edited by hand.
     """
     plain = all(
-        rule.origin == "mined" and rule.enabled and not rule.pinned and rule.held_out is None
+        rule.origin == "mined"
+        and rule.enabled
+        and not (rule.pinned or rule.regrown)
+        and rule.held_out is None
         for rule in rule_set.rules
     )
     if rule_set.cut != "thresholds" or rule_set.source.digest != given.digest or not plain:

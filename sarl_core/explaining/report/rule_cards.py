@@ -183,6 +183,8 @@ def tags(rule: Rule) -> tuple[str, ...]:
         labels.append("written by hand")
     if rule.pinned:
         labels.append("put in its place by hand")
+    if rule.regrown:
+        labels.append("of a part of the tree that was regrown by hand")
     return tuple(labels)
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from sarl_core.mining.editing.edits import Add, Edit, Move, Pin, Remove, Switch, Unpin
+from sarl_core.mining.editing.edits import Add, Edit, Move, Pin, Regrow, Remove, Switch, Unpin
 from sarl_core.mining.language import (
     action_text,
     conditions_text,
     counted,
     label_text,
+    query_text,
     sentence,
     share_text,
 )
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.effects import Conflict, EditEffect, Verdicts
 
 
@@ -26,6 +27,9 @@ def edit_text(edit: Edit, rule_set: RuleSet) -> str:
     Returns:
         As "switch off R12" or "add a rule (always push right)".
     """
+    if isinstance(edit, Regrow):
+        query = Condition(edit.feature, "<=", edit.threshold)
+        return f"regrow a part ({query_text(query, rule_set.source.features)})"
     rule = rule_set.names.get(edit.rule_id, "a rule")
     if isinstance(edit, Switch):
         return f"switch {'on' if edit.on else 'off'} {rule}"
@@ -49,9 +53,10 @@ def state_text(rule: Rule) -> str:
         rule: Any.
 
     Returns:
-        As "mined", "pinned", "manual"; with ", off" where it is switched off.
+        As "mined", "regrown", "pinned", "manual"; with ", off" where it is switched off.
     """
-    kind = "manual" if rule.origin == "manual" else "pinned" if rule.pinned else "mined"
+    kind = "pinned" if rule.pinned else "regrown" if rule.regrown else "mined"
+    kind = "manual" if rule.origin == "manual" else kind
     return kind if rule.enabled else f"{kind}, off"
 
 
@@ -86,7 +91,7 @@ def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, 
         parts.append(f"by action: {', '.join(names)}")
     text += f" ({'; '.join(parts)})." if parts else "."
     moved = [
-        f"{name} {verb} from {share_text(old)} to {share_text(new)}"
+        f"{name} {verb} from {' to '.join(_apart(old, new))}"
         for name, old, new in (
             ("Coverage", before.coverage, after.coverage),
             ("fidelity", before.fidelity, after.fidelity),
@@ -98,6 +103,15 @@ def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, 
         numbers = " and ".join(moved)
         text += f" {numbers[:1].upper()}{numbers[1:]}."
     return text
+
+
+def _apart(old: float, new: float) -> tuple[str, str]:
+    """Two shares that differ, with as many digits as show it, where that is few."""
+    texts = share_text(old), share_text(new)
+    for decimals in (1, 2):
+        if texts[0] == texts[1]:
+            texts = share_text(old, decimals=decimals), share_text(new, decimals=decimals)
+    return texts
 
 
 def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:

@@ -25,11 +25,12 @@ from sarl_core.mining.language import (
     short_condition,
 )
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Bounds, Rule, node_of
+from sarl_core.mining.rules import LAST_REGROWN, Bounds, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.shielding.neighbourhood import FeatureChange
 
 _HALF = 0.5  # of a feature that is 1 or 0
+_LONGEST_NUMBER = len(str(LAST_REGROWN))
 
 
 @dataclass(frozen=True)
@@ -272,8 +273,8 @@ def node_of_way(
     if before != str(tree.index) or not (number.isascii() and number.isdigit()):
         return None
     # Longer numbers are no node's, and Python refuses to read the longest.
-    node = node_of(rule) if len(number) < 10 else tree.n_nodes
-    if node >= tree.n_nodes:
+    node = tree.place_of(node_of(rule)) if len(number) <= _LONGEST_NUMBER else None
+    if node is None:
         return None
     (own,) = rules_at(tree, np.array([node]))
     return node if set(own.bounds) == set(rule.bounds) else None

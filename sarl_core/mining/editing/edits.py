@@ -2,17 +2,26 @@
 
 An edit names a rule and changes no rule set. What is in force follows from the set that was mined
 and the edits on top of it, so that the thresholds may move below them: pinned and manual rules
-stay, and an edit of a rule that is no longer there waits until it comes back.
+stay, and an edit of a rule that is no longer there waits until it comes back. One that regrows a
+part of a tree changes what is mined, at all thresholds (`regrowing.regrown_trees`).
 """
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
+
+# A node's number has sixteen digits at most; what is longer was not written here.
+_REGROW = re.compile(
+    r"([0-9]{1,6})\.([0-9]{1,16}):([0-9]{1,6}):(-?[0-9]+(?:\.[0-9]+)?(?:e[+-]?[0-9]{1,3})?)",
+    re.ASCII,
+)
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,56 @@ class Remove:
     rule_id: str
 
 
-Edit = Switch | Pin | Unpin | Move | Add | Change | Remove
+@dataclass(frozen=True)
+class Regrow:
+    """Let a node of a tree ask another query, and grow the part below it anew.
+
+    Attributes:
+        dimension: Action dimension of the tree.
+        node: Number of the node, as rules are called by it.
+        feature: Index of the feature that it is to ask about.
+        threshold: A state goes left where the feature is at most this.
+    """
+
+    dimension: int
+    node: int
+    feature: int
+    threshold: float
+
+    @property
+    def rule_id(self) -> str:
+        """Of the rule that a cut at the node gives."""
+        return f"{self.dimension}.{self.node}"
+
+    @property
+    def text(self) -> str:
+        """For a link, as "0.12:3:0.0254"; `of` reads it."""
+        return f"{self.rule_id}:{self.feature}:{self.threshold!r}"
+
+    @classmethod
+    def of(cls, text: str) -> Regrow:
+        """Read what `text` wrote.
+
+        Args:
+            text: From anywhere.
+
+        Returns:
+            Four numbers; whether there are such a node and feature is seen where it is done.
+
+        Raises:
+            InputError: If it is no such text.
+        """
+        parts = _REGROW.fullmatch(text)
+        if parts is None or not math.isfinite(float(parts[4])):
+            raise InputError(
+                f"{quoted(text)} says no part to regrow; give dimension.node:feature:threshold, as "
+                "0.12:3:0.0254"
+            )
+        return cls(int(parts[1]), int(parts[2]), int(parts[3]), float(parts[4]))
+
+
+_OfRule = Switch | Pin | Unpin | Move | Add | Change | Remove
+Edit = _OfRule | Regrow
 
 
 @dataclass(frozen=True)
@@ -147,7 +205,8 @@ def apply(rule_set: RuleSet, edits: Iterable[Edit]) -> RuleSet:
     """The rule set that edits make of another.
 
     Args:
-        rule_set: What was mined, or read from a file.
+        rule_set: What was mined, or read from a file; where a part of its trees is to be regrown,
+            what was mined from those (`regrowing.regrown_trees`).
         edits: The oldest first. One whose rule is not there changes nothing.
 
     Returns:
@@ -159,7 +218,8 @@ def apply(rule_set: RuleSet, edits: Iterable[Edit]) -> RuleSet:
         return rule_set
     desk = _Desk(rule_set)
     for edit in edits:
-        desk.take(edit)
+        if not isinstance(edit, Regrow):  # the rules are those of the trees with it
+            desk.take(edit)
     return desk.result()
 
 
@@ -173,7 +233,7 @@ class _Desk:
         self._placed = [rule.id for rule in rule_set.rules if rule.placed]
         self._on: dict[str, bool] = {}
 
-    def take(self, edit: Edit) -> None:
+    def take(self, edit: _OfRule) -> None:
         rule_id = edit.rule_id
         if isinstance(edit, Switch):
             self._on[rule_id] = edit.on
@@ -241,11 +301,13 @@ def check_edit(rule_set: RuleSet, edit: Edit) -> None:
 
     Args:
         rule_set: In force, with all edits so far.
-        edit: The next one.
+        edit: The next one. Whether a part can be regrown is seen where that is done.
 
     Raises:
         InputError: If its rule is not there, or nothing can be done to it in this way.
     """
+    if isinstance(edit, Regrow):
+        return
     rule = next((one for one in rule_set.rules if one.id == edit.rule_id), None)
     if isinstance(edit, Add):
         if rule is not None:

@@ -10,6 +10,7 @@ from sarl_dashboard.state.edits import Base
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.edit import form
 from sarl_dashboard.views.edit.conflicts import conflicts
+from sarl_dashboard.views.edit.part import part
 from sarl_dashboard.views.edit.rule import chosen_rule
 from sarl_dashboard.views.edit.table import table
 from sarl_dashboard.views.edit.totals import bar, numbers
@@ -32,6 +33,7 @@ def editing(of: Base) -> None:
             wish = chosen_rule(of, rule, after)
             if wish:
                 form.begin(of, rule, changing=wish == "change")
+            part(of, rule, after)
     else:
         st.info(
             "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "

@@ -52,7 +52,8 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
     with st.container(horizontal=True, gap="small", vertical_alignment="bottom"):
         words = search_box()
         view = switch("Show", "rules_shown", [EVERY, TOUCHED])
-    rows = _rows(of.rule_set, edits.history(of).edits, view == TOUCHED, words)
+    made = edits.history(of).edits
+    rows = _rows(edits.grown(of, made), made, view == TOUCHED, words)
     order = rows.order
     if not order:
         st.info(
@@ -96,7 +97,7 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
 
 
 def _touched(rule: Rule) -> bool:
-    return rule.placed or not rule.enabled
+    return rule.placed or rule.regrown or not rule.enabled
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +172,9 @@ def _columns(rule_set: RuleSet) -> dict[str, Any]:
     return {
         "On": column.CheckboxColumn(width=40, help="Whether a shield uses the rule"),
         "Kind": column.TextColumn(
-            width=70, help="Mined; pinned, so that it keeps its place; or added by hand"
+            width=70,
+            help="Mined; regrown, with a part of the tree; pinned, so that it keeps its place; or "
+            "added by hand",
         ),
         "Rule": column.TextColumn(
             width=80, help="Its name: rules are numbered by their place in the set"

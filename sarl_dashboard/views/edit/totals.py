@@ -7,8 +7,9 @@ import streamlit as st
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.html.number_cards import Number, number_cards
 from sarl_core.explaining.words.edits import edit_text, edits_change_text
+from sarl_core.mining.editing.edits import Edit, Regrow
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rule_set import rules_to_json
+from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.state import edits
@@ -28,7 +29,7 @@ def bar(of: Base) -> None:
             ("Undo", "undo", edits.undo, history.edits[-1:]),
             ("Redo", "redo", edits.redo, history.undone[-1:]),
         ):
-            sentence = edit_text(waiting[0], rule_set) if waiting else ""
+            sentence = edit_text(waiting[0], _with(of, waiting)) if waiting else ""
             st.button(
                 f"{name}: {escaped(_short(sentence))}" if sentence else name,
                 on_click=step,
@@ -53,6 +54,14 @@ def bar(of: Base) -> None:
                 icon=":material/difference:",
                 query_params={"first": "before the edits", "second": "edited"},
             )
+
+
+def _with(of: Base, waiting: tuple[Edit, ...]) -> RuleSet:
+    """The rules that know what an edit speaks of: of one that is undone, those it would make."""
+    made = edits.history(of).edits
+    if isinstance(waiting[0], Regrow) and waiting != made[-1:]:
+        return edits.grown(of, (*made, *waiting))
+    return edits.edited(of)
 
 
 def _short(text: str, most: int = 44) -> str:

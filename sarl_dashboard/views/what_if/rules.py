@@ -60,7 +60,7 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
     if fitted is not None:
         edited, notes = rules_for(edited, fitted)
         notes_notice(notes)
-        return RulesOnTrees(edited, in_force.trees, in_force.leaves)
+        return RulesOnTrees(edited, edits.edited_trees() or in_force.trees, in_force.leaves)
     st.info(
         "The edited rules speak of other features or actions than the chosen demonstrations, "
         "so the rules in force are shown instead; choose the demonstrations of their "
