@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import streamlit as st
 
 from sarl_core.explaining.templates import style_sheet
-from sarl_dashboard.components.sidebar import sidebar
-from sarl_dashboard.session import settle
+from sarl_dashboard.components.sidebar import require_data, sidebar
+from sarl_dashboard.session import ICON, settle
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -20,7 +19,7 @@ from sarl_dashboard.state.url import (
 
 st.set_page_config(
     page_title="SARL Explorer",
-    page_icon=str(Path(__file__).parent / "icon.png"),  # a named icon would come from the network
+    page_icon=str(ICON),  # a named icon would come from the network
     layout="wide",
     initial_sidebar_state="auto",
 )
@@ -104,6 +103,11 @@ PAGES = [
         icon=":material/content_cut:",
     ),
     st.Page(
+        "library.py",
+        title="Library",
+        icon=":material/inventory_2:",
+    ),
+    st.Page(
         "improve.py",
         title="Improve",
         icon=":material/trending_up:",
@@ -138,6 +142,8 @@ st.html(style_sheet())
 show_left_out(page.title)
 sidebar(with_thresholds=page.title != "Thresholds")
 try:
+    if page.title != "Library":
+        require_data(page.title)
     page.run()
 finally:  # also where the page ends early
     settle(page.title, len(sys.modules))

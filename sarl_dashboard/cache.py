@@ -215,4 +215,5 @@ def owner() -> str:
     """Digest of the upload that the page works on, "" where it works on none."""
     upload = st.session_state.get("_upload")
     chosen = st.session_state.get("_data")
-    return str(upload.digest) if upload is not None and chosen == "upload" else ""
+    names = ("upload", st.session_state.get("_upload_id"))
+    return str(upload.digest) if upload is not None and chosen in names else ""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -12,6 +14,13 @@ from tests.toys import TOYS
 # An example that takes long on a busy machine is no failure.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_library(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """What tests upload is kept nowhere else."""
+    os.environ["SARL_LIBRARY"] = str(tmp_path_factory.mktemp("kept"))
+    os.environ["SARL_AUTHOR"] = "Tester"
 
 
 @pytest.fixture(scope="session")

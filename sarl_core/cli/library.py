@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +11,7 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.options import Json, out_option
 from sarl_core.errors import InputError
+from sarl_core.library.place import usual_author
 
 if TYPE_CHECKING:
     from sarl_core.library import Item, Library
@@ -96,7 +95,7 @@ def list_items(
             for item in items
         ],
     )
-    usage = opened.usage(_author())
+    usage = opened.usage(usual_author())
     if usage.warning:
         terminal.print_notes([usage.warning])
 
@@ -160,7 +159,7 @@ def import_file(
     from sarl_core.library.bundles import import_bundle
     from sarl_core.library.contents import add_demonstrations, add_rules
 
-    opened, author = _opened(), _author()
+    opened, author = _opened(), usual_author()
     if file.suffix.lower() == _BUNDLE:
         if name is not None:
             raise InputError("what was exported has names; leave --name out")
@@ -198,7 +197,7 @@ def remove_item(
 
     Example: `python -m sarl_core library remove ID`
     """
-    opened, author = _opened(), _author()
+    opened, author = _opened(), usual_author()
     if undo:
         _tell([opened.restore(identifier, author=author)], "is back", as_json)
         return
@@ -217,7 +216,7 @@ def approve_item(
 
     Example: `python -m sarl_core library approve ID --note "Held against the logs of March."`
     """
-    author = _author()
+    author = usual_author()
     _tell([_opened().approve(identifier, author=author, note=note)], "is approved", as_json)
 
 
@@ -225,17 +224,6 @@ def _opened() -> Library:
     from sarl_core.library import Library
 
     return Library()
-
-
-def _author() -> str:
-    """Who types: on one person's machine nobody has to say."""
-    given = os.environ.get("SARL_AUTHOR", "").strip()
-    if given:
-        return given
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError, ImportError):  # of a number without a name
-        return "somebody"
 
 
 def _tell(items: Sequence[Item], what: str, as_json: bool) -> None:

@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
-from sqlalchemy import Connection, Row, delete, func, insert, or_, select, update
+from sqlalchemy import Connection, delete, or_, select, update
 
 from sarl_core.errors import InputError, quoted
 from sarl_core.library import tables
@@ -17,6 +17,14 @@ from sarl_core.library.database import Database
 from sarl_core.library.file_store import FileStore
 from sarl_core.library.items import KINDS, Approval, Item, ItemFile, Kind, as_id, new_id
 from sarl_core.library.place import LibraryPlace, place_of
+from sarl_core.library.rows import (
+    files_where,
+    insert_approval,
+    insert_item,
+    item_of_row,
+    sizes_where,
+    time_text,
+)
 
 _GIGABYTE = 10**9
 _LONGEST_NAME = 200
@@ -144,9 +152,7 @@ class Library:
         """
         if kind not in KINDS:
             raise InputError(f"{quoted(kind)} is no kind of thing; choose from {', '.join(KINDS)}")
-        written = json.dumps(dict(details or {}), allow_nan=False)
-        if len(written) > _LONGEST_DETAILS:
-            raise InputError("the details have more than 1 MB; put them into a file")
+        written = _written(details or {})
         described = {
             role: self._store.describe(role, source, ending)
             for role, (source, ending) in files.items()
@@ -174,7 +180,7 @@ class Library:
         self._put(item, contents)
         with self._database.writing() as connection:
             self._require_room(connection, author, item.files)  # others may have written meanwhile
-            _insert(connection, item)
+            insert_item(connection, item)
             self._put(item, contents)  # who removed the last thing with this file may be faster
         return item
 
@@ -207,7 +213,7 @@ class Library:
             for item, files in items:
                 known = select(tables.items.c.id).where(tables.items.c.id == item.id)
                 if connection.execute(known).first() is None:
-                    _insert(connection, item)
+                    insert_item(connection, item)
                     self._put(item, files)
         return [self.item(item.id) for item, _ in items]
 
@@ -322,7 +328,7 @@ class Library:
             connection.execute(
                 delete(tables.approvals).where(at.item == item.id, at.author == approval.author)
             )
-            _insert_approval(connection, item.id, approval)
+            insert_approval(connection, item.id, approval)
         return self.item(item.id)
 
     def rename(self, identifier: str, name: str, *, author: str) -> Item:
@@ -333,6 +339,21 @@ class Library:
             WorkError: If it cannot be written.
         """
         return self._update(identifier, author, {"name": _named(name)})
+
+    def annotate(self, identifier: str, details: Mapping[str, Any], *, author: str) -> Item:
+        """Say more about something: what it holds stays what it was.
+
+        Args:
+            identifier: Of what.
+            details: What is said besides, or in the place of what was said under these names.
+            author: Whose it is.
+
+        Raises:
+            InputError: If it is somebody else's, or the details are too long.
+            WorkError: If it cannot be written.
+        """
+        known = self.item(identifier).details
+        return self._update(identifier, author, {"details": _written({**known, **details})})
 
     def share(self, identifier: str, *, author: str, shared: bool = True) -> Item:
         """Let something stand in everybody's list, or no longer.
@@ -350,7 +371,7 @@ class Library:
             InputError: If it is somebody else's.
             WorkError: If it cannot be written.
         """
-        return self._update(identifier, author, {"removed": _time(_now())})
+        return self._update(identifier, author, {"removed": time_text(_now())})
 
     def restore(self, identifier: str, *, author: str) -> Item:
         """Bring back what was removed.
@@ -374,8 +395,8 @@ class Library:
             WorkError: If the library cannot be read.
         """
         with self._database.reading() as connection:
-            own = _sizes(connection, tables.items.c.author == author)
-            return Usage(sum(own.values()), sum(_sizes(connection).values()), self.quota)
+            own = sizes_where(connection, tables.items.c.author == author)
+            return Usage(sum(own.values()), sum(sizes_where(connection).values()), self.quota)
 
     def sweep(self) -> int:
         """Remove for good what was removed 30 days ago, and files that nothing speaks of.
@@ -386,20 +407,20 @@ class Library:
         Raises:
             WorkError: If it cannot be written.
         """
-        before = _time(_now() - _UNDONE_FOR)
+        before = time_text(_now() - _UNDONE_FOR)
         at = tables.items.c
         with self._database.writing() as connection:
             gone = connection.execute(select(at.id).where(at.removed < before)).scalars().all()
             files = [
                 file
                 for identifier in gone
-                for file in _files(connection, tables.files.c.item == identifier)
+                for file in files_where(connection, tables.files.c.item == identifier)
             ]
             connection.execute(delete(tables.items).where(at.id.in_(gone)))
         # In a step of its own: killed between the two, a file is left over, and none is missing.
         for file in [file for _, file in files] + self._store.older_than(_LEFT_OVER_FOR):
             with self._database.writing() as connection:
-                if not _files(connection, tables.files.c.digest == file.digest):
+                if not files_where(connection, tables.files.c.digest == file.digest):
                     self._store.forget(file)
         return len(gone)
 
@@ -410,7 +431,7 @@ class Library:
             ).all()
             chosen = select(tables.items.c.id).where(*wanted)
             files: dict[str, list[ItemFile]] = {}
-            for owner, file in _files(connection, tables.files.c.item.in_(chosen)):
+            for owner, file in files_where(connection, tables.files.c.item.in_(chosen)):
                 files.setdefault(owner, []).append(file)
             approvals: dict[str, list[Approval]] = {}
             at = tables.approvals.c
@@ -420,7 +441,7 @@ class Library:
                 approvals.setdefault(one.item, []).append(
                     Approval(one.author, one.note, datetime.fromisoformat(one.created))
                 )
-        return [_item(row, files.get(row.id, ()), approvals.get(row.id, ())) for row in rows]
+        return [item_of_row(row, files.get(row.id, ()), approvals.get(row.id, ())) for row in rows]
 
     def _standing(self, identifier: str) -> Item:
         item = self.item(identifier)
@@ -460,7 +481,7 @@ class Library:
             ((own,), self.quota.author, f"{author} may keep"),
             ((), self.quota.whole, "the library may keep"),
         ):
-            there = _sizes(connection, *wanted)
+            there = sizes_where(connection, *wanted)
             after = sum((there | sizes).values())
             if after > most and sizes.keys() - there.keys():
                 raise InputError(
@@ -469,86 +490,11 @@ class Library:
                 )
 
 
-def _insert(connection: Connection, item: Item) -> None:
-    """Write an item with its files and approvals."""
-    number = connection.execute(select(func.max(tables.items.c.number))).scalar() or 0
-    connection.execute(
-        insert(tables.items).values(
-            id=item.id,
-            number=number + 1,
-            kind=item.kind,
-            name=item.name,
-            author=item.author,
-            created=_time(item.created),
-            digest=item.digest,
-            lineage=item.lineage,
-            parent=item.parent,
-            came_from=json.dumps(list(item.came_from)),
-            command=item.command,
-            details=json.dumps(dict(item.details)),
-            shared=item.shared,
-            removed=None,
-        )
-    )
-    for one in item.files:
-        connection.execute(
-            insert(tables.files).values(
-                item=item.id, role=one.role, digest=one.digest, ending=one.ending, size=one.size
-            )
-        )
-    for approval in item.approvals:
-        _insert_approval(connection, item.id, approval)
-
-
-def _insert_approval(connection: Connection, identifier: str, approval: Approval) -> None:
-    connection.execute(
-        insert(tables.approvals).values(
-            item=identifier,
-            author=approval.author,
-            note=approval.note,
-            created=_time(approval.created),
-        )
-    )
-
-
-def _item(row: Row[Any], files: Sequence[ItemFile], approvals: Sequence[Approval]) -> Item:
-    return Item(
-        id=row.id,
-        kind=row.kind,
-        name=row.name,
-        author=row.author,
-        created=datetime.fromisoformat(row.created),
-        digest=row.digest,
-        lineage=row.lineage,
-        parent=row.parent,
-        came_from=tuple(json.loads(row.came_from)),
-        command=row.command,
-        details=json.loads(row.details),
-        shared=bool(row.shared),
-        removed=None if row.removed is None else datetime.fromisoformat(row.removed),
-        files=tuple(files),
-        approvals=tuple(approvals),
-    )
-
-
-def _files(connection: Connection, *wanted: Any) -> list[tuple[str, ItemFile]]:
-    """Ids of things, and files of theirs."""
-    rows = connection.execute(
-        select(tables.files).where(*wanted).order_by(tables.files.c.item, tables.files.c.role)
-    )
-    return [(row.item, ItemFile(row.role, row.digest, row.ending, row.size)) for row in rows]
-
-
-def _sizes(connection: Connection, *wanted: Any) -> dict[str, int]:
-    """Bytes of each file, by its digest, of things that are not removed."""
-    at = tables.files.c
-    rows = connection.execute(
-        select(at.digest, at.size)
-        .join(tables.items, tables.items.c.id == at.item)
-        .where(tables.items.c.removed.is_(None), *wanted)
-        .distinct()
-    )
-    return {row.digest: row.size for row in rows}
+def _written(details: Mapping[str, Any]) -> str:
+    text = json.dumps(dict(details), allow_nan=False)
+    if len(text) > _LONGEST_DETAILS:
+        raise InputError("the details have more than 1 MB; put them into a file")
+    return text
 
 
 def _named(name: str) -> str:
@@ -572,10 +518,6 @@ def _author(author: str) -> str:
 
 def _now() -> datetime:
     return datetime.now(UTC)
-
-
-def _time(time: datetime) -> str:
-    return time.isoformat(timespec="microseconds")
 
 
 def _in_gigabytes(size: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from sarl_core.errors import InputError, quoted
 
 LIBRARY = "SARL_LIBRARY"  # environment variable: a folder, or the address of a database
 LIBRARY_FILES = "SARL_LIBRARY_FILES"  # the folder of the files, where that is a database
+AUTHOR = "SARL_AUTHOR"  # environment variable: who works here
 _DATABASE = "library.sqlite3"
 _POSTGRESQL = ("postgresql://", "postgres://")
 
@@ -71,6 +73,17 @@ def place_of(text: str | Path | None = None) -> LibraryPlace:
         )
     path = Path(given).expanduser() if given else _own()
     return LibraryPlace(f"sqlite:///{path.absolute() / _DATABASE}", path, str(path))
+
+
+def usual_author() -> str:
+    """Who works here, where nobody says so: the environment variable `AUTHOR`, or the account."""
+    given = os.environ.get(AUTHOR, "").strip()
+    if given:
+        return given
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):  # of an account without a name
+        return "somebody"
 
 
 def _own() -> Path:

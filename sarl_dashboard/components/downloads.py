@@ -18,6 +18,7 @@ MIMES = {
     ".gif": "image/gif",
     ".html": "text/html",
     ".json": "application/json",
+    ".sarl": "application/zip",
     ".md": "text/markdown",
     ".mp4": "video/mp4",
     ".npz": "application/octet-stream",

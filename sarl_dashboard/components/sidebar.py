@@ -16,8 +16,8 @@ from sarl_dashboard.state.data import (
     all_demonstrations,
     choose_dataset,
     chosen_dataset,
-    dataset_label,
-    dataset_names,
+    data_problem,
+    dataset_labels,
     uncombined_demonstrations,
 )
 from sarl_dashboard.state.thresholds import (
@@ -27,6 +27,7 @@ from sarl_dashboard.state.thresholds import (
     chosen_divider,
     chosen_thresholds,
 )
+from sarl_dashboard.text import refuse
 
 
 def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
@@ -46,6 +47,19 @@ def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
                 st.query_params[name] = threshold_text(value)
 
 
+def require_data(title: str) -> None:
+    """Where a link names what is not here, say so and stop: nothing takes its place.
+
+    Args:
+        title: Of the page.
+    """
+    if problem := data_problem():
+        st.title(title)
+        refuse(problem)
+        st.page_link("library.py", label="Go to Library", icon=":material/arrow_forward:")
+        st.stop()
+
+
 def sidebar(*, with_thresholds: bool = True) -> None:
     """The choice of data, and which rules are in force.
 
@@ -62,15 +76,20 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         _keep_in_url(thresholds, divider)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
     st.session_state["_data_choice"] = name
+    labels = dataset_labels()
     with st.sidebar:
         st.selectbox(
             "Data",
-            dataset_names(),
-            format_func=dataset_label,
+            list(labels),
+            format_func=labels.__getitem__,
             key="_data_choice",
             on_change=lambda: choose_dataset(st.session_state["_data_choice"]),
         )
-        demonstrations = uncombined_demonstrations()
+        problem = data_problem()
+        demonstrations = None if problem else uncombined_demonstrations()
+        if problem:
+            st.caption("What the address names is not here.")
+            return
         if demonstrations is None:
             st.caption("Nothing uploaded yet: see the Demonstrations page.")
             return

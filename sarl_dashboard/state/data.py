@@ -7,6 +7,7 @@ a table) go through `url_choice`.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import cast
 
 import streamlit as st
@@ -15,9 +16,9 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
-from sarl_dashboard.state import combining, formulas, given_names, hold_out
+from sarl_dashboard.state import combining, formulas, given_names, hold_out, library
 from sarl_dashboard.state.hold_out import Parts
-from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import refuse
 
 SHIPPED_SETS = {
@@ -30,25 +31,64 @@ SHIPPED_SETS = {
 }
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"
+_MOST_LISTED = 20  # of what is kept; the page Library has all
+_LONGEST = 200  # signs of a name in an address
 DATA_FOLDER = DATA / "demonstrations"
 
 
 # --- what is chosen ----------------------------------------------------------------------------
 
 
-def dataset_names() -> tuple[str, ...]:
-    """What the URL parameter `data` may be: the shipped sets, and "upload"."""
-    return (*SHIPPED_SETS, UPLOAD)
+def dataset_labels() -> dict[str, str]:
+    """What may be chosen, and what it is called: shipped sets, what is kept, an upload.
+
+    Also what a link names that is not here.
+    """
+    labels = {name: dataset_label(name) for name in SHIPPED_SETS}
+    own = library.own_demonstrations()
+    labels |= {item.id: item.name for item in own[:_MOST_LISTED]}
+    if not st.session_state.get("_upload_id"):  # it has a place in the list
+        labels[UPLOAD] = dataset_label(UPLOAD)
+    name = chosen_dataset()
+    return labels if name in labels else labels | {name: dataset_label(name)}
 
 
 def dataset_label(name: str) -> str:
     """What a data set is called on screen."""
-    return SHIPPED_SETS[name][0] if name in SHIPPED_SETS else "Your upload"
+    if name in SHIPPED_SETS:
+        return SHIPPED_SETS[name][0]
+    if name == UPLOAD:
+        return "Your upload"
+    try:
+        return library.standing_item(name).name
+    except SarlError:
+        return "Not here"
 
 
 def chosen_dataset() -> str:
-    """Name of the chosen data set, one of `dataset_names`."""
-    return url_choice("data", dataset_names(), DEFAULT_DATA)
+    """What is chosen: the name of a shipped set, an id of the library, or "upload".
+
+    A link may name anything: what is not there is said (`data_problem`) and nothing else shown.
+    """
+    return url_text("data", DEFAULT_DATA, lambda text: len(text) <= _LONGEST)
+
+
+def data_problem() -> str:
+    """Why what a link or a choice names cannot be shown; "" where it can."""
+    name = chosen_dataset()
+    if name in SHIPPED_SETS or name == UPLOAD:
+        return ""
+    if not library.is_id(name):
+        return (
+            f"there are no demonstrations called {name!r}; check the address, or choose others in "
+            "the sidebar"
+        )
+    try:
+        if st.session_state.get("_upload_id") != name:
+            library.stored_demonstrations(name)
+    except SarlError as error:
+        return str(error)
+    return ""
 
 
 def choose_dataset(name: str) -> None:
@@ -68,12 +108,29 @@ def set_upload(demonstrations: Demonstrations, *, file_name: str = "") -> None:
     visit().bring(demonstrations.digest)
     st.session_state["_upload"] = demonstrations
     st.session_state["_upload_name"] = file_name
-    choose_dataset(UPLOAD)
+    st.session_state["_upload_id"] = ""
+    try:
+        identifier = library.keep(demonstrations, file_name or "demonstrations")
+    except SarlError as error:
+        library.say_once(error)
+        choose_dataset(UPLOAD)
+        return
+    st.session_state["_upload_id"] = identifier
+    _with_notes(demonstrations)
+    choose_dataset(identifier)
 
 
 def upload_name() -> str:
-    """Of the file that was uploaded, as the command line would name it."""
+    """What the command line would take for the chosen demonstrations that are not shipped."""
+    name = chosen_dataset()
+    if library.is_id(name) and name != st.session_state.get("_upload_id"):
+        return f"library:{name}"
     return str(st.session_state.get("_upload_name") or "demonstrations.parquet")
+
+
+def is_upload_chosen() -> bool:
+    """Whether what was uploaded last in this visit is what is chosen."""
+    return chosen_dataset() in (UPLOAD, st.session_state.get("_upload_id"))
 
 
 def uploaded_demonstrations() -> Demonstrations | None:
@@ -84,16 +141,33 @@ def uploaded_demonstrations() -> Demonstrations | None:
 def raw_demonstrations() -> Demonstrations | None:
     """The chosen demonstrations as they were read; None while nothing is uploaded.
 
-    A shipped file that cannot be read is said on the page, which then stops.
+    What cannot be read is said on the page, which then stops.
     """
     name = chosen_dataset()
-    if name == UPLOAD:
+    if is_upload_chosen():
         return uploaded_demonstrations()
     try:
+        if name not in SHIPPED_SETS:
+            return _with_notes(library.stored_demonstrations(name))
         return shipped_demonstrations(name)
     except SarlError as error:
         refuse(error)
         st.stop()
+
+
+def _with_notes(raw: Demonstrations) -> Demonstrations:
+    """Kept demonstrations, in the first run of a visit with the names and formulas they had."""
+    ready = st.session_state.setdefault("_restored", set())
+    if raw.digest not in ready:
+        ready.add(raw.digest)
+        details = library.details_of(raw)
+        # What does not fit was written by another version; the data themselves are here.
+        with suppress(SarlError, KeyError, TypeError):
+            if details.get(formulas.DETAIL):
+                formulas.restore(raw, details[formulas.DETAIL])
+            if details.get(given_names.DETAIL):
+                given_names.restore(raw, details[given_names.DETAIL])
+    return raw
 
 
 # The way of the data: as it was read (`raw_demonstrations`), with a visitor's `formulas` and under

@@ -6,14 +6,19 @@ changes no formula.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import cast
 
 import streamlit as st
 
-from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.dataset import Demonstrations, formula_feature
 from sarl_core.demonstrations.derived import DerivedFeature, formula_texts
 from sarl_core.environments.formulas import Formula
 from sarl_dashboard.cache import cached
+from sarl_dashboard.state import library
+
+DETAIL = "formulas"
+"""Where formulas stand among what is said of kept demonstrations."""
 
 Derived = tuple[DerivedFeature, ...]
 
@@ -38,6 +43,13 @@ def put(raw: Demonstrations, derived: Derived) -> None:
         _written().pop(raw.digest, None)
     else:
         _written()[raw.digest] = derived
+    changed = _written().get(raw.digest)
+    library.annotate(raw, {DETAIL: None if changed is None else list(formula_texts(changed))})
+
+
+def restore(raw: Demonstrations, texts: Sequence[str]) -> None:
+    """Let that be derived which was written in another visit."""
+    _written()[raw.digest] = tuple(formula_feature(text, raw.observed) for text in texts)
 
 
 def without(derived: Derived, place: int) -> Derived:

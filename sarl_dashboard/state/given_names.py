@@ -5,7 +5,8 @@ They belong to the data as they were read, whatever episodes are left out or hel
 
 from __future__ import annotations
 
-from typing import cast
+from collections.abc import Mapping
+from typing import Any, cast
 
 import streamlit as st
 
@@ -13,7 +14,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
 from sarl_core.errors import InputError
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state import formulas
+from sarl_dashboard.state import formulas, library
+
+DETAIL = "names"
+"""Where names stand among what is said of kept demonstrations."""
 
 
 def _given() -> dict[str, Names]:
@@ -61,16 +65,31 @@ def give(raw: Demonstrations, names: Names) -> None:
     _drafts()[raw.digest] = names
     if not problem(raw):
         put = tidy(names)
-        if put == names_of(raw):
+        own = put == names_of(raw)
+        if own:
             _given().pop(raw.digest, None)
         else:
             _given()[raw.digest] = put
+        library.annotate(raw, {DETAIL: None if own else put._asdict()})
 
 
 def reset(raw: Demonstrations) -> None:
     """Go back to the names that the data came with; for callbacks."""
     _drafts().pop(raw.digest, None)
     _given().pop(raw.digest, None)
+    library.annotate(raw, {DETAIL: None})
+
+
+def restore(raw: Demonstrations, names: Mapping[str, Any]) -> None:
+    """Give the names that were given in another visit, if they fit."""
+    put = Names(
+        features=tuple(names["features"]),
+        units=tuple(names["units"]),
+        actions=tuple(names["actions"]),
+        labels=tuple(tuple(one) for one in names["labels"]),
+    )
+    _renamed(formulas.deriving(raw), put)
+    _given()[raw.digest] = put
 
 
 @cached()

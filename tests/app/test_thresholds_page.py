@@ -71,7 +71,7 @@ def test_a_link_opens_what_it_says() -> None:
     [
         {"support": "abc", "confidence": "7"},
         {"support": "-1", "confidence": "nan"},
-        {"data": "nonsense", "layer": "zzz", "view": "", "grid": "1"},
+        {"layer": "zzz", "view": "", "grid": "1"},
         {"lift": "-3", "depth": "x", "divider": "99"},
     ],
 )

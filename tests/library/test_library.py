@@ -78,6 +78,18 @@ def test_removing_is_the_authors_and_can_be_undone(library: Library) -> None:
     assert library.rename(item.id, " another\n name ", author="Ada").name == "another name"
 
 
+def test_more_can_be_said_of_a_thing_and_it_stays_what_it_is(library: Library) -> None:
+    item = note(library, details={"a": 1, "b": 2})
+    told = library.annotate(item.id, {"b": 3, "c": ["x"]}, author="Ada")
+    assert told == library.item(item.id)
+    assert told.details == {"a": 1, "b": 3, "c": ["x"]}
+    assert told.files == item.files
+    with pytest.raises(InputError, match="who alone may change"):
+        library.annotate(item.id, {}, author="Bob")
+    with pytest.raises(InputError, match="more than 1 MB"):
+        library.annotate(item.id, {"x": "y" * 2**20}, author="Ada")
+
+
 def test_what_was_removed_long_ago_is_gone_and_files_that_others_hold_stay(
     library: Library, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,8 +24,7 @@ from sarl_dashboard.components.safety import Tile, safety_tiles
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.jobs.improving import Outcome
 from sarl_dashboard.state.data import (
-    UPLOAD,
-    chosen_dataset,
+    is_upload_chosen,
     set_upload,
     uploaded_demonstrations,
 )
@@ -239,7 +238,7 @@ def take_away(outcome: Outcome, improved: Aggregation) -> None:
             key="use_improved",
             on_click=use,
             args=(improved, name),
-            disabled=in_use and chosen_dataset() == UPLOAD,
+            disabled=in_use and is_upload_chosen(),
             help="Every page then works on them, as if you had uploaded them.",
         )
         download(

@@ -14,7 +14,7 @@ from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.jobs.report import ReportOrder, as_results, comparison_of_session
 from sarl_dashboard.state.data import (
-    UPLOAD,
+    SHIPPED_SETS,
     chosen_dataset,
     raw_demonstrations,
     upload_name,
@@ -98,7 +98,7 @@ def file_names(choices: ReportChoices) -> tuple[str, str]:
     """Of the rules and of the demonstrations, as the command line would name them."""
     name = chosen_dataset()
     data = f"data/demonstrations/{name}.parquet"
-    if name == UPLOAD:
+    if name not in SHIPPED_SETS:
         data = upload_name()
     rules = "rules.json"
     if choices.rules in COMPACT_ENDINGS:

@@ -1,0 +1,148 @@
+"""What visitors make, kept beyond their session: opened once, and doing without where it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from threading import Lock
+from typing import Any, cast
+
+import streamlit as st
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError, SarlError
+from sarl_core.library import Item, Library
+from sarl_core.library.contents import add_demonstrations, demonstrations_of
+from sarl_core.library.items import as_id
+from sarl_core.library.place import LibraryPlace, place_of, usual_author
+from sarl_dashboard.cache import cached
+
+_OPENED: dict[LibraryPlace, Library] = {}
+_LOCK = Lock()
+
+
+def library() -> Library:
+    """The library of this server, opened once for all visits.
+
+    Raises:
+        SarlError: If it cannot be opened.
+    """
+    place = place_of()
+    with _LOCK:
+        if place not in _OPENED:
+            _OPENED[place] = Library(place)
+        return _OPENED[place]
+
+
+def author() -> str:
+    """Who works here."""
+    return usual_author()
+
+
+def is_id(text: str) -> bool:
+    """Whether a text may be the id of something that is kept."""
+    try:
+        return as_id(text) == text
+    except InputError:
+        return False
+
+
+def own_demonstrations() -> list[Item]:
+    """The demonstrations in a visitor's list, the newest first; [] where there is no library."""
+    try:
+        return library().items(author(), kind="demonstrations")
+    except SarlError:
+        return []
+
+
+def standing_item(identifier: str) -> Item:
+    """What is kept under an id.
+
+    Raises:
+        SarlError: If there is none, it was removed, or the library cannot be read.
+    """
+    item = library().item(identifier)
+    if item.removed is not None:
+        raise InputError(
+            f"{item.name} was removed by {item.author}, who can bring it back on the page Library; "
+            "ask for it, or choose other data"
+        )
+    return item
+
+
+def stored_demonstrations(identifier: str) -> Demonstrations:
+    """Demonstrations that are kept.
+
+    Raises:
+        SarlError: If there are none, they were removed, or cannot be read.
+    """
+    item = standing_item(identifier)
+    demonstrations = _read(item.id, item.digest)
+    _ids()[demonstrations.digest] = item.id
+    return demonstrations
+
+
+@cached(show_spinner="Reading the demonstrations …")
+def _read(identifier: str, digest: str) -> Demonstrations:
+    opened = library()
+    return demonstrations_of(opened, opened.item(identifier))
+
+
+def keep(demonstrations: Demonstrations, name: str) -> str:
+    """Keep what was uploaded.
+
+    Args:
+        demonstrations: Read and checked.
+        name: Of the file.
+
+    Returns:
+        Its id; the one that it has where its author keeps the same already.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    opened = library()
+    digest = demonstrations.digest
+    known = [
+        one for one in opened.with_digest(digest, kind="demonstrations") if one.author == author()
+    ]
+    item = known[0] if known else add_demonstrations(opened, demonstrations, name, author=author())
+    _ids()[digest] = item.id
+    return item.id
+
+
+def details_of(demonstrations: Demonstrations) -> Mapping[str, Any]:
+    """What is said of demonstrations that are kept; {} of others."""
+    identifier = _ids().get(demonstrations.digest)
+    if identifier is None:
+        return {}
+    try:
+        return library().item(identifier).details
+    except SarlError:
+        return {}
+
+
+def annotate(demonstrations: Demonstrations, details: Mapping[str, Any]) -> None:
+    """Say more of demonstrations, where they are the visitor's own and kept."""
+    identifier = _ids().get(demonstrations.digest)
+    if identifier is None:
+        return
+    try:
+        item = library().item(identifier)
+        if item.author == author():
+            library().annotate(identifier, details, author=author())
+    except SarlError as error:
+        say_once(error)
+
+
+def say_once(problem: SarlError) -> None:
+    """Say in a visit, once, that what is made stays in it."""
+    if st.session_state.get("_library_problem") != str(problem):
+        st.session_state["_library_problem"] = str(problem)
+        st.toast(
+            f"What you make is kept for this visit only: {problem}.", icon=":material/inventory_2:"
+        )
+
+
+def _ids() -> dict[str, str]:
+    """Ids of kept demonstrations by their digest, of this visit."""
+    return cast("dict[str, str]", st.session_state.setdefault("_kept_ids", {}))

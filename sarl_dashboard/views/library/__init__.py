@@ -1,0 +1,1 @@
+"""The page Library: what is kept, and what may be done with it."""

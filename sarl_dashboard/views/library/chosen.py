@@ -1,0 +1,120 @@
+"""One thing that is kept: what is known of it, and what may be done with it."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import streamlit as st
+
+from sarl_core.errors import SarlError
+from sarl_core.library import Item, Library
+from sarl_core.library.bundles import ENDING, export_bundle
+from sarl_dashboard.components.downloads import download
+from sarl_dashboard.state.data import choose_dataset
+from sarl_dashboard.text import escaped, file_name
+from sarl_dashboard.views.library.listing import KINDS, about, size_text
+
+
+def show_chosen(opened: Library, item: Item, author: str) -> None:
+    """All that is known of a thing, and buttons.
+
+    Args:
+        opened: Where it is.
+        item: The thing.
+        author: Who looks.
+    """
+    own = item.author == author
+    if item.removed is not None:
+        st.info(
+            f"{escaped(item.name)} was removed"
+            + (": it can be brought back below." if own else f" by {escaped(item.author)}."),
+            icon=":material/delete:",
+        )
+        return
+    with st.container(border=True):
+        st.subheader(escaped(item.name))
+        st.caption(
+            f"{KINDS[item.kind]} · {about(item) or 'no more is known'} · {size_text(item.size)} · "
+            f"kept by {escaped('you' if own else item.author)} on "
+            f"{item.created.astimezone():%d %B %Y, %H:%M}"
+        )
+        if item.command:
+            st.code(item.command, language="sh")
+        for approval in item.approvals:
+            note = f": {escaped(approval.note)}" if approval.note else ""
+            st.markdown(f":material/verified: Approved by **{escaped(approval.author)}**{note}")
+        _buttons(opened, item, author, own=own)
+        st.caption(f"On the command line: `library:{item.id}`")
+
+
+def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
+    with st.container(horizontal=True):
+        if item.kind == "demonstrations":
+            st.button(
+                "Open",
+                type="primary",
+                icon=":material/dataset:",
+                key="library_open",
+                on_click=choose_dataset,
+                args=(item.id,),
+                help="Every page then works on them; the address is a link for others.",
+            )
+        download(
+            "To carry elsewhere",
+            partial(_bundle, opened, item),
+            f"{file_name(item.name)}{ENDING}",
+            key="library_export",
+            meaning="With all that it was made of and its earlier versions, as one file",
+        )
+        if not own:
+            return
+        st.toggle(
+            "Shared with all",
+            value=item.shared,
+            key=f"share_{item.id}",
+            on_change=_change,
+            args=(opened.share, item, author),
+            kwargs={"shared": not item.shared},
+            help="It then stands in everybody's list. Whoever has its link may look anyway.",
+        )
+        st.button(
+            "Remove",
+            icon=":material/delete:",
+            key="library_remove",
+            on_click=_change,
+            args=(opened.remove, item, author),
+            help="For 30 days it can be brought back below.",
+        )
+    st.text_input(
+        "Name",
+        value=item.name,
+        key=f"name_{item.id}",
+        max_chars=200,
+        on_change=_rename,
+        args=(opened, item, author),
+    )
+
+
+def _bundle(opened: Library, item: Item) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"bundle{ENDING}"
+        export_bundle(opened, [item.id], path)
+        return path.read_bytes()
+
+
+def _change(change: Any, item: Item, author: str, **named: Any) -> None:
+    try:
+        change(item.id, author=author, **named)
+    except SarlError as error:
+        st.session_state["_library_error"] = str(error)
+
+
+def _rename(opened: Library, item: Item, author: str) -> None:
+    name = st.session_state[f"name_{item.id}"]
+    try:
+        opened.rename(item.id, name, author=author)
+    except SarlError as error:
+        st.session_state["_library_error"] = str(error)

@@ -1,0 +1,166 @@
+"""What a visitor makes outlives the visit, and what is not there is said and not replaced."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core.errors import InputError
+from sarl_core.library import Library
+from sarl_core.library.items import new_id
+from sarl_dashboard.state import library as state
+from tests.app.screens import errors, metrics, open_page, texts
+
+DATA = Path(__file__).parents[2] / "data" / "demonstrations"
+ROWS = b"obs_speed,action,episode\n0.5,0,0\n1.5,1,0\n0.25,0,1\n2.5,1,1\n0.1,0,1\n"
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A library of this test's own."""
+    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "library"))
+    monkeypatch.setenv("SARL_AUTHOR", "Ada")
+    yield tmp_path / "library"
+    for opened in state._OPENED.values():
+        opened.close()
+    state._OPENED.clear()
+
+
+def upload(app: AppTest, content: bytes = ROWS, name: str = "crane.csv") -> str:
+    """What the address calls it then."""
+    app.file_uploader(key="upload_files").set_value([(name, content, "text/csv")]).run()
+    assert not app.exception
+    assert not errors(app)
+    return str(app.query_params["data"])
+
+
+def test_an_upload_is_there_after_a_reload_with_its_names_and_formulas() -> None:
+    app = open_page("demonstrations")
+    identifier = upload(app)
+    app.switch_page("names.py").run()
+    raw = app.session_state["_upload"]
+    key = raw.digest[:8]
+    app.text_input(key=f"formula_{key}").set_value("twice [m] = 2 * speed").run()
+    app.button(key="formula_take").click().run()
+    fresh = open_page("names", data=identifier)
+    assert not errors(fresh)
+    assert "twice" in texts(fresh)
+    assert metrics(open_page("demonstrations", data=identifier))["Steps"] == "5"
+    sidebar = fresh.selectbox(key="_data_choice")
+    assert sidebar.value == identifier
+    assert "crane.csv" in sidebar.options
+
+
+def test_the_same_file_is_kept_once() -> None:
+    first = upload(open_page("demonstrations"))
+    assert upload(open_page("demonstrations")) == first
+    with Library() as library:
+        assert len(library.items()) == 1
+
+
+@pytest.mark.parametrize("page", ["demonstrations", "thresholds", "rules", "replay", "report"])
+@pytest.mark.parametrize("missing", ["removed", "gone", "damaged", "words"])
+def test_what_a_link_names_is_not_replaced_in_silence(page: str, missing: str, place: Path) -> None:
+    identifier = upload(open_page("demonstrations"))
+    says = {
+        "removed": "was removed by Ada",
+        "gone": "has nothing with the id",
+        "damaged": "is missing from the library",
+        "words": "There are no demonstrations called",
+    }[missing]
+    if missing == "removed":
+        with Library() as library:
+            library.remove(identifier, author="Ada")
+    elif missing == "damaged":
+        shutil.rmtree(place / "files")
+    name = {"gone": new_id(), "words": "nonsense"}.get(missing, identifier)
+    app = open_page(page, data=name)
+    assert any(says in one for one in errors(app)), errors(app)
+    assert metrics(app) == {}
+    assert app.query_params["data"] == name
+
+
+def test_without_a_library_everything_else_works(place: Path) -> None:
+    place.write_text("a file where the folder should be")
+    app = open_page("demonstrations")
+    assert upload(app) == "upload"
+    assert metrics(app)["Steps"] == "5"
+    assert [one.value for one in app.toast][-1:] != []
+    app.switch_page("library.py").run()
+    assert any("cannot be made" in one for one in errors(app))
+    assert "kept for this visit only" in texts(app)
+
+
+def test_a_link_opens_one_thing_and_its_author_changes_it() -> None:
+    identifier = upload(open_page("demonstrations"))
+    app = open_page("library", item=identifier)
+    assert "5 steps, 2 episodes" in texts(app)
+    assert f"library:{identifier}" in texts(app)
+    app.text_input(key=f"name_{identifier}").set_value("the crane").run()
+    app.toggle(key=f"share_{identifier}").set_value(True).run()
+    with Library() as library:
+        item = library.item(identifier)
+        assert (item.name, item.shared) == ("the crane", True)
+    app.text_input(key=f"name_{identifier}").set_value(" ").run()
+    assert any("needs a name" in one for one in errors(app))
+    app.button(key="library_open").click().run()
+    assert app.query_params["data"] == identifier
+    assert "the crane" in app.selectbox(key="_data_choice").options
+    app.button(key="library_remove").click().run()
+    assert not app.exception
+    assert "can be brought back below" in texts(app)
+    with Library() as library:
+        assert library.item(identifier).removed is not None
+
+
+def test_who_is_not_the_author_may_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    identifier = upload(open_page("demonstrations"))
+    monkeypatch.setenv("SARL_AUTHOR", "Bob")
+    app = open_page("library", item=identifier)
+    keys = {button.key for button in app.button}
+    assert "library_open" in keys
+    assert "library_remove" not in keys
+    assert not app.toggle
+    assert metrics(open_page("demonstrations", data=identifier))["Steps"] == "5"
+
+
+def test_things_are_listed_renamed_shared_opened_removed_and_brought_back() -> None:
+    assert "Nothing is kept yet" in texts(open_page("library"))
+    identifier = upload(open_page("demonstrations"))
+    with Library() as library:
+        library.add("note", "Bob's", {}, author="Bob")
+        library.add("note", "of all", {}, author="Bob", shared=True)
+    app = open_page("library")
+    (table,) = app.dataframe
+    assert table.value["Name"].tolist() == ["of all", "crane.csv"]
+    assert table.value["Author"].tolist() == ["Bob", "you"]
+    assert table.value["About"].tolist() == ["", "5 steps, 2 episodes"]
+    with Library() as library:
+        item = library.rename(identifier, "crane", author="Ada")
+        assert item.name == "crane"
+        library.remove(identifier, author="Ada")
+    app.run()
+    assert app.dataframe[0].value["Name"].tolist() == ["of all"]
+    app.button(key=f"restore_{identifier}").click().run()
+    assert app.dataframe[0].value["Name"].tolist() == ["of all", "crane"]
+
+
+def test_a_bundle_is_brought_and_a_wrong_one_refused(tmp_path: Path) -> None:
+    from sarl_core.library.bundles import export_bundle
+
+    with Library(tmp_path / "other") as other:
+        item = other.add("note", "from afar", {}, author="Bob")
+        export_bundle(other, [item.id], tmp_path / "x.sarl")
+    app = open_page("library")
+    content = (tmp_path / "x.sarl").read_bytes()
+    app.file_uploader(key="library_file").set_value(("x.sarl", content, "")).run()
+    assert not errors(app)
+    assert app.dataframe[0].value["Name"].tolist() == ["from afar"]
+    app.file_uploader(key="library_file").set_value(("y.sarl", content[:-30], "")).run()
+    assert any("y.sarl" in one for one in errors(app))
+    with Library() as library, pytest.raises(InputError):
+        library.item(new_id())
