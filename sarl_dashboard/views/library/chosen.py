@@ -51,7 +51,7 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
 
 
 def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
-    with st.container(horizontal=True):
+    with st.container(horizontal=True, vertical_alignment="center"):
         if item.kind == "demonstrations":
             st.button(
                 "Open",
