@@ -11,9 +11,10 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
-from sarl_core.library.contents import add_demonstrations, demonstrations_of
+from sarl_core.library.contents import add_demonstrations, add_rules, demonstrations_of
 from sarl_core.library.items import as_id
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.cache import cached
 
 _OPENED: dict[LibraryPlace, Library] = {}
@@ -146,3 +147,35 @@ def say_once(problem: SarlError) -> None:
 def _ids() -> dict[str, str]:
     """Ids of kept demonstrations by their digest, of this visit."""
     return cast("dict[str, str]", st.session_state.setdefault("_kept_ids", {}))
+
+
+def keep_rules(rule_set: RuleSet, name: str, demonstrations: Demonstrations) -> Item:
+    """Keep a rule set as it stands, as a version of the one that was kept before it in this visit.
+
+    Args:
+        rule_set: With every edit.
+        name: What it is called.
+        demonstrations: That it is about.
+
+    Returns:
+        What is kept; where its author keeps the same already, that.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    opened, digest = library(), rules_digest(rule_set)
+    for known in opened.with_digest(digest, kind="rules"):
+        if known.author == author():
+            return known
+    before = cast("dict[str, str]", st.session_state.setdefault("_kept_rules", {}))
+    raw = _ids().get(demonstrations.digest)
+    item = add_rules(
+        opened,
+        rule_set,
+        name,
+        author=author(),
+        parent=before.get(demonstrations.digest, ""),
+        came_from=[raw] if raw else [],
+    )
+    before[demonstrations.digest] = item.id
+    return item

@@ -183,7 +183,7 @@ def test_rules_about_two_features_are_in_force_on_every_page(page: str) -> None:
         assert "The chosen demonstrations are of something else" not in texts(app)
         assert metrics(app)["Fidelity"].endswith("%")
     if page in ("rules", "what_if"):
-        assert "pole angle plus 0.2 s of pole angular velocity" in html(app) + texts(app)
+        assert "pole angle plus 0.27 s of pole angular velocity" in html(app) + texts(app)
 
 
 def test_a_compact_rule_is_explained_on_the_chosen_demonstrations(compact: RuleSet) -> None:

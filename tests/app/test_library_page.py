@@ -11,6 +11,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core.errors import InputError
 from sarl_core.library import Library
+from sarl_core.library.contents import rules_of
 from sarl_core.library.items import new_id
 from sarl_dashboard.state import library as state
 from tests.app.screens import errors, metrics, open_page, texts
@@ -164,3 +165,27 @@ def test_a_bundle_is_brought_and_a_wrong_one_refused(tmp_path: Path) -> None:
     assert any("y.sarl" in one for one in errors(app))
     with Library() as library, pytest.raises(InputError):
         library.item(new_id())
+
+
+def test_rules_are_kept_as_versions_and_approved_one_by_one() -> None:
+    app = open_page("export", data="cartpole")
+    app.text_input(key="keep_name").set_value("for the crane").run()
+    app.button(key="keep_rules").click().run()
+    assert not errors(app)
+    app.button(key="keep_rules").click().run()  # the same is kept once
+    with Library() as library:
+        (first,) = library.items(kind="rules")
+    assert first.name == "for the crane"
+    app.toggle(key="rounded").set_value(False).run()
+    app.button(key="keep_rules").click().run()
+    with Library() as library:
+        second, _ = library.items(kind="rules")
+        assert second.parent == first.id
+        assert len(rules_of(library, second)) == len(rules_of(library, first))
+    app = open_page("library", item=first.id)
+    app.text_area(key=f"approval_{first.id}").set_value("held against the logs").run()
+    app.button(key="library_approve").click().run()
+    assert "Approved by **Ada**: held against the logs" in texts(app)
+    app.button(key=f"version_{second.id}").click().run()
+    assert app.query_params["item"] == second.id
+    assert "Approved by" not in texts(app)

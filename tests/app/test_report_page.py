@@ -98,4 +98,4 @@ def test_shipped_rules_about_two_features_are_reported() -> None:
     app = open_page("report", data="cartpole", report_rules="compact, two features", frames="1")
     assert not errors(app)
     assert "2 rules, 2 of them in full" in texts(app)
-    assert "pole angle plus 0.2 s of pole angular velocity" in shown(made(app))
+    assert "pole angle plus 0.27 s of pole angular velocity" in shown(made(app))

@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.keeping import keep_rules_form
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state.data import all_demonstrations
 from sarl_dashboard.text import in_full
@@ -41,3 +42,4 @@ def show_export(demonstrations: Demonstrations) -> None:
         show_matrix(prepared.rule_set, chosen.stem, demonstrations)
     else:
         show_file(prepared.rule_set, chosen)
+        keep_rules_form(prepared.rule_set)

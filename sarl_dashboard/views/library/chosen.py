@@ -12,8 +12,10 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, export_bundle
+from sarl_core.library.contents import rules_of
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.state.data import choose_dataset
+from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, file_name
 from sarl_dashboard.views.library.listing import KINDS, about, size_text
 
@@ -48,6 +50,8 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
             st.markdown(f":material/verified: Approved by **{escaped(approval.author)}**{note}")
         _buttons(opened, item, author, own=own)
         st.caption(f"On the command line: `library:{item.id}`")
+        if item.kind == "rules":
+            _rules(opened, item, author)
 
 
 def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
@@ -96,6 +100,46 @@ def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
         on_change=_rename,
         args=(opened, item, author),
     )
+
+
+def _rules(opened: Library, item: Item, author: str) -> None:
+    """What the rules say, their versions, and who stands for them."""
+    rule_set = rules_of(opened, item)
+    with st.expander(f"The rules in words ({len(rule_set):,})", icon=":material/rule:"):
+        st.text(rule_set.to_text())
+    versions = opened.versions(item.id)
+    if len(versions) > 1:
+        with st.expander(f"Versions ({len(versions):,})", icon=":material/history:"):
+            for one in versions:
+                mark = "this one" if one.id == item.id else "open"
+                who = ", ".join(approval.author for approval in one.approvals)
+                st.button(
+                    f"{one.created.astimezone():%d %b %Y, %H:%M:%S} · {about(one)}"
+                    + (f" · approved by {escaped(who)}" if who else ""),
+                    key=f"version_{one.id}",
+                    disabled=one.id == item.id,
+                    help=mark,
+                    type="tertiary",
+                    on_click=set_url_choice,
+                    args=("item", one.id),
+                )
+    with st.expander("Approve this version", icon=":material/verified:"):
+        st.caption(
+            "You say by your name that you stand for these very rules. A change makes another "
+            "version, for which nobody stands yet."
+        )
+        st.text_area("Note", key=f"approval_{item.id}", max_chars=10_000)
+        st.button(
+            f"Approve as {escaped(author)}",
+            key="library_approve",
+            on_click=_approve,
+            args=(opened, item, author),
+        )
+
+
+def _approve(opened: Library, item: Item, author: str) -> None:
+    note = st.session_state.get(f"approval_{item.id}") or ""
+    _change(opened.approve, item, author, note=note)
 
 
 def _bundle(opened: Library, item: Item) -> bytes:
