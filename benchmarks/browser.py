@@ -50,7 +50,7 @@ def slider(quick: bool) -> Iterable[Row]:
         save_demonstrations(_many(demonstrations(), MANY), file)
         page.goto(f"{address}/thresholds")
         yield _row(page, f"{len(demonstrations()):,} steps", moves, 0.15)
-        page.goto(address)
+        page.goto(f"{address}/demonstrations")
         page.get_by_text("Use your own demonstrations").first.click()
         page.locator("input[type=file]").set_input_files(file)
         page.get_by_text(f"{MANY:,} steps").first.wait_for()

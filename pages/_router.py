@@ -7,8 +7,10 @@ import sys
 import streamlit as st
 
 from sarl_core.explaining.templates import style_sheet
+from sarl_dashboard.components.journey.brand import ICON, show_logo
+from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.sidebar import require_data, sidebar
-from sarl_dashboard.session import ICON, settle
+from sarl_dashboard.session import settle
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -17,119 +19,64 @@ from sarl_dashboard.state.url import (
     without,
 )
 
-st.set_page_config(
-    page_title="SARL Explorer",
-    page_icon=str(ICON),  # a named icon would come from the network
-    layout="wide",
-    initial_sidebar_state="auto",
-)
+# The tab's title is that of the page.
+st.set_page_config(page_icon=ICON, layout="wide", initial_sidebar_state="auto")
 
-PAGES = [
-    st.Page(
-        "demonstrations.py",
-        title="Demonstrations",
-        icon=":material/dataset:",
-        default=True,
-        url_path="start",  # never seen: the default page is at "/"
-    ),
-    st.Page(
-        "episodes.py",
-        title="Episodes",
-        icon=":material/timeline:",
-    ),
-    st.Page(
-        "names.py",
-        title="Names",
-        icon=":material/label:",
-    ),
-    st.Page(
-        "thresholds.py",
-        title="Thresholds",
-        icon=":material/tune:",
-    ),
-    st.Page(
-        "rules.py",
-        title="Rules",
-        icon=":material/rule:",
-    ),
-    st.Page(
-        "evidence.py",
-        title="Evidence",
-        icon=":material/verified:",
-    ),
-    st.Page(
-        "what_if.py",
-        title="What if",
-        icon=":material/help_center:",
-    ),
-    st.Page(
-        "edit.py",
-        title="Edit",
-        icon=":material/edit:",
-    ),
-    st.Page(
-        "difference.py",
-        title="Difference",
-        icon=":material/difference:",
-    ),
-    st.Page(
-        "export.py",
-        title="Export",
-        icon=":material/ios_share:",
-    ),
-    st.Page(
-        "report.py",
-        title="Report",
-        icon=":material/summarize:",
-    ),
-    st.Page(
-        "replay.py",
-        title="Replay",
-        icon=":material/play_circle:",
-    ),
-    st.Page(
-        "shield.py",
-        title="Shield",
-        icon=":material/shield:",
-    ),
-    st.Page(
-        "audit.py",
-        title="Audit",
-        icon=":material/fact_check:",
-    ),
-    st.Page(
-        "ablation.py",
-        title="Ablation",
-        icon=":material/content_cut:",
-    ),
-    st.Page(
-        "library.py",
-        title="Library",
-        icon=":material/inventory_2:",
-    ),
-    st.Page(
-        "improve.py",
-        title="Improve",
-        icon=":material/trending_up:",
-    ),
-    st.Page(
-        "learning.py",
-        title="Learning",
-        icon=":material/school:",
-    ),
-    st.Page(
-        "paper.py",
-        title="Paper",
-        icon=":material/article:",
-    ),
-]
-# Other addresses of a page: one that is guessed by who knows the rest, and one that it once had.
-ALIASES = {"demonstrations": "Demonstrations", "carry": "Export"}
+# The way from data to what is handed over.
+SECTIONS = {
+    "Start": [
+        st.Page("overview.py", title="Overview", icon=":material/home:", default=True),
+    ],
+    "1 Data": [
+        st.Page("demonstrations.py", title="Demonstrations", icon=":material/dataset:"),
+        st.Page("names.py", title="Names", icon=":material/label:"),
+        st.Page("episodes.py", title="Episodes", icon=":material/timeline:"),
+    ],
+    "2 Rules": [
+        st.Page("thresholds.py", title="Thresholds", icon=":material/tune:"),
+        st.Page("rules.py", title="Rules", icon=":material/rule:"),
+        st.Page("evidence.py", title="Evidence", icon=":material/verified:"),
+    ],
+    "3 Understand and change": [
+        st.Page("what_if.py", title="What if", icon=":material/help_center:"),
+        st.Page("edit.py", title="Edit", icon=":material/edit:"),
+        st.Page("difference.py", title="Compare", icon=":material/difference:", url_path="compare"),
+    ],
+    "4 Try the shield": [
+        st.Page("replay.py", title="Replay", icon=":material/play_circle:"),
+        st.Page("shield.py", title="Measure", icon=":material/shield:", url_path="measure"),
+        st.Page(
+            "ablation.py",
+            title="Worth of each rule",
+            icon=":material/content_cut:",
+            url_path="worth",
+        ),
+        st.Page("audit.py", title="Audit", icon=":material/fact_check:"),
+    ],
+    "5 Hand over": [
+        st.Page("report.py", title="Report", icon=":material/summarize:"),
+        st.Page("export.py", title="Export", icon=":material/ios_share:"),
+        st.Page("library.py", title="Library", icon=":material/inventory_2:"),
+    ],
+    "Research": [
+        st.Page("research/improve.py", title="Improve", icon=":material/trending_up:"),
+        st.Page("research/learning.py", title="Learning", icon=":material/school:"),
+        st.Page("research/paper.py", title="Paper", icon=":material/article:"),
+    ],
+}
+PAGES = [page for pages in SECTIONS.values() for page in pages]
+# Addresses that pages once had.
+ALIASES = {
+    "carry": "Export",
+    "difference": "Compare",
+    "shield": "Measure",
+    "ablation": "Worth of each rule",
+}
 aliases = [
     st.Page(lambda: None, title=title, url_path=path, visibility="hidden")
     for path, title in ALIASES.items()
 ]
-page = st.navigation([*PAGES, *aliases], expanded=True)
+page = st.navigation(SECTIONS | {"Start": [*SECTIONS["Start"], *aliases]}, expanded=True)
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
     st.switch_page(meant, query_params=st.query_params.to_dict())
@@ -139,11 +86,13 @@ if absurd := absurd_parameters():
     say_left_out(absurd, page.title)
     st.switch_page(page, query_params=without(absurd))
 st.html(style_sheet())
+show_logo()
 show_left_out(page.title)
 sidebar(with_thresholds=page.title != "Thresholds")
 try:
-    if page.title != "Library":
+    if page.title not in ("Overview", "Library"):
         require_data(page.title)
     page.run()
-finally:  # also where the page ends early
+    next_step(page.title)
+finally:  # also where the page ends early: then it has said itself what to do
     settle(page.title, len(sys.modules))

@@ -1,4 +1,4 @@
-"""Ablation: what each rule of a shield is worth, found by taking it out.
+"""Worth of each rule: what each rule of a shield is worth, found by taking it out.
 
 What is known of the present choices is shown at once, whoever ran it and whenever; Run adds what is
 missing. The work goes on beside the page, in processes of its own.
@@ -14,7 +14,7 @@ from sarl_dashboard.text import refuse
 from sarl_dashboard.views.ablation.outcome import outcome
 from sarl_dashboard.views.ablation.settings import settings
 
-st.title("Ablation")
+st.title("Worth of each rule")
 st.caption(
     "What each rule is worth: the same episodes again, with one rule taken out. A rule without "
     "which an agent does worse carries load; one without which it does better does harm."

@@ -1,4 +1,4 @@
-"""Difference: two rule sets side by side, their rules and the states they decide differently."""
+"""Compare: two rule sets side by side, their rules and the states they decide differently."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import streamlit as st
 
 from sarl_dashboard.views.difference.comparison import comparison
 
-st.title("Difference")
+st.title("Compare")
 st.caption(
     "Two rule sets side by side: which rules differ, and on how many of the same states the two "
     "decide differently."

@@ -30,12 +30,12 @@ if played is None:
             "thresholds may apply at few steps. The work goes on while you look at other pages.",
             icon=":material/play_circle:",
         )
-    st.stop()
-headline(played.replay, current_order)
-numbers(played.replay)
-film(played.replay)
-take_up(played.order)
-step_by_step(played)
-if jump is not None:
-    arrive(jump, played)
-comparison(played.order)
+else:
+    headline(played.replay, current_order)
+    numbers(played.replay)
+    film(played.replay)
+    take_up(played.order)
+    step_by_step(played)
+    if jump is not None:
+        arrive(jump, played)
+    comparison(played.order)

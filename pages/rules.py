@@ -12,6 +12,7 @@ from sarl_dashboard.views.rules.in_force import rules_in_force
 from sarl_dashboard.views.rules.table import nothing_in_force, search_and_rules
 
 st.title("Rules")
+st.caption("Every rule in words, and how much of what the expert did stands behind it.")
 notice()
 in_force = rules_in_force(require_demonstrations())
 if not in_force.rule_set.rules:

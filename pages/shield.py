@@ -1,4 +1,4 @@
-"""Shield: any agents with any shields on the same seeds, in one table and one picture.
+"""Measure: any agents with any shields on the same seeds, in one table and one picture.
 
 What is known of the present choices is shown at once, whoever ran it and whenever; Run adds what is
 missing. The work goes on beside the page, in processes of its own.
@@ -17,7 +17,7 @@ from sarl_dashboard.views.shield.lines import guards, line, pilots
 from sarl_dashboard.views.shield.settings import settings
 from sarl_dashboard.views.shield.table import comparison_of
 
-st.title("Shield")
+st.title("Measure")
 st.caption(
     "What a shield is worth: agents with the rules and without, on the same seeds. The rules are "
     "learned from demonstrations; they guarantee nothing."

@@ -57,7 +57,4 @@ else:
     table = largest.empty()
 with top:
     show_controls(display, landscape, table)
-st.page_link(
-    "rules.py", label="All rules, with the evidence behind each", icon=":material/arrow_forward:"
-)
 cross_fitting.make_ready()

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import gc
-from pathlib import Path
 
 import streamlit as st
-
-ICON = Path(__file__).parent / "icon.png"
-"""What stands in a browser's tab."""
 
 
 @st.cache_resource(show_spinner=False)

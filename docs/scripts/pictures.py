@@ -29,7 +29,7 @@ SCREENS = {
     "thresholds.png": ("thresholds", "light", "judged by rules mined without it"),
     "thresholds_dark.png": ("thresholds", "dark", "judged by rules mined without it"),
     "rules.png": ("rules", "light", "judged by rules mined without it"),
-    "demonstrations.png": ("", "light", "Return of each episode"),
+    "demonstrations.png": ("demonstrations", "light", "Return of each episode"),
     "evidence.png": ("evidence?holdout=0.4", "light", "judged by rules mined without it"),
     "what_if.png": ("what_if?data=cartpole&confidence=0.9", "light", "The least change that"),
 }

@@ -52,7 +52,7 @@ def report(
             "--comparison",
             metavar="FILE",
             show_default=False,
-            help="Results to show: the CSV file of the page Shield, or what `evaluate --json` "
+            help="Results to show: the CSV file of the page Measure, or what `evaluate --json` "
             "printed. May be given several times.",
         ),
     ] = None,

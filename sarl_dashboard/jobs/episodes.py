@@ -151,7 +151,7 @@ class EpisodeBatch:
     problems: dict[object, SarlError] = field(default_factory=dict)
 
 
-COMPARISON = Place[EpisodeBatch]("comparison")  # of the page Shield
+COMPARISON = Place[EpisodeBatch]("comparison")  # of the page Measure
 
 
 def run_batch(rows: Sequence[Row], episodes: int) -> Job[EpisodeBatch]:

@@ -89,13 +89,13 @@ def _make(job: Job[Report], order: ReportOrder, cache: BoundedCache[Report]) -> 
 
 
 def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:
-    """What this visitor ran last on the page Shield, as far as it is there.
+    """What this visitor ran last on the page Measure, as far as it is there.
 
     Args:
         env_id: Of the report; a comparison in another environment says nothing about it.
 
     Returns:
-        The comparison, None where there is none; and the name of the file that the page Shield
+        The comparison, None where there is none; and the name of the file that the page Measure
         downloads of it.
     """
     job = COMPARISON.job

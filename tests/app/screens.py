@@ -20,7 +20,7 @@ def open_page(name: str, **query: str | list[str]) -> AppTest:
     for key, value in query.items():
         app.query_params[key] = value
     app.run()
-    if name != "demonstrations":
+    if name != "overview":
         app.switch_page(f"{name}.py").run()
     assert not app.exception, app.exception
     return app

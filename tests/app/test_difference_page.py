@@ -1,4 +1,4 @@
-"""The page Difference: any two rule sets, counted by two shields."""
+"""The page Compare: any two rule sets, counted by two shields."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def opened(page: str, **query: str) -> AppTest:
     for name, value in query.items():
         app.query_params[name] = value
     app.run()
-    if page != "demonstrations":
+    if page != "overview":
         assert not app.exception, app.exception
         app.switch_page(f"{page}.py").run()
     return app

@@ -1,4 +1,4 @@
-"""The pages Edit and Difference in a browser: edit, take it back, save, compare."""
+"""The pages Edit and Compare in a browser: edit, take it back, save, compare."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     assert off["pinned"]
     # The edits are still there on another page, and go into a comparison.
     screen.get_by_role("link", name="Compare with the unedited set").click()
-    expect(screen.get_by_role("heading", name="Difference", level=1)).to_be_visible()
+    expect(screen.get_by_role("heading", name="Compare", level=1)).to_be_visible()
     expect(screen.locator(".st-key-confusion table")).to_be_visible()
     settle(screen)
     assert parameters(screen)["second"] == "edited"
@@ -64,7 +64,7 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
 
 
 def test_another_second_set_is_compared_and_a_link_shows_the_same(screen: Page) -> None:
-    visit(screen, "/difference?data=cartpole", "Difference")
+    visit(screen, "/compare?data=cartpole", "Compare")
     table = screen.locator(".st-key-confusion table")
     expect(table).to_be_visible()
     before = table.inner_text()
@@ -75,7 +75,7 @@ def test_another_second_set_is_compared_and_a_link_shows_the_same(screen: Page) 
     now = table.inner_text()
     assert now != before
     assert parameters(screen)["second"] == "compact"
-    visit(screen, screen.url, "Difference")
+    visit(screen, screen.url, "Compare")
     expect(table).to_be_visible()
     assert table.inner_text() == now
     no_trace(screen)

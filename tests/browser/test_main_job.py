@@ -24,7 +24,7 @@ def upload(screen: Page, name: str, content: bytes) -> None:
 
 
 def test_an_uploaded_csv_is_shown_and_chosen(screen: Page) -> None:
-    visit(screen, "/?data=cartpole", "Demonstrations")
+    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
     upload(screen, "mine.csv", csv_bytes(*ROWS))
     expect(screen.get_by_test_id("stMetricValue").first).to_have_text("5")
     assert metric(screen, "Episodes") == "2"
@@ -33,7 +33,7 @@ def test_an_uploaded_csv_is_shown_and_chosen(screen: Page) -> None:
 
 
 def test_a_bad_csv_is_one_sentence_and_the_earlier_set_stays(screen: Page) -> None:
-    visit(screen, "/?data=cartpole", "Demonstrations")
+    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
     upload(screen, "broken.csv", changed(2, "0,1,0.25,abc,1"))
     alert = screen.get_by_test_id("stAlert")
     expect(alert).to_contain_text("'abc'")
@@ -47,7 +47,7 @@ def test_a_bad_csv_is_one_sentence_and_the_earlier_set_stays(screen: Page) -> No
 def test_the_chosen_set_is_downloaded(
     screen: Page, tmp_path: Path, label: str, extension: str
 ) -> None:
-    visit(screen, "/?data=cartpole", "Demonstrations")
+    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
     with screen.expect_download() as started:
         screen.get_by_test_id("stDownloadButton").filter(has_text=label).click()
     path = tmp_path / f"again.{extension}"

@@ -1,4 +1,4 @@
-"""The page Shield in a browser: run, look, change, download, come back."""
+"""The page Measure in a browser: run, look, change, download, come back."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PATIENCE = 240_000  # milliseconds; the processes that run episodes may have to 
 def test_a_comparison_is_run_changed_downloaded_and_found_again(
     screen: Page, tmp_path: Path
 ) -> None:
-    visit(screen, "/shield?data=cartpole&episodes=4&first_seed=8000", "Shield")
+    visit(screen, "/measure?data=cartpole&episodes=4&first_seed=8000", "Measure")
     expect(screen.get_by_text("press Run")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
     expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
@@ -42,7 +42,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     expect(screen.get_by_text("4 episodes for each of 3 settings")).to_be_visible()
     settle(screen)
     assert parameters(screen)["agents"] == "novice"
-    visit(screen, screen.url, "Shield")
+    visit(screen, screen.url, "Measure")
     expect(traces).to_have_count(3)
     no_trace(screen)
 

@@ -11,7 +11,7 @@ from tests.demonstrations.test_formats_hubs import lerobot, zipped
 
 
 def upload(screen: Page, *files: tuple[str, bytes]) -> None:
-    visit(screen, "/?data=cartpole", "Demonstrations")
+    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
     screen.get_by_text("Use your own demonstrations").click()
     payloads: list[FilePayload] = [
         {"name": name, "mimeType": "application/octet-stream", "buffer": content}

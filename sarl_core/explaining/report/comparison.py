@@ -155,7 +155,7 @@ def results_of(comparison: Comparison) -> tuple[Result, ...]:
 
 
 def read_results(path: Path) -> tuple[Result, ...]:
-    """Read a comparison: the CSV of the page Shield, or what `evaluate --json` printed.
+    """Read a comparison: the CSV of the page Measure, or what `evaluate --json` printed.
 
     Args:
         path: The file.
@@ -258,7 +258,7 @@ def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
         there = reader.fieldnames or []
     except csv.Error as error:
         raise InputError(
-            f"the comparison {name} is no CSV ({error}); give the file that the page Shield "
+            f"the comparison {name} is no CSV ({error}); give the file that the page Measure "
             "downloads"
         ) from error
     for column in ("arm", "episodes", *_NUMBERS):

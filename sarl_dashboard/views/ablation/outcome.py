@@ -1,4 +1,4 @@
-"""The work of the page Ablation: begun, on its way, and what is known so far."""
+"""The work of the page Worth of each rule: begun, on its way, and what is known so far."""
 
 from __future__ import annotations
 

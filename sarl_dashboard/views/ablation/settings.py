@@ -1,4 +1,4 @@
-"""The settings of the page Ablation, and the ablation that they ask for."""
+"""The settings of the page Worth of each rule, and the ablation that they ask for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page Ablation shows: what it comes to, a figure, a table, and the chosen rule."""
+"""What the page Worth of each rule shows: its result, a figure, a table, and the chosen rule."""
 
 from __future__ import annotations
 

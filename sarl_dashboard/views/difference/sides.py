@@ -1,4 +1,4 @@
-"""The two rule sets of the page Difference: the choices, and what was chosen."""
+"""The two rule sets of the page Compare: the choices, and what was chosen."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def report_of(order: ReportOrder, name: str) -> None:
         elif not at_work and not order.comparison:
             st.markdown(
                 ":material/info: :gray[A report says more with results in it: run agents with the "
-                "rules and without on the page Shield first, and come back.]"
+                "rules and without on the page Measure first, and come back.]"
             )
 
     watched(PLACE, outcome)

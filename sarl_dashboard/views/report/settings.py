@@ -30,7 +30,7 @@ def settings(has_comparison: bool) -> ReportChoices:
     """The widgets.
 
     Args:
-        has_comparison: Whether this visitor has run one on the page Shield.
+        has_comparison: Whether this visitor has run one on the page Measure.
     """
     offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
@@ -68,14 +68,14 @@ def settings(has_comparison: bool) -> ReportChoices:
         with_session = False
         if has_comparison:
             with_session = st.checkbox(
-                "With the comparison you ran on the page Shield",
+                "With the comparison you ran on the page Measure",
                 value=True,
                 key="with_comparison",
                 bind="query-params",
             )
         with st.expander("Add results from files"):
             files = st.file_uploader(
-                "CSV of the page Shield, or JSON of `evaluate --json`",
+                "CSV of the page Measure, or JSON of `evaluate --json`",
                 accept_multiple_files=True,
                 key="report_results",
             )

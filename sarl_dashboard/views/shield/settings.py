@@ -1,4 +1,4 @@
-"""What the Shield page asks for: agents, shields, and the episodes to compare them on."""
+"""What the page Measure asks for: agents, shields, and the episodes to compare them on."""
 
 from __future__ import annotations
 

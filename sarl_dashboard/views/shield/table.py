@@ -1,4 +1,4 @@
-"""What the Shield page shows of a comparison: what it comes to, two figures, and a table."""
+"""What the page Measure shows of a comparison: what it comes to, two figures, and a table."""
 
 from __future__ import annotations
 
