@@ -8,7 +8,9 @@ import streamlit as st
 
 from sarl_core.explaining.templates import style_sheet
 from sarl_dashboard.components.journey.brand import ICON, show_logo
+from sarl_dashboard.components.journey.first_run import show_first_run
 from sarl_dashboard.components.journey.next_step import next_step
+from sarl_dashboard.components.journey.words import words_button
 from sarl_dashboard.components.sidebar import require_data, sidebar
 from sarl_dashboard.session import settle
 from sarl_dashboard.state.url import (
@@ -89,9 +91,11 @@ st.html(style_sheet())
 show_logo()
 show_left_out(page.title)
 sidebar(with_thresholds=page.title != "Thresholds")
+words_button()
 try:
-    if page.title not in ("Overview", "Library"):
+    if page.title != "Library":
         require_data(page.title)
+    show_first_run(page.title)
     page.run()
     next_step(page.title)
 finally:  # also where the page ends early: then it has said itself what to do

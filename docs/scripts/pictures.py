@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -81,18 +81,45 @@ def walker() -> None:
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "walker.gif"
         render("BipedalWalker-v3", "bipedal_walker_compact", whole)
-        with Image.open(whole) as film:
-            pictures = []
-            for number in range(0, 500, 3):
-                film.seek(number)
-                pictures.append(film.convert("RGB").resize((420, 409), Image.Resampling.LANCZOS))
-    palette = pictures[50].quantize(128)
+        _smaller(whole, PICTURES / "walker.gif", range(0, 500, 3), (420, 409), colours=128)
+
+
+def overview() -> None:
+    """What the page Overview shows: the GIF of `replay`, every third picture, made smaller."""
+    out = ROOT / "data" / "replays" / "lunar_lander.gif"
+    out.parent.mkdir(exist_ok=True)
+    with Image.open(PICTURES / "replay.gif") as film:
+        count = film.n_frames
+    numbers = [*range(0, count - 1, 3), count - 1]
+    _smaller(PICTURES / "replay.gif", out, numbers, (760, 365), colours=48, at_the_end=2000)
+
+
+def _smaller(
+    whole: Path,
+    out: Path,
+    numbers: Sequence[int],
+    size: tuple[int, int],
+    *,
+    colours: int,
+    at_the_end: int = 60,
+) -> None:
+    """Some pictures of a GIF as another one, in fewer colours, each for three of the original.
+
+    The last stands for `at_the_end` milliseconds, so that one sees how it ended.
+    """
+    with Image.open(whole) as film:
+        pictures = []
+        for number in numbers:
+            film.seek(number)
+            pictures.append(film.convert("RGB").resize(size, Image.Resampling.LANCZOS))
+            pictures[-1].info.clear()  # the colour that was transparent is none of the new ones
+    palette = pictures[50].quantize(colours)
     first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures)
     first.save(
-        PICTURES / "walker.gif",
+        out,
         save_all=True,
         append_images=others,
-        duration=60,
+        duration=[60] * len(others) + [at_the_end],
         loop=0,
         optimize=True,
     )
@@ -214,6 +241,7 @@ def _wait(address: str, page: Page) -> None:
 
 if __name__ == "__main__":
     replay()
+    overview()
     driving()
     walker()
     crane()

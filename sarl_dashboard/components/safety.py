@@ -12,11 +12,8 @@ from sarl_core.environments.failures import no_failures_text
 from sarl_core.mining.language import share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.failures import rate_text, safety_cells, safety_facts
+from sarl_dashboard.components.journey.words import word_help
 
-FREEDOM_HELP = (
-    "What the rules leave the agent to choose from: 100 % where no rule applies, 0 % where they "
-    "decide everything and the agent nothing"
-)
 _ALWAYS = "Failures"  # a typical return hides them
 
 
@@ -79,7 +76,7 @@ def safety_column_config() -> dict[str, Any]:
         "Cost": "What an episode costs on average, by what the environment or the server's owner "
         "says, with the 95 % interval",
         "Worst tenth": "Mean return of the worst tenth of the episodes",
-        "Freedom": FREEDOM_HELP,
+        "Freedom": word_help("freedom"),
     }
     return {
         name: st.column_config.TextColumn(alignment="right", help=text)
@@ -121,5 +118,5 @@ def safety_tiles(episodes: Episodes, *, shielded: bool) -> list[Tile]:
     if len(episodes) > 1:
         tiles.append(Tile("Worst tenth", cells["Worst tenth"], "Mean return of the worst tenth"))
     if "freedom" in facts:
-        tiles.append(Tile("Freedom", freedom_cell(episodes), FREEDOM_HELP))
+        tiles.append(Tile("Freedom", freedom_cell(episodes), word_help("freedom")))
     return tiles

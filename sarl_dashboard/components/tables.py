@@ -17,6 +17,7 @@ from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import action_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
+from sarl_dashboard.components.journey.words import word_help
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
 _TALL_ROW = 76  # four lines
@@ -56,20 +57,16 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             width=max(472 - _NAME - action_width, _PHRASE if _combines(rule_set) else 0),
             help="The conditions under which the rule applies",
         ),
-        "Support": column.NumberColumn(
-            width=80, format="%.2f %%", help="Share of all states to which the rule applies"
-        ),
+        "Support": column.NumberColumn(width=80, format="%.2f %%", help=word_help("support")),
         "Confidence": column.ProgressColumn(
             width=112,
             min_value=0.0,
             max_value=100.0,
             format="%.2f %%",
             color="gray",
-            help="Share of those in which the expert did what the rule says",
+            help=word_help("confidence"),
         ),
-        "Lift": column.NumberColumn(
-            width=58, format="%.2f", help="Confidence over the action's share of all states"
-        ),
+        "Lift": column.NumberColumn(width=58, format="%.2f", help=word_help("lift")),
         "Joint support": column.NumberColumn(
             width=100,
             format="%.2f %%",

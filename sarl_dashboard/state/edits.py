@@ -149,6 +149,16 @@ def history(of: Base) -> History:
     return _histories().get(of.key, History())
 
 
+def made() -> int:
+    """How many edits there are of the rules that are edited; nothing is mined to say none."""
+    if not any(history.edits for history in _histories().values()):
+        return 0
+    try:
+        return len(history(base()).edits)
+    except SarlError:  # said on the page Edit
+        return 0
+
+
 def waiting(of: Base) -> int:
     """Of how many other rule sets there are edits in this session."""
     return sum(bool(edits.edits) for key, edits in _histories().items() if key != of.key)

@@ -21,7 +21,8 @@ def open_page(name: str, **query: str | list[str]) -> AppTest:
         app.query_params[key] = value
     app.run()
     if name != "overview":
-        app.switch_page(f"{name}.py").run()
+        (file,) = ROUTER.parent.rglob(f"{name}.py")
+        app.switch_page(str(file.relative_to(ROUTER.parent))).run()
     assert not app.exception, app.exception
     return app
 

@@ -209,7 +209,7 @@ def test_the_command_calls_features_as_the_file_does(commands: list[list[str]]) 
     given = names_of(CARTPOLE)._replace(features=("place", "speed", "lean", "turning"))
     app = open_page("names", data="cartpole", combine="2,3")
     app.session_state["_names"] = {CARTPOLE.digest: given}
-    app.switch_page("improve.py").run()
+    app.switch_page("research/improve.py").run()
     assert not app.exception
     assert not errors(app)
     assert commands[-1][-4:-2] == ["--combine", "pole angle, pole angular velocity"]
@@ -220,7 +220,7 @@ def test_the_command_has_the_formulas_of_the_page_names(commands: list[list[str]
     app = open_page("names", data="cartpole")
     app.text_input(key=f"formula_{CARTPOLE.digest[:8]}").set_value(formula).run()
     app.button(key="formula_take").click().run()
-    app.switch_page("improve.py").run()
+    app.switch_page("research/improve.py").run()
     assert not app.exception
     assert not errors(app)
     assert commands[-1][-4:] == ["--feature", formula, "--out", "rules.json"]
@@ -277,7 +277,7 @@ def test_what_was_finished_before_a_cancel_stays_readable() -> None:
     # Meanwhile other pages are there, and the work goes on.
     app.switch_page("rules.py").run()
     assert not app.exception
-    app.switch_page("improve.py").run()
+    app.switch_page("research/improve.py").run()
     assert len(app.dataframe[0].value) > 1
     app.button(key="cancel_improve").click().run()
     finished(app)

@@ -57,7 +57,7 @@ def test_every_page_is_followed_by_another() -> None:
         assert file != TITLES[title]
 
 
-@pytest.mark.parametrize("title", ["Overview", "Compare", "Replay", "Learning"])
+@pytest.mark.parametrize("title", ["Overview", "Episodes", "Compare", "Replay", "Learning"])
 def test_a_page_ends_with_the_step_that_follows(title: str) -> None:
     """That of Replay too, where nothing was run yet."""
     app = open_page(TITLES[title].removesuffix(".py"), data="cartpole")

@@ -205,7 +205,7 @@ def test_a_number_of_episodes_that_cannot_be_is_the_usual_one(episodes: str) -> 
 def test_with_nothing_chosen_the_page_says_so() -> None:
     app = open_page("shield", data="cartpole", shields="own file")
     assert "at least one agent and one shield" in texts(app)
-    assert not app.button
+    assert not app.main.button
 
 
 def test_a_policy_and_rules_of_one_s_own(tmp_path: Path) -> None:

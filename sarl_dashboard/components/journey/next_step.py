@@ -41,5 +41,5 @@ def next_step(page: str) -> None:
     if page not in _WITHOUT_DATA and raw_demonstrations() is None:
         return
     file, label = NEXT[page]
-    with st.container(key="next_step"):
+    with st.container(key="go_on"):
         st.page_link(file, label=f"Next: {label[:1].lower()}{label[1:]}", icon=":material/east:")

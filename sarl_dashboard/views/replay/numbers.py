@@ -10,7 +10,8 @@ from sarl_core.explaining.words.fork import ending_texts
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rules import UNFILTERED
 from sarl_core.rollouts.episodes import Episodes
-from sarl_dashboard.components.safety import FREEDOM_HELP, freedom_cell
+from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.safety import freedom_cell
 from sarl_dashboard.jobs.replays import ReplayPair
 from sarl_dashboard.state.rule_files import CHOSEN
 
@@ -54,7 +55,7 @@ def numbers(replay: ReplayPair) -> None:
             freedom_cell(shielded),
             border=True,
             height="stretch",
-            help=f"{FREEDOM_HELP}.",
+            help=word_help("freedom"),
         )
     (with_them,), (without,) = ending_texts(shielded), ending_texts(plain)
     ends = f"With the rules {with_them}. Without them {without}."

@@ -19,6 +19,7 @@ from sarl_core.mining.thresholds.steps import (
     with_step,
 )
 from sarl_dashboard.components.elsewhere import elsewhere_notice
+from sarl_dashboard.components.journey.words import word_help
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import compact_set
@@ -73,7 +74,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
             format_func=threshold_text,
             bind="query-params",
             on_change=moved,
-            help="Share of all demonstrated states to which a rule must apply.",
+            help=word_help("support", "Here: how much of it a rule must have at least."),
         )
         jump_buttons("support", jumps.support_below, jumps.support_above)
     with middle:
@@ -85,7 +86,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
             format_func=threshold_text,
             bind="query-params",
             on_change=moved,
-            help="Share of those states in which the expert did what the rule says.",
+            help=word_help("confidence", "Here: how much of it a rule must have at least."),
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
     with right:
@@ -98,7 +99,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
                 value=MIN_DIVIDER,
                 bind="query-params",
                 on_change=leave_compact,
-                help="Number of equal intervals each continuous action is divided into.",
+                help=word_help("divider"),
             )
         named_settings(thresholds, compact_set.in_force() if display.compact else None)
     point = display.point(thresholds)

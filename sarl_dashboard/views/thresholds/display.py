@@ -14,6 +14,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
+from sarl_dashboard.components.journey.words import word_help
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import compact_set
 from sarl_dashboard.state.compact_set import Compact
@@ -149,8 +150,7 @@ def more() -> None:
             bind="query-params",
             on_change=compact_set.choose,
             args=(None,),
-            help="How many times more often than over all states the expert must have done what "
-            "the rule says. 0: no limit.",
+            help=word_help("lift", "Here: how much of it a rule must have at least; 0: no limit."),
         )
         st.slider(
             "Maximum depth",

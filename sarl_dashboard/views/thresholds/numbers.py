@@ -11,6 +11,9 @@ from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.validation.cross_fitting import Judged
+from sarl_dashboard.components.journey.words import word_help
+
+_ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
 
 def show_numbers(point: Landscape, judged: Judged | None) -> None:
@@ -22,24 +25,22 @@ def show_numbers(point: Landscape, judged: Judged | None) -> None:
     """
     rules = int(point.rule_count[0, 0])
     with st.container(horizontal=True, key="metrics"):
-        st.metric("Rules", f"{rules:,}")
+        st.metric("Rules", f"{rules:,}", help=word_help("rule"))
         st.metric(
             "Mean length",
             f"{point.mean_length[0, 0]:.1f}" if rules else "–",
-            help="Conditions a rule, on average",
+            help=word_help("length of a rule", "Here: on average."),
         )
         st.metric(
             "Coverage",
             share_text(float(point.coverage[0, 0]), decimals=1),
-            help="Share of the demonstrated states in which some rule applies; elsewhere: of the "
-            "states of an episode that the rules were not mined from, on average",
+            help=word_help("coverage", _ELSEWHERE),
             **elsewhere(None if judged is None else judged.coverage),
         )
         st.metric(
             "Fidelity",
             share_text(float(point.fidelity[0, 0]), decimals=1),
-            help="Share of those in which the expert did what the rule says; elsewhere: in an "
-            "episode that the rules were not mined from, on average",
+            help=word_help("fidelity", _ELSEWHERE),
             **elsewhere(None if judged is None else judged.fidelity),
         )
         if point.held_out_fidelity is not None:

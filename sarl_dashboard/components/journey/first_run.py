@@ -1,0 +1,143 @@
+"""The first run: Lunar Lander in five steps, each on its page, with what to do there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import streamlit as st
+
+from sarl_dashboard.state.compact_set import THRESHOLDS
+from sarl_dashboard.state.data import DEFAULT_DATA
+from sarl_dashboard.state.rule_files import FEWEST
+
+_STEP, _DONE = "_first_run", "_first_run_done"
+_TASK = {"data": DEFAULT_DATA}
+_SLIDERS = {**_TASK, "set": THRESHOLDS}
+_SIX_RULES = {**_TASK, "set": FEWEST}
+
+
+@dataclass(frozen=True)
+class FirstStep:
+    """One of the five.
+
+    Attributes:
+        page: Title of the page.
+        file: Of the page.
+        what: What one sees there.
+        task: What to look at, and to do.
+        query: What is chosen.
+    """
+
+    page: str
+    file: str
+    what: str
+    task: str
+    query: dict[str, str]
+
+
+STEPS = (
+    FirstStep(
+        "Demonstrations",
+        "demonstrations.py",
+        "what an expert did",
+        "An expert landed a small spacecraft again and again. At every moment its state was "
+        "written down (where it was, how fast, how tilted), and which engine it fired. Look at how "
+        "often it used each engine; there is nothing to set.",
+        _SLIDERS,
+    ),
+    FirstStep(
+        "Thresholds",
+        "thresholds.py",
+        "how many rules, and how good",
+        "From these moments rules are found. Move **Minimum support** to the right: only rules "
+        "that apply often are left, so the number **Rules** falls. **Fidelity** says how often the "
+        "expert did what they say.",
+        _SLIDERS,
+    ),
+    FirstStep(
+        "Rules",
+        "rules.py",
+        "six rules in words",
+        "These six rules come with the data; they were built to be as few as possible, and may ask "
+        "about two numbers together. Choose one in the table and read its sentence.",
+        _SIX_RULES,
+    ),
+    FirstStep(
+        "What if",
+        "what_if.py",
+        "what the rules do in one state",
+        "Move one of the sliders, the angle for one, and see which rule decides now, and how "
+        "little would have to change for another one to decide.",
+        _SIX_RULES,
+    ),
+    FirstStep(
+        "Replay",
+        "replay.py",
+        "the rules at work",
+        "Press **Run**. On the left the six rules correct an agent that acts at random; on the "
+        "right nobody does. They were learned from examples and guarantee nothing: try other "
+        "seeds, and on the page Measure many episodes at once.",
+        {**_SIX_RULES, "agent": "novice", "rules": FEWEST},
+    ),
+)
+
+
+def begin_first_run() -> None:
+    """Go to the first step, on Lunar Lander; what was uploaded stays and can be chosen again."""
+    _go(0)
+
+
+def step_at_hand() -> int | None:
+    """Which step is next, from 0; None where there is no first run under way."""
+    number = st.session_state.get(_STEP)
+    return number if isinstance(number, int) else None
+
+
+def first_run_done() -> bool:
+    """Whether it was gone through to the end in this session."""
+    return bool(st.session_state.get(_DONE))
+
+
+def _go(number: int) -> None:
+    st.session_state[_STEP] = number
+    step = STEPS[number]
+    st.switch_page(step.file, query_params=step.query)
+
+
+def _end() -> None:
+    st.session_state.pop(_STEP, None)
+
+
+def show_first_run(page: str) -> None:
+    """What to do on this page, or where the run goes on; nothing where none is under way.
+
+    Args:
+        page: Title of the page.
+    """
+    number = step_at_hand()
+    if number is None or page == "Overview":
+        return
+    step = STEPS[number]
+    last = number == len(STEPS) - 1
+    with st.container(border=True, key="first_run"):
+        here = f"**First run, step {number + 1} of {len(STEPS)}: {step.what}.**"
+        st.markdown(f"{here} {step.task}" if page == step.page else here)
+        with st.container(horizontal=True, gap="small"):
+            if page != step.page:
+                if st.button(f"Go on with {step.page}", key="first_run_on", type="primary"):
+                    _go(number)
+            elif last:
+                if st.button("Done", key="first_run_on", type="primary", icon=":material/check:"):
+                    st.session_state[_DONE] = True
+                    _end()
+                    st.switch_page("overview.py", query_params=_TASK)
+            elif st.button(
+                f"Next: {STEPS[number + 1].page}",
+                key="first_run_on",
+                type="primary",
+                icon=":material/east:",
+            ):
+                _go(number + 1)
+            if page == step.page and number and st.button("Back", key="first_run_back"):
+                _go(number - 1)
+            st.button("End the first run", key="first_run_end", type="tertiary", on_click=_end)

@@ -1,0 +1,47 @@
+"""What words mean: where one is, in the list on the Overview, and beside every page."""
+
+from __future__ import annotations
+
+import streamlit as st
+
+from sarl_core.explaining.words.glossary import GLOSSARY, meaning_of
+from sarl_dashboard.text import together
+
+ANCHOR = "words"
+_ALL = f"[All words](./#{ANCHOR})"  # a link in a help text opens beside the page, which stays
+
+
+def word_help(word: str, more: str = "") -> str:
+    """What stands behind the "?" of a number or a slider that is called by a word.
+
+    Args:
+        word: One of the glossary.
+        more: What is to be said of it here.
+
+    Returns:
+        What it means, and the way to all words.
+    """
+    return " ".join(part for part in (meaning_of(word), more, _ALL) if part)
+
+
+def show_words(columns: int) -> None:
+    """Every word with what it means.
+
+    Args:
+        columns: Beside each other, where there is room.
+    """
+    lines = [f"**{word[0].upper()}{word[1:]}:** {together(GLOSSARY[word])}." for word in GLOSSARY]
+    most = -(-len(lines) // columns)
+    for place, column in enumerate(st.columns(columns, gap="medium")):
+        column.markdown("\n\n".join(lines[place * most : (place + 1) * most]))
+
+
+def words_button() -> None:
+    """The way to all words from any page, which stays as it is behind them."""
+    if st.sidebar.button("Words", key="words", icon=":material/menu_book:", type="tertiary"):
+        _words()
+
+
+@st.dialog("Words", width="large")
+def _words() -> None:
+    show_words(1)

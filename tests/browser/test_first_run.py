@@ -1,0 +1,40 @@
+"""The Overview in a browser: its film, the first run, and how a "?" leads to the words."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Page, expect
+
+from sarl_dashboard.components.journey.first_run import STEPS
+from tests.browser.walking import no_trace, parameters, settle, visit
+
+
+def test_the_first_run_goes_from_the_overview_to_a_replay_and_back(screen: Page) -> None:
+    visit(screen, "/", "Overview")
+    source = screen.get_by_test_id("stImage").locator("img").first.get_attribute("src")
+    assert source is not None
+    film = screen.request.get(source).body()
+    assert film.startswith(b"GIF89a")  # as it was made: a picture that is made smaller stands still
+    assert b"NETSCAPE2.0" in film
+    screen.get_by_role("button", name="Begin the first run").click()
+    for step in STEPS:
+        expect(screen.get_by_role("heading", name=step.page, level=1, exact=True)).to_be_visible()
+        settle(screen)
+        expect(screen.locator(".st-key-first_run")).to_contain_text(step.what)
+        for name, value in step.query.items():
+            if (name, value) not in (("data", "lunar_lander"), ("set", "thresholds")):
+                assert parameters(screen).get(name, "novice") == value
+        no_trace(screen)
+        screen.locator(".st-key-first_run_on button").click()
+    expect(screen.get_by_role("heading", name="Overview", level=1)).to_be_visible()
+    settle(screen)
+    expect(screen.locator(".st-key-first_run")).to_have_count(0)
+
+
+def test_a_question_mark_leads_to_the_words(screen: Page) -> None:
+    visit(screen, "/thresholds?data=cartpole", "Thresholds")
+    screen.get_by_test_id("stTooltipIcon").first.hover()
+    with screen.context.expect_page() as opening:
+        screen.get_by_role("link", name="All words").click()
+    words = opening.value
+    expect(words.get_by_role("heading", name="Words", level=3)).to_be_in_viewport()
+    expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()
