@@ -11,7 +11,7 @@ from sarl_dashboard.views.library.chosen import show_chosen
 from sarl_dashboard.views.library.listing import choose_item, import_form, removed_items, room
 
 st.title("Library")
-st.markdown("What you have made or uploaded is kept here: open it, share it, carry it elsewhere.")
+st.caption("What you have made or uploaded is kept here: open it, share it, carry it elsewhere.")
 try:
     opened = library.library()
     item = choose_item(opened, library.author())

@@ -221,7 +221,7 @@ def test_one_loop_steps_environments():
     assert stepping == {"sarl_core/rollouts/player.py", "sarl_core/shielding/wrappers.py"}
 
 
-PAGES = [path for path in sorted((ROOT / "pages").glob("*.py")) if path.name != "_router.py"]
+PAGES = [path for path in sorted((ROOT / "pages").rglob("*.py")) if path.name != "_router.py"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)

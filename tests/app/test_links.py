@@ -67,7 +67,7 @@ def test_a_page_opens_whatever_its_address_says(page: str, value: str) -> None:
     ],
 )
 def test_what_was_left_out_of_a_link_is_said(query: dict[str, str], named: str) -> None:
-    app = opened("demonstrations", **query)
+    app = opened("overview", **query)
     assert not app.exception
     (told,) = [warning.value for warning in app.warning if "link" in warning.value]
     assert f"cannot be used for {named}," in told
@@ -75,9 +75,9 @@ def test_what_was_left_out_of_a_link_is_said(query: dict[str, str], named: str) 
 
 
 def test_a_link_keeps_what_can_be_used() -> None:
-    app = opened("demonstrations", seed="inf", data="pendulum", left_out="3,7")
+    app = opened("overview", seed="inf", data="pendulum", left_out="3,7")
     assert app.query_params["data"] == "pendulum"
     assert app.query_params["left_out"] == "3,7"
     assert "seed" not in app.query_params
-    app = opened("demonstrations", data="cartpole", left_out="3,7")
+    app = opened("overview", data="cartpole", left_out="3,7")
     assert not [warning for warning in app.warning if "link" in warning.value]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 import streamlit as st
@@ -12,8 +13,10 @@ from sarl_dashboard.components.journey.next_step import NEXT
 from tests.app.screens import ROUTER, open_page
 
 TITLES = {
-    re.search(r'^st\.title\("(.+)"\)', path.read_text(), re.MULTILINE)[1]: path.name
-    for path in sorted(ROUTER.parent.glob("*.py"))
+    re.search(r'^st\.title\("(.+)"\)', path.read_text(), re.MULTILINE)[1]: str(
+        path.relative_to(ROUTER.parent)
+    )
+    for path in sorted(ROUTER.parent.rglob("*.py"))
     if path != ROUTER
 }
 SECTIONS = {
@@ -22,7 +25,7 @@ SECTIONS = {
     "2 Rules": ["Thresholds", "Rules", "Evidence"],
     "3 Understand and change": ["What if", "Edit", "Compare"],
     "4 Try the shield": ["Replay", "Measure", "Worth of each rule", "Audit"],
-    "5 Hand over": ["Report", "Export"],
+    "5 Hand over": ["Report", "Export", "Library"],
     "Research": ["Improve", "Learning", "Paper"],
 }
 
@@ -60,7 +63,7 @@ def test_every_page_is_followed_by_another() -> None:
 @pytest.mark.parametrize("title", ["Overview", "Episodes", "Compare", "Replay", "Learning"])
 def test_a_page_ends_with_the_step_that_follows(title: str) -> None:
     """That of Replay too, where nothing was run yet."""
-    app = open_page(TITLES[title].removesuffix(".py"), data="cartpole")
+    app = open_page(Path(TITLES[title]).stem, data="cartpole")
     (label,) = next_links(app)
     assert label[6:].casefold() == NEXT[title][1].casefold()
 

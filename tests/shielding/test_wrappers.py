@@ -107,7 +107,7 @@ def test_our_own_code_never_steps_around_a_wrapper():
     for path in [
         *Path("sarl_core").rglob("*.py"),
         *Path("sarl_dashboard").rglob("*.py"),
-        *Path("pages").glob("*.py"),
+        *Path("pages").rglob("*.py"),
         Path("app.py"),
     ]:
         for node in ast.walk(ast.parse(path.read_text())):
