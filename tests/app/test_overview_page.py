@@ -101,7 +101,7 @@ def test_every_word_is_in_the_list_and_a_question_mark_leads_to_it() -> None:
         ("Minimum confidence", "confidence"),
     ):
         assert helps[label].startswith(meaning_of(word))
-        assert "(./#words)" in helps[label]
+        assert "(./?words=all)" in helps[label]
 
 
 def test_the_words_open_beside_any_page() -> None:

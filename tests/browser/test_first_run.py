@@ -36,5 +36,6 @@ def test_a_question_mark_leads_to_the_words(screen: Page) -> None:
     with screen.context.expect_page() as opening:
         screen.get_by_role("link", name="All words").click()
     words = opening.value
-    expect(words.get_by_role("heading", name="Words", level=3)).to_be_in_viewport()
+    meaning = words.get_by_role("dialog").get_by_text("share of all demonstrated states")
+    expect(meaning).to_be_visible()
     expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()

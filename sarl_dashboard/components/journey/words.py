@@ -8,7 +8,9 @@ from sarl_core.explaining.words.glossary import GLOSSARY, meaning_of
 from sarl_dashboard.text import together
 
 ANCHOR = "words"
-_ALL = f"[All words](./#{ANCHOR})"  # a link in a help text opens beside the page, which stays
+_OPEN = "words"  # parameter of an address that opens them
+# A link in a help text opens beside the page, which stays.
+_ALL = f"[All words](./?{_OPEN}=all)"
 
 
 def word_help(word: str, more: str = "") -> str:
@@ -38,7 +40,9 @@ def show_words(columns: int) -> None:
 
 def words_button() -> None:
     """The way to all words from any page, which stays as it is behind them."""
-    if st.sidebar.button("Words", key="words", icon=":material/menu_book:", type="tertiary"):
+    linked = st.query_params.pop(_OPEN, None) is not None
+    button = st.sidebar.button("Words", key="words", icon=":material/menu_book:", type="tertiary")
+    if button or linked:
         _words()
 
 
