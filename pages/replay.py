@@ -8,7 +8,7 @@ from sarl_dashboard.jobs.replays import REPLAY, arrived, latest
 from sarl_dashboard.views.replay.episodes import comparison, take_up
 from sarl_dashboard.views.replay.film import film, headline
 from sarl_dashboard.views.replay.numbers import numbers
-from sarl_dashboard.views.replay.run import arrive, replay_bar, set_out
+from sarl_dashboard.views.replay.run import arrive, open_with, replay_bar, set_out
 from sarl_dashboard.views.replay.settings import settings
 from sarl_dashboard.views.replay.steps import step_by_step
 
@@ -19,11 +19,22 @@ st.caption(
     "demonstrations: they guarantee nothing."
 )
 set_out()
-current_order = replay_bar(settings())
+result, form = st.container(), st.container()
+with form:
+    choices = settings()
+with result:
+    order = open_with(choices)
 jump = arrived()
 played = latest()
+first = played is None and REPLAY.at_work
+# How far the work is stands where the picture will be, or below the form that asked for it. It is
+# drawn before all that follows: a press on Run is answered with it.
+with result if first else form:
+    if first:
+        st.caption("The first replay begins by itself. In the form below you choose another one.")
+    replay_bar(order, played)
 if played is None:
-    if current_order is not None and not REPLAY.at_work:
+    if order is not None and not REPLAY.at_work:
         st.info(
             "Choose an agent and the rules, then press Run. What rules do shows best with the "
             "novice, which acts at random, and the unfiltered rules; those at the paper's filtered "
@@ -31,9 +42,10 @@ if played is None:
             icon=":material/play_circle:",
         )
 else:
-    headline(played.replay, current_order)
-    numbers(played.replay)
-    film(played.replay)
+    with result:
+        headline(played.replay)
+        film(played.replay)
+        numbers(played.replay)
     take_up(played.order)
     step_by_step(played)
     if jump is not None:

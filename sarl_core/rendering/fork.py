@@ -23,8 +23,7 @@ from sarl_core.progress import Progress, report
 from sarl_core.rendering.camera import film_episode, picture_speed
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
-from sarl_core.rendering.gif_and_mp4 import gif_bytes
-from sarl_core.rendering.overlay import Caption, Panel, side_by_side_picture
+from sarl_core.rendering.overlay import Caption, Panel
 from sarl_core.rendering.replay import DescribeRule, Replay, sentences
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
@@ -36,7 +35,7 @@ Rest = Literal["shielded", "alone"]
 Ending = Literal["failure", "end", "limit"]
 """How an episode ended: by a failure, by the environment for another reason, by a time limit."""
 
-_LEAD_SECONDS = 1.0  # of the common part that a picture of the fork begins with
+_LEAD_SECONDS = 1.0  # of the common part that a film of the fork begins with
 
 
 class Branch(NamedTuple):
@@ -60,7 +59,8 @@ class Fork:
     """An episode with all changes of a shield, and one without one of them.
 
     Attributes:
-        replay: Both, the one with the change on the left.
+        replay: Both, the one with the change on the left; a film of them begins a second before
+            they part.
         step: Where they part.
         rest: What the shield does after it, in the one without the change.
     """
@@ -89,32 +89,6 @@ class Fork:
     def difference(self) -> float:
         """What the return gains, or loses where it is negative, when the change is withheld."""
         return float(self.withheld.returns[0] - self.unchanged.returns[0])
-
-    @property
-    def first_picture(self) -> int:
-        """Where a moving picture begins: a second before the two part."""
-        return max(self.step - round(_LEAD_SECONDS * self.replay.fps), 0)
-
-    def gif(self, *, progress: Progress | None = None) -> bytes:
-        """Both branches side by side, from a second before they part; encoded once.
-
-        Args:
-            progress: Called with (pictures done, in all); returning False stops.
-
-        Returns:
-            The file's content.
-        """
-        if "_gif" not in self.__dict__:
-            first, panels = self.first_picture, self.replay.panels
-            self.__dict__["_gif"] = gif_bytes(
-                len(self.replay) - first,
-                lambda number: side_by_side_picture(panels, first + number),
-                panels[0].film.palette.colours,
-                self.replay.fps,
-                progress=progress,
-            )
-        content: bytes = self.__dict__["_gif"]
-        return content
 
 
 def fork(
@@ -191,7 +165,8 @@ def fork(
                 rest=rest,
             )
         )
-    return Fork(Replay(tuple(episodes), tuple(panels), fps), step, rest)
+    first = max(step - round(_LEAD_SECONDS * fps), 0)
+    return Fork(Replay(tuple(episodes), tuple(panels), fps, first), step, rest)
 
 
 def _check_step(episode: Episodes, step: int, seed: int) -> None:

@@ -25,7 +25,7 @@ from sarl_core.rendering.camera import film_episode, picture_speed
 from sarl_core.rendering.canvas import OVERLAY_COLOURS
 from sarl_core.rendering.film import Film, Palette
 from sarl_core.rendering.gif_and_mp4 import encode_gif, encode_mp4, gif_bytes
-from sarl_core.rendering.overlay import Panel, side_by_side_picture
+from sarl_core.rendering.overlay import GAP, Panel, side_by_side_picture
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.player import shield_for
 from sarl_core.rollouts.trial import make_agent
@@ -47,11 +47,13 @@ class Replay:
         episodes: One `Episodes` of a single episode, with its steps, for each panel.
         panels: What is drawn, in the order of `episodes`.
         fps: Pictures a second, real time.
+        first: The picture that a film of it begins with.
     """
 
     episodes: tuple[Episodes, ...]
     panels: tuple[Panel, ...]
     fps: float
+    first: int = 0
 
     def named(self, dimensions: tuple[LabelledDimension, ...]) -> Replay:
         """The same pictures under other names of the actions.
@@ -60,16 +62,28 @@ class Replay:
             dimensions: Of the same environment.
         """
         panels = tuple(replace(panel, dimensions=dimensions) for panel in self.panels)
-        return Replay(self.episodes, panels, self.fps)
+        return replace(self, panels=panels)
 
     def __len__(self) -> int:
         """Number of pictures: one before each step, and the last state."""
         return 1 + max(len(panel.steps) for panel in self.panels)
 
     @property
+    def pictures(self) -> int:
+        """Number of those in a film of it."""
+        return len(self) - self.first
+
+    @property
     def seconds(self) -> float:
-        """How long it runs."""
-        return len(self) / self.fps
+        """How long a film of it runs."""
+        return self.pictures / self.fps
+
+    @property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """Left edge and width of each panel, in pixels."""
+        widths = [panel.size[1] for panel in self.panels]
+        lefts = [sum(widths[:at]) + at * GAP for at in range(len(widths))]
+        return tuple(zip(lefts, widths, strict=True))
 
     def frame(self, number: int) -> NDArray[np.uint8]:
         """The picture in which step `number` is decided; its text is about exactly that step.
@@ -100,8 +114,8 @@ class Replay:
         return file.getvalue()
 
     def animation(self) -> Iterator[NDArray[np.uint8]]:
-        """All pictures, in order, as they are saved."""
-        for number in range(len(self)):
+        """All pictures of a film, in order, as they are saved."""
+        for number in range(self.first, len(self)):
             yield self.frame(number)
 
     @cached_property
@@ -122,8 +136,8 @@ class Replay:
         """
         if "_gif" not in self.__dict__:
             self.__dict__["_gif"] = gif_bytes(
-                len(self),
-                lambda number: side_by_side_picture(self.panels, number),
+                self.pictures,
+                lambda number: side_by_side_picture(self.panels, self.first + number),
                 self._colours,
                 self.fps,
                 progress=progress,
@@ -145,7 +159,7 @@ class Replay:
         target = as_path(path)
         check_picture_path(target)
         if target.suffix.lower() == ".mp4":
-            encode_mp4(self.animation(), self.fps, target, count=len(self), progress=progress)
+            encode_mp4(self.animation(), self.fps, target, count=self.pictures, progress=progress)
             return
         with whole_file(target) as unfinished:
             unfinished.write_bytes(self.gif(progress=progress))

@@ -32,6 +32,7 @@ from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.job import Job, Place, Result
 from sarl_dashboard.memory_cache import BoundedCache
 from sarl_dashboard.state.agents import ChosenAgent
+from sarl_dashboard.text import digest_of
 
 EPISODES = (20, 50, 100, 200)
 WITH, WITHOUT, ALONE = "with the rules", "without", "agent alone"
@@ -122,6 +123,11 @@ class ReplayPair:
         return self.main_episode.steps
 
     @cached_property
+    def name(self) -> str:
+        """Tells its film from all others."""
+        return digest_of(self.film.gif())
+
+    @cached_property
     def png(self) -> Callable[[int], bytes]:
         """Gives the picture of a step as a file; the latest are kept."""
         return lru_cache(MOST_PICTURES)(self.film.png)
@@ -156,6 +162,16 @@ class Played:
 
     order: ReplayOrder
     replay: ReplayPair
+
+
+def begin_anew(order: ReplayOrder) -> None:
+    """Run a replay in the place of the latest, which is of another task.
+
+    Args:
+        order: Of the replay.
+    """
+    st.session_state.pop(_LATEST, None)
+    REPLAY.begin(lambda: replaying(Jump(order)))
 
 
 def latest_order() -> ReplayOrder | None:
@@ -355,13 +371,13 @@ def _fork(order: ReplayOrder, step: int, rest: Rest, job: Job[Fork]) -> Fork:
     )
     dimensions = environment_dimensions(order.description, rule_set)
     branched = replace(branched, replay=branched.replay.named(dimensions))
-    branched.gif(progress=_encoding(job))
+    branched.replay.gif(progress=_encoding(job))
     return branched
 
 
-def movie(replay: ReplayPair) -> bytes:
-    """The replay as MP4."""
+def movie(film: Film) -> bytes:
+    """A replay, or both branches of a fork, as MP4."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "replay.mp4"
-        replay.film.save(path)
+        path = Path(folder) / "film.mp4"
+        film.save(path)
         return path.read_bytes()

@@ -22,17 +22,50 @@ def run(app: AppTest) -> AppTest:
     return run_through(app, "replay")
 
 
-def test_before_a_run_the_page_says_what_to_do() -> None:
-    app = open_page("replay")
+def test_the_page_opens_with_the_novice_under_the_rules_in_force() -> None:
+    app = finished(open_page("replay", data="cartpole"), "replay")
+    assert "Novice" in texts(app)
+    assert "rules (at the thresholds)" in texts(app)
+    assert "Return with rules" in metrics(app)
+    assert not app.button(key="run_replay").disabled  # another one can be had
+
+
+def test_another_task_is_not_left_with_the_picture_of_the_one_before() -> None:
+    app = finished(open_page("replay", data="cartpole"), "replay")
+    app.selectbox(key="env").set_value("Pendulum-v1")
+    app.selectbox(key="rules").set_value("none").run()
+    assert "CartPole" not in texts(finished(app, "replay"))
+    assert "**Novice** in **Pendulum-v1**" in texts(app)
+
+
+def test_what_was_called_off_at_the_first_visit_is_begun_by_a_press() -> None:
+    app = open_page("replay", data="lunar_lander", rules="unfiltered", seed="78")
+    assert "begins by itself" in texts(app)
+    app.button(key="cancel_replay").click().run()
+    app.run()
     assert "press Run" in texts(app)
+    assert "Cancelled; nothing was kept" in texts(app)
     assert not app.metric
+
+
+def test_results_stand_above_the_forms_that_made_them() -> None:
+    app = run(open_page("replay", data="cartpole", rules="unfiltered", seed="3"))
+    app.button(key="next").click().run()
+    run_through(app, "fork")
+    run_through(app, "episodes")
+    protos = [getattr(element, "proto", None) for element in app.main]
+    ids = [str(getattr(proto, "id", "")) for proto in protos]
+    for result, form in (("film", "run_replay"), ("fork_film", "withhold"), ("comparison", "over")):
+        (above,) = [at for at, name in enumerate(ids) if name.endswith(f"-{result}")]
+        (below,) = [at for at, name in enumerate(ids) if name.endswith(f"-{form}")]
+        assert above < below, form
 
 
 def test_work_of_the_page_before_is_not_taken_for_a_chosen_step() -> None:
     app = open_page("evidence", data="cartpole", support="0.05", confidence="0.9")
     app.switch_page("replay.py").run()
     assert not app.exception, app.exception
-    assert "press Run" in texts(app)
+    assert finished(app, "replay").slider(key="step").value == 0
 
 
 @pytest.mark.parametrize(
@@ -71,7 +104,6 @@ def test_the_rules_keep_a_novice_upright() -> None:
 
 def test_a_run_is_called_off_or_goes_on_while_another_page_is_read() -> None:
     app = open_page("replay", data="lunar_lander", rules="unfiltered", seed="77")
-    app.button(key="run_replay").click().run()
     app.button(key="cancel_replay").click().run()
     assert "Cancelled; nothing was kept" in texts(app)
     assert not metrics(app)

@@ -102,8 +102,7 @@ def test_a_rule_is_opened(screen: Page) -> None:
 
 
 def replay(screen: Page, query: str) -> None:
-    visit(screen, f"/replay?{query}", "Replay")
-    screen.get_by_role("button", name="Run", exact=True).click()
+    visit(screen, f"/replay?{query}", "Replay")  # it is run unasked
     expect(screen.get_by_role("heading", name="Step by step")).to_be_visible(timeout=PATIENCE)
     settle(screen)
 
@@ -127,11 +126,6 @@ def test_a_gif_is_made_and_downloaded(screen: Page, tmp_path: Path) -> None:
     assert sum(durations) == pytest.approx(1000 * (steps + 1) / 50, abs=20)
     assert len(np.unique(frames[0].reshape(-1, 3), axis=0)) > 5
     assert any((frame != frames[0]).any() for frame in frames[1:])
-    shown = screen.get_by_test_id("stImage").first.locator("img")
-    assert shown.evaluate("image => image.naturalWidth") == frames[0].shape[1]
-    source = shown.get_attribute("src")
-    assert source is not None
-    assert source.endswith(".gif")
     no_trace(screen)
 
 

@@ -14,6 +14,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.mining.language import number_text
+from sarl_core.rendering.overlay import GAP
 from sarl_core.rollouts.steps import StepTable
 from tests.browser.walking import PATIENCE, metric, no_trace, parameters, settle, visit
 
@@ -35,8 +36,7 @@ def wanted() -> StepTable:
 
 
 def replay(screen: Page, query: str = "") -> None:
-    visit(screen, f"{ADDRESS}{query}", "Replay")
-    screen.get_by_role("button", name="Run", exact=True).click()
+    visit(screen, f"{ADDRESS}{query}", "Replay")  # it is run unasked
     recorder = screen.get_by_role("heading", name="Flight recorder")
     expect(recorder).to_be_visible(timeout=PATIENCE)
     expect(screen.locator(".st-key-recorder_table canvas").first).to_be_visible()
@@ -136,17 +136,17 @@ def test_both_pictures_of_a_fork_are_shown_and_downloaded(screen: Page, wanted: 
     step = int(changes[changes > 30][0])
     expect_step(screen, step, wanted)
     screen.get_by_role("button", name=f"Go on without the change at step {step}").click()
-    both = screen.get_by_alt_text("Left: with the change. Right: without it.")
+    both = screen.get_by_role("img", name="Left: with the change. Right: without it.")
     expect(both).to_be_visible(timeout=PATIENCE)
+    alone = screen.get_by_role("img", name="The episode, with the rules and without")
     settle(screen)
     assert metric(screen, "Return with it") == metric(screen, "Return with rules")
-    for key, shown in (
-        ("fork_gif", both),
-        ("gif", screen.get_by_test_id("stImage").locator("img")),
-    ):
+    for key, shown in (("fork_gif", both), ("gif", alone)):
         content = downloaded(screen, key)
         assert content[:4] == b"GIF8"
-        width = shown.first.evaluate("image => image.complete ? image.naturalWidth : 0")
+        parts = shown.locator("canvas")
+        expect(parts).to_have_count(2)
+        width = GAP + sum(part.evaluate("part => part.width") for part in parts.all())
         with Image.open(io.BytesIO(content)) as picture:
             assert picture.width == width
             assert picture.n_frames > 10
@@ -154,6 +154,8 @@ def test_both_pictures_of_a_fork_are_shown_and_downloaded(screen: Page, wanted: 
             last = np.asarray(picture.convert("RGB")).astype(int)
         half = last.shape[1] // 2  # one branch stands beside the other, and they end apart
         assert (last[:, :half] != last[:, -half:]).any()
+    for key in ("fork_mp4", "mp4"):
+        assert downloaded(screen, key)[4:8] == b"ftyp"
     no_trace(screen)
 
 

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imageio_ffmpeg import count_frames_and_secs
 from PIL import Image
 
 from sarl_core import InputError, Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.progress import CancelledError
 from sarl_core.rendering.fork import Fork, Rest, endings, fork
+from sarl_core.rendering.overlay import GAP
 from sarl_core.rollouts.steps import StepTable
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
@@ -102,17 +104,24 @@ def test_the_branch_without_is_what_the_environment_does_with_those_actions(cart
     assert endings(found.withheld) == (without.ending,)
 
 
-def test_the_same_fork_gives_the_same_picture(cart: Shield) -> None:
+def test_the_same_fork_gives_the_same_picture(cart: Shield, tmp_path: Path) -> None:
     step = int(np.flatnonzero(original("CartPole-v1", cart, 7).intervened)[20])
     found, again = (
         fork("CartPole-v1", "novice", cart, step=step, rest="alone", seed=7) for _ in range(2)
     )
-    assert found.gif() == again.gif()
-    assert found.gif() is found.gif()
-    picture = Image.open(io.BytesIO(found.gif()))
+    assert found.replay.gif() == again.replay.gif()
+    assert found.replay.gif() is found.replay.gif()
+    picture = Image.open(io.BytesIO(found.replay.gif()))
     one = found.replay.panels[0].size[1]
     assert picture.width > 2 * one  # two panels and the gap
-    assert found.first_picture == max(step - 50, 0)
+    first = max(step - 50, 0)  # a second before they part
+    film = found.replay
+    assert (film.first, film.pictures) == (first, len(film) - first)
+    assert (next(film.animation()) == film.frame(first)).all()
+    assert film.places == ((0, one), (one + GAP, one))
+    found.replay.save(tmp_path / "fork.mp4")
+    shown, _ = count_frames_and_secs(tmp_path / "fork.mp4")
+    assert shown == film.pictures
     marks = [found.replay.panels[1].caption(at).mark for at in (step - 1, step, step + 1)]
     assert marks[1:] == ["WITHHELD", "NO SHIELD"]
     assert found.replay.panels[0].caption(step).mark == "CHANGED"

@@ -24,6 +24,7 @@ from sarl_dashboard.jobs.replays import (
     EPISODES,
     WITH,
     ReplayOrder,
+    Runs,
     compared,
     comparing,
     comparison_cache,
@@ -47,6 +48,7 @@ def comparison(order: ReplayOrder) -> None:
     """Several episodes instead of one, on request."""
     st.subheader("Over several episodes")
     ran, order = compared(order), _first(order)
+    result = st.container()
     episodes = int(
         st.segmented_control(
             "Episodes",
@@ -81,6 +83,16 @@ def comparison(order: ReplayOrder) -> None:
     if ran != (order, episodes):
         st.session_state["_compared"] = (order, episodes)
         st.rerun()  # the recorder above shows their steps
+    with result:
+        outcome(runs)
+
+
+def outcome(runs: Runs) -> None:
+    """What came of them.
+
+    Args:
+        runs: With the rules, where there are some, and without.
+    """
     rows, table = [], []
     for (name, run), safety in zip(runs, safety_columns([run for _, run in runs]), strict=True):
         interval = summarise(run.returns)

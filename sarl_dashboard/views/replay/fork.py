@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import streamlit as st
 
 from sarl_core.explaining.html.headings import heading
@@ -9,8 +11,9 @@ from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.fork import Fork, Rest
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
-from sarl_dashboard.jobs.replays import FORK, Played, fork_cache, forking
-from sarl_dashboard.text import escaped
+from sarl_dashboard.jobs.replays import FORK, Played, fork_cache, forking, movie
+from sarl_dashboard.text import digest_of, escaped
+from sarl_dashboard.views.replay.player import film_player
 
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
 
@@ -32,6 +35,7 @@ def fork_section(played: Played, current: int) -> None:
             else "The rules changed nothing in this episode, so there is nothing to withhold."
         )
         return
+    result = st.container()
     chosen = st.segmented_control(
         "Withhold",
         list(RESTS),
@@ -66,7 +70,8 @@ def fork_section(played: Played, current: int) -> None:
     watched(FORK, bar, seconds=0.5)
     branched = fork_cache().get(key)
     if branched is not None:
-        show(branched)
+        with result:
+            show(branched)
 
 
 def show(branched: Fork) -> None:
@@ -84,6 +89,9 @@ def show(branched: Fork) -> None:
         )
         st.metric("Length with it", f"{with_it.steps:,}", border=True, height="stretch")
         st.metric("Length without it", f"{without.steps:,}", border=True, height="stretch")
-    gif = branched.gif()
-    st.image(gif, width="content", alt="Left: with the change. Right: without it.")
-    download("Download GIF", gif, f"fork-{branched.step}-{branched.rest}.gif", key="fork_gif")
+    film = branched.replay
+    gif, name = film.gif(), f"fork-{branched.step}-{branched.rest}"
+    film_player(film, digest_of(gif), "Left: with the change. Right: without it.", key="fork_film")
+    with st.container(horizontal=True):
+        download("Download GIF", gif, f"{name}.gif", key="fork_gif")
+        download("Download MP4", partial(movie, film), f"{name}.mp4", key="fork_mp4")

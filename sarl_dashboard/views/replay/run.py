@@ -11,10 +11,12 @@ from sarl_dashboard.jobs.replays import (
     Jump,
     Played,
     ReplayOrder,
+    begin_anew,
     compared,
     latest_order,
     replaying,
 )
+from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.replay.settings import ReplaySettings
 
@@ -39,13 +41,35 @@ def set_out() -> None:
         REPLAY.begin(lambda: replaying(jump))
 
 
-def replay_bar(settings: ReplaySettings) -> ReplayOrder | None:
-    """The button, or how far the work is; what the settings ask for, None if it cannot be had."""
+def open_with(settings: ReplaySettings) -> ReplayOrder | None:
+    """What the settings ask for, which is run unasked where none of this task was yet.
+
+    Args:
+        settings: On the page.
+
+    Returns:
+        None if it cannot be had, and then the page says why.
+    """
     try:
         order = settings.order()
     except SarlError as error:
         refuse(error)
-        order = None
+        return None
+    demonstrations = chosen_demonstrations()
+    task = (str(order.env_id), "" if demonstrations is None else demonstrations.digest)
+    if st.session_state.get("_replayed_task") != task:
+        st.session_state["_replayed_task"] = task
+        begin_anew(order)
+    return order
+
+
+def replay_bar(order: ReplayOrder | None, played: Played | None) -> None:
+    """The button, or how far the work is.
+
+    Args:
+        order: What the settings ask for; None if it cannot be had.
+        played: On screen; None where nothing is yet.
+    """
     offer = None
     if order is not None:
         jump = Jump(order)
@@ -60,7 +84,10 @@ def replay_bar(settings: ReplaySettings) -> ReplayOrder | None:
         if st.session_state.pop("_run", False):
             REPLAY.begin(offer.start)
     watched(REPLAY, lambda _: run_bar(REPLAY, offer), seconds=0.5)
-    return order
+    changed = played is not None and (order is None or order.key != played.order.key)
+    # Below the buttons: what goes away above one that is being pressed moves it from the pointer.
+    if changed and not REPLAY.at_work:
+        st.markdown(":orange[:material/info: The settings have changed since: press Run.]")
 
 
 def arrive(jump: Jump, played: Played) -> None:

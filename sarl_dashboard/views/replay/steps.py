@@ -30,16 +30,24 @@ from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room,
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
 from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.views.replay.fork import fork_section
+from sarl_dashboard.views.replay.player import film_at
 from sarl_dashboard.views.replay.recorder import flight_recorder
 
 
 def pick_step() -> None:
-    """Go to the step that was clicked in the strip; for a callback, and the last thing it does.
+    """Go to the step that was clicked in the strip; for a callback, and the last thing it does."""
+    look_at(clicked_step("strip"))
 
-    The slider is drawn by another fragment, which finds the step as it begins: what a callback
-    writes to a slider does not reach the browser when it asks for another run.
+
+def look_at(step: int | None) -> None:
+    """Go to a step that was chosen outside the fragment of the slider.
+
+    That fragment finds the step as it begins: what a callback writes to a slider does not reach
+    the browser when it asks for another run.
+
+    Args:
+        step: None where there is none to go to.
     """
-    step = clicked_step("strip")
     if step is not None:
         st.session_state["_step"] = step
         # A click in a picture that is about to go finds no fragment: then the page runs as a whole.
@@ -116,6 +124,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
         changes(replay, current, mark)
     else:
         st.html(mark)
+        film_at(replay.name, current)
     view = step_view(steps, current, replay.dimensions, replay.features, replay.rule_set)
     pictures, words = st.columns([3, 2], gap="medium")
     with pictures:
@@ -168,6 +177,7 @@ def changes(replay: ReplayPair, current: int, mark: Markup) -> None:
         )
         count = f"{len(changed):,} of {len(replay.steps):,} steps were changed."
         st.html(mark + aside(f"{count} {flips_text(replay.main_episode)}"))
+        film_at(replay.name, current)
 
 
 def flips_text(episodes: Episodes) -> str:
