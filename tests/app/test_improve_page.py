@@ -162,7 +162,9 @@ def test_a_run_is_what_the_library_gives_and_goes_on_from_there(expected: Aggreg
     app.button(key="use_improved").click().run()
     assert not app.exception
     assert "now the ones chosen, on every page" in app.success[0].value
-    assert app.query_params["data"] == "upload"
+    kept = app.selectbox(key="_data_choice")
+    assert app.query_params["data"] == kept.value
+    assert any(label.endswith("-rules.parquet") for label in kept.options)
     used = app.session_state["_upload"]
     assert used.digest == expected.demonstrations.digest
     app.switch_page("rules.py").run()
