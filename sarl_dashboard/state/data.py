@@ -46,11 +46,18 @@ def dataset_labels() -> dict[str, str]:
     """
     labels = {name: dataset_label(name) for name in SHIPPED_SETS}
     own = library.own_demonstrations()
-    labels |= {item.id: item.name for item in own[:_MOST_LISTED]}
+    for item in own[:_MOST_LISTED]:
+        # Streamlit tells options by what they are called: no two may be called alike.
+        called = (item.name, f"{item.name} ({item.created.astimezone():%d %b, %H:%M:%S})")
+        free = [label for label in called if label not in labels.values()]
+        labels[item.id] = free[0] if free else f"{item.name} ({item.id})"
     if not st.session_state.get("_upload_id"):  # it has a place in the list
         labels[UPLOAD] = dataset_label(UPLOAD)
     name = chosen_dataset()
-    return labels if name in labels else labels | {name: dataset_label(name)}
+    if name not in labels:
+        label = dataset_label(name)
+        labels[name] = f"{label} ({name[:26]})" if label in labels.values() else label
+    return labels
 
 
 def dataset_label(name: str) -> str:

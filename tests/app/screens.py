@@ -21,10 +21,15 @@ def open_page(name: str, **query: str | list[str]) -> AppTest:
         app.query_params[key] = value
     app.run()
     if name != "overview":
-        (file,) = ROUTER.parent.rglob(f"{name}.py")
-        app.switch_page(str(file.relative_to(ROUTER.parent))).run()
+        app.switch_page(page_file(name)).run()
     assert not app.exception, app.exception
     return app
+
+
+def page_file(name: str) -> str:
+    """Where a page lies, as pages call each other."""
+    (file,) = ROUTER.parent.rglob(f"{name}.py")
+    return str(file.relative_to(ROUTER.parent))
 
 
 def texts(app: AppTest) -> str:

@@ -14,7 +14,7 @@ from sarl_core import (
     with_combinations,
     with_formulas,
 )
-from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts
+from tests.app.screens import ROUTER, errors, html, open_page, page_file, run_through, texts
 from tests.app.test_demonstrations_page import upload
 from tests.app.test_names_page import type_into
 
@@ -55,7 +55,7 @@ def test_every_page_opens_with_what_is_derived(content: bytes) -> None:
     app = upload(open_page("demonstrations"), ("combined.parquet", content))
     assert not app.exception, app.exception
     for page in PAGES:
-        app.switch_page(f"{page}.py").run()
+        app.switch_page(page_file(page)).run()
         assert not app.exception, (page, app.exception)
     app.switch_page("rules.py").run()
     assert " of pole angular velocity" in texts(app) + html(app)

@@ -56,6 +56,19 @@ def test_an_upload_is_there_after_a_reload_with_its_names_and_formulas() -> None
     assert "crane.csv" in sidebar.options
 
 
+def test_two_files_of_one_name_are_told_apart() -> None:
+    first = upload(open_page("demonstrations"))
+    app = open_page("demonstrations")
+    second = upload(app, ROWS.replace(b"0.5", b"0.75"))
+    assert first != second
+    labels = app.selectbox(key="_data_choice").options
+    assert len([label for label in labels if label.startswith("crane.csv")]) == 2
+    assert len(set(labels)) == len(labels)
+    app.switch_page("thresholds.py").run()
+    assert app.query_params["data"] == second
+    assert app.selectbox(key="_data_choice").value == second
+
+
 def test_the_same_file_is_kept_once() -> None:
     first = upload(open_page("demonstrations"))
     assert upload(open_page("demonstrations")) == first
