@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.walking import metric, no_trace, parameters, visit
 
-PAGES = 19
+PAGES = 20
 
 
 def test_the_overview_is_where_one_arrives_and_takes_the_data_of_old_links(screen: Page) -> None:

@@ -26,7 +26,7 @@ def _part(ending: str) -> str:
 _PLAYER = st.components.v2.component(
     "film_player", html=_part(".html"), css=_part(".css"), js=_part(".js")
 )
-_STEP = st.components.v2.component("film_step", html="<span></span>\n<span></span>", js=_TELL)
+_STEP = st.components.v2.component("film_step", js=_TELL)
 
 
 def _nothing() -> None:
