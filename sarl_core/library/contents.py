@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import (
@@ -28,10 +27,7 @@ def add_demonstrations(
     name: str,
     *,
     author: str,
-    parent: str = "",
     command: str = "",
-    details: Mapping[str, Any] | None = None,
-    shared: bool = False,
 ) -> Item:
     """Keep demonstrations, with names, units and formulas.
 
@@ -40,10 +36,7 @@ def add_demonstrations(
         demonstrations: All of them.
         name: What they are called.
         author: Whose they are.
-        parent: Id of the version that they were made from.
         command: That makes them again.
-        details: More about them.
-        shared: Whether they stand in everybody's list.
 
     Raises:
         InputError: As of `Library.add`.
@@ -63,10 +56,8 @@ def add_demonstrations(
             {"demonstrations": (path, ".parquet")},
             author=author,
             digest=demonstrations.digest,
-            parent=parent,
             command=command,
-            details={**about, **(details or {})},
-            shared=shared,
+            details=about,
         )
 
 
@@ -78,8 +69,6 @@ def add_rules(
     author: str,
     parent: str = "",
     came_from: Sequence[str] = (),
-    command: str = "",
-    details: Mapping[str, Any] | None = None,
     shared: bool = False,
 ) -> Item:
     """Keep a rule set, as it is written into a rule file.
@@ -91,8 +80,6 @@ def add_rules(
         author: Whose it is.
         parent: Id of the version that it was made from.
         came_from: Ids of the demonstrations that it was mined from.
-        command: That makes it again.
-        details: More about it.
         shared: Whether it stands in everybody's list.
 
     Raises:
@@ -111,8 +98,7 @@ def add_rules(
             digest=rules_digest(rule_set),
             parent=parent,
             came_from=came_from,
-            command=command,
-            details={**about, **(details or {})},
+            details=about,
             shared=shared,
         )
 

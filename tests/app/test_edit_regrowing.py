@@ -36,7 +36,7 @@ def keys(app: AppTest) -> list[str]:
     return [str(button.key) for button in app.button]
 
 
-def queries(app: AppTest):  # type: ignore[no-untyped-def]
+def queries(app: AppTest):
     return next(one.value for one in app.dataframe if "Gain" in one.value)
 
 

@@ -20,7 +20,7 @@ from tests.app.test_thresholds_page import expected, specs
 
 def best(**limits: float) -> Recommendation:
     data = load_demonstrations(CART)
-    found = recommended(grow_policy_trees(data), cross_fit(data), **limits)  # type: ignore[arg-type]
+    found = recommended(grow_policy_trees(data), cross_fit(data), **limits)
     assert found is not None
     return found
 
@@ -60,7 +60,7 @@ def test_it_is_marked_among_the_trade_offs() -> None:
     app = open_page("thresholds", data="cartpole", details="Best trade-offs")
     until(app, "mined without it, they are right in")
     assert "the diamond the one recommended above" in texts(app)
-    traces = {trace.get("name"): trace for trace in specs(app)[-1]["data"]}  # type: ignore[attr-defined]
+    traces = {trace.get("name"): trace for trace in specs(app)[-1]["data"]}
     assert traces["recommended"]["x"] == [best().rules]
 
 

@@ -65,7 +65,11 @@ def test_equal_rules_are_one_dot_that_says_how_many_they_are(rules: RuleSet) -> 
             assert f"{count} {action_text(label, rules.actions[0])}" in text
     marks = rule_scatter(dots, rules, SUPPORT, CONFIDENCE).data[0]
     widest = {
-        key: max(size for (id_,), size in zip(marks.customdata, marks.marker.size) if id_ == key)  # noqa: B905
+        key: max(
+            size
+            for (id_,), size in zip(marks.customdata, marks.marker.size, strict=True)
+            if id_ == key
+        )
         for key in {id_ for (id_,) in marks.customdata}
     }
     assert widest[dots[0].rules[0].id] > widest[dots[-1].rules[0].id] >= 7
@@ -126,7 +130,7 @@ def test_the_actions_of_several_dimensions_have_their_colours_and_forms(
     marks = rule_scatter(dots, rules, SUPPORT, CONFIDENCE).data[0]
     symbols = {
         (symbol, colour)
-        for symbol, colour in zip(marks.marker.symbol, marks.marker.color)  # noqa: B905
+        for symbol, colour in zip(marks.marker.symbol, marks.marker.color, strict=True)
     }
     forms = ("circle", "diamond")
     assert symbols == {(forms[one.dimension], label_colour(one.action)) for one in rules.rules}
