@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from hashlib import blake2b
 from pathlib import Path
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -15,6 +16,9 @@ from sarl_core.demonstrations.formats import (
 from sarl_core.errors import InputError, quoted
 from sarl_core.library.items import Item, Kind
 from sarl_core.library.library import Library
+from sarl_core.limits import limited_bytes
+from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
+from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest, rules_from_json
 
 MAIN_FILES = {"demonstrations": ".parquet", "rules": ".json"}
@@ -103,6 +107,56 @@ def add_rules(
         )
 
 
+def add_edits(
+    library: Library,
+    edits: Sequence[Edit],
+    base: str,
+    *,
+    author: str,
+) -> Item:
+    """Keep edits, so that a link can name them; where their author keeps the same, that is it.
+
+    Args:
+        library: Where.
+        edits: The oldest first.
+        base: What tells the rules that they were made on.
+        author: Who made them.
+
+    Raises:
+        InputError: As of `Library.add`.
+        WorkError: If they cannot be written.
+    """
+    content = edits_to_json(edits).encode()
+    digest = blake2b(base.encode() + b"\0" + content, digest_size=16).hexdigest()
+    for known in library.with_digest(digest, kind="edits"):
+        if known.author == author:
+            return known
+    count = len(edits)
+    return library.add(
+        "edits",
+        f"{count} edit{'s' if count != 1 else ''}",
+        {"edits": (content, ".json")},
+        author=author,
+        digest=digest,
+        details={"base": base, "edits": count},
+    )
+
+
+def edits_of(library: Library, item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:
+    """The edits that are kept.
+
+    Args:
+        library: Where they are.
+        item: The edits.
+        rule_set: That they were made on.
+
+    Raises:
+        InputError: If it is something else, or its file is missing or damaged.
+    """
+    path = file_of(library, item, "edits")
+    return edits_from_json(limited_bytes(path), rule_set, name=f"what is kept as {item.id}")
+
+
 def demonstrations_of(library: Library, item: Item) -> Demonstrations:
     """The demonstrations that are kept.
 
@@ -165,4 +219,5 @@ _SAID = {
     "rules": "a rule set",
     "result": "a result",
     "note": "a note",
+    "edits": "edits of rules",
 }

@@ -12,8 +12,10 @@ from typing import Any, Literal, get_args
 
 from sarl_core.errors import InputError, quoted
 
-Kind = Literal["demonstrations", "rules", "result", "note"]
+Kind = Literal["demonstrations", "rules", "result", "note", "edits"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+UNLISTED: tuple[Kind, ...] = ("edits",)
+"""What links need and nobody looks for: in a list only where it is asked for."""
 
 PREFIX = "library:"
 """Before an id where a command takes a file."""

@@ -15,7 +15,16 @@ from sarl_core.errors import InputError, quoted
 from sarl_core.library import tables
 from sarl_core.library.database import Database
 from sarl_core.library.file_store import FileStore
-from sarl_core.library.items import KINDS, Approval, Item, ItemFile, Kind, as_id, new_id
+from sarl_core.library.items import (
+    KINDS,
+    UNLISTED,
+    Approval,
+    Item,
+    ItemFile,
+    Kind,
+    as_id,
+    new_id,
+)
 from sarl_core.library.place import LibraryPlace, place_of
 from sarl_core.library.rows import (
     files_where,
@@ -246,7 +255,7 @@ class Library:
 
         Args:
             author: Their own things, and those that are shared; everything where None.
-            kind: Of this kind only.
+            kind: Of this kind only; all but edits where not given.
             removed: What they removed and may have back, in place of what is there.
 
         Raises:
@@ -256,8 +265,7 @@ class Library:
         wanted: list[Any] = [at.removed.is_not(None) if removed else at.removed.is_(None)]
         if author is not None:
             wanted.append(at.author == author if removed else or_(at.author == author, at.shared))
-        if kind is not None:
-            wanted.append(at.kind == kind)
+        wanted.append(at.kind.not_in(UNLISTED) if kind is None else at.kind == kind)
         return self._select(*wanted)
 
     def versions(self, identifier: str) -> list[Item]:

@@ -160,7 +160,7 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
             "steps": source.steps,
             "episodes": source.episodes,
         },
-        "rules": map(_rule, rule_set.rules),
+        "rules": map(rule_document, rule_set.rules),
     }
 
 
@@ -216,7 +216,8 @@ def _action(action: LabelledDimension) -> dict[str, Any]:
     }
 
 
-def _rule(rule: Rule) -> dict[str, Any]:
+def rule_document(rule: Rule) -> dict[str, Any]:
+    """A rule as the file has it."""
     entry: dict[str, Any] = {
         "id": rule.id,
         "dimension": rule.dimension,
@@ -250,17 +251,17 @@ _Whole = Annotated[int, Meta(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 _Action = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 
 
-class _Part(Struct, forbid_unknown_fields=True):
-    pass
+class Part(Struct, forbid_unknown_fields=True):
+    """A part of a document that holds nothing that is not known."""
 
 
-class _Indicator(_Part):
+class _Indicator(Part):
     column: str
     value: str
     otherwise: str = ""
 
 
-class _Definition(_Part):
+class _Definition(Part):
     terms: tuple[tuple[int, Number], tuple[int, Number]] | None = None
     formula: str | None = None
 
@@ -281,7 +282,7 @@ class _Definition(_Part):
         return combination
 
 
-class _Feature(_Part):
+class _Feature(Part):
     name: str
     unit: str = ""
     indicator: _Indicator | None = None
@@ -324,7 +325,7 @@ class _Feature(_Part):
         return Feature(self.name, self.unit, indicator, splits=splits_of)
 
 
-class _Discrete(_Part, tag_field="kind", tag="discrete"):
+class _Discrete(Part, tag_field="kind", tag="discrete"):
     name: str
     labels: tuple[str, ...]
     first: _Whole = 0
@@ -340,7 +341,7 @@ class _Discrete(_Part, tag_field="kind", tag="discrete"):
         return LabelledDimension(self.name, self.labels, first=self.first, codes=self.codes)
 
 
-class _Interval(_Part, tag_field="kind", tag="interval"):
+class _Interval(Part, tag_field="kind", tag="interval"):
     name: str
     edges: list[_Action]
     bounds_from: str = "action space"
@@ -355,26 +356,26 @@ class _Interval(_Part, tag_field="kind", tag="interval"):
         return LabelledDimension.of_edges(self.name, edges, bounds_from=self.bounds_from)
 
 
-class _Thresholds(_Part):
+class _Thresholds(Part):
     support: Share
     confidence: Share
     lift: NotNegative = 0.0
     max_depth: Count | None = None
 
 
-class _Demonstrations(_Part):
+class _Demonstrations(Part):
     digest: str
     steps: _FromOne
     episodes: _FromOne
 
 
-class _Condition(_Part, gc=False):
+class _Condition(Part, gc=False):
     feature: int
     op: Operator
     threshold: Number
 
 
-class _Box(_Part):
+class _Box(Part):
     least: tuple[Number, ...]
     low: tuple[Number, ...]
     high: tuple[Number, ...]
@@ -391,7 +392,7 @@ class _Box(_Part):
         return box
 
 
-class _HeldOutPairs(_Part):
+class _HeldOutPairs(Part):
     """Of version 1, which did not say in how many episodes they lie."""
 
     samples: Count
@@ -428,7 +429,7 @@ _P = TypeVar("_P")
 _T = TypeVar("_T")
 
 
-class _Rule(_Part, Generic[_Held]):
+class _Rule(Part, Generic[_Held]):
     id: str
     dimension: int
     conditions: list[_Condition]
@@ -467,8 +468,16 @@ class _Rule(_Part, Generic[_Held]):
         return Rule(**entries)
 
 
-def _each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T, ...]:
-    """What is made of the parts of a list; an error says of which."""
+RuleDocument = _Rule[_HeldOut]
+"""A rule as it may stand in a file; `read` makes one of it."""
+
+
+def each(parts: Iterable[_P], place: str, read: Callable[[_P], _T]) -> tuple[_T, ...]:
+    """What is made of the parts of a list.
+
+    Raises:
+        MisfitError: If one of them does not fit; it says which.
+    """
     made = []
     for number, part in enumerate(parts, start=1):
         try:
@@ -496,10 +505,10 @@ def _features(entries: Sequence[_Feature], version: int) -> tuple[Feature, ...]:
             observed.append(feature)
         return feature
 
-    return _each(entries, "features", read)
+    return each(entries, "features", read)
 
 
-class _Document(_Part, Generic[_Held]):
+class _Document(Part, Generic[_Held]):
     format: str
     version: int
     env_id: str
@@ -513,11 +522,11 @@ class _Document(_Part, Generic[_Held]):
 
     def read(self) -> RuleContents:
         features = _features(self.features, self.version)
-        actions = _each(self.actions, "actions", lambda action: action.read())
+        actions = each(self.actions, "actions", lambda action: action.read())
         if not features or not actions:
             raise MisfitError("there are no features or no actions")
         mined = self.demonstrations
-        rules = _each(
+        rules = each(
             self.rules, "rules", lambda rule: rule.read(actions, len(features), mined.steps)
         )
         doubled = [one for one, count in Counter(rule.id for rule in rules).items() if count > 1]
