@@ -11,8 +11,9 @@ from sarl_dashboard.components.journey.brand import ICON, show_logo
 from sarl_dashboard.components.journey.first_run import show_first_run
 from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.journey.words import words_button
-from sarl_dashboard.components.sidebar import require_data, sidebar
+from sarl_dashboard.components.sidebar import require_data, require_rules, sidebar
 from sarl_dashboard.session import settle
+from sarl_dashboard.state.in_force import take_up
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -66,6 +67,8 @@ SECTIONS = {
         st.Page("research/paper.py", title="Paper", icon=":material/article:"),
     ],
 }
+# What can be looked at whichever rules are in force.
+WITHOUT_RULES = ("Overview", "Demonstrations", "Names", "Library", "Improve", "Learning", "Paper")
 PAGES = [page for pages in SECTIONS.values() for page in pages]
 # Addresses that pages once had.
 ALIASES = {
@@ -90,11 +93,14 @@ if absurd := absurd_parameters():
 st.html(style_sheet())
 show_logo()
 show_left_out(page.title)
+take_up()
 sidebar(with_thresholds=page.title != "Thresholds")
 words_button()
 try:
     if page.title != "Library":
         require_data(page.title)
+    if page.title not in WITHOUT_RULES:
+        require_rules(page.title)
     show_first_run(page.title)
     page.run()
     next_step(page.title)

@@ -7,16 +7,16 @@ import streamlit as st
 from sarl_core.mining.language import counted
 from sarl_dashboard.state import edits
 from sarl_dashboard.text import escaped
-from sarl_dashboard.views.edit.base import base_choice
+from sarl_dashboard.views.edit.base import edited_base
 from sarl_dashboard.views.edit.editing import editing
 
 st.title("Edit")
 st.caption(
     "Switch rules off, pin them, move them, add your own, or let a part of the tree grow anew from "
-    "another query. Edits lie on top of the rules in force, "
-    "stay while the thresholds move, and last as long as this session: the rule file keeps them."
+    "another query. Edits lie on top of the rules that are chosen in the sidebar, stay while the "
+    "thresholds move, and are in force on every page."
 )
-base = base_choice()
+base = edited_base()
 if base.name:
     st.caption(f"The rules of {escaped(base.name)}, {len(base.rule_set):,} of them.")
 others = edits.waiting(base)

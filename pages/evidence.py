@@ -7,10 +7,11 @@ from markupsafe import Markup
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import influence_sentences
+from sarl_dashboard.components.edits_notice import without_edits_notice
 from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.hold_out import leave_out_choice
 from sarl_dashboard.jobs import cross_fitting
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
@@ -29,9 +30,10 @@ require_demonstrations()
 demonstrations = all_demonstrations()
 assert demonstrations is not None
 hold_out_choice(demonstrations)
-if compact_set.in_force():
+without_edits_notice()
+if not rule_base.at_thresholds():
     st.info(
-        "The compact rules were built from other states, the held-out ones perhaps among them, so "
+        "The rules in force were built from other states, the held-out ones perhaps among them, so "
         "they cannot be tried here. This page is about the rules at the thresholds.",
         icon=":material/info:",
     )

@@ -7,7 +7,6 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_dashboard.jobs.report import comparison_of_session
 from sarl_dashboard.state.data import chosen_dataset, require_demonstrations
-from sarl_dashboard.state.rule_files import OWN_FILE
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.report.order import order_of
 from sarl_dashboard.views.report.preview import report_of
@@ -21,9 +20,6 @@ st.caption(
 demonstrations = require_demonstrations()
 comparison, _ = comparison_of_session(demonstrations.env_id)
 choices = settings(comparison is not None)
-if choices.rules == OWN_FILE and choices.rule_file is None:
-    st.info("Upload the rule file that the report is to be about.", icon=":material/upload_file:")
-    st.stop()
 try:
     order = order_of(choices, demonstrations)
 except SarlError as error:

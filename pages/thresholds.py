@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import streamlit as st
 
+from sarl_dashboard.components.edits_notice import without_edits_notice
 from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.compact_set import chosen_compact
 from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
 from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
+from sarl_dashboard.text import escaped
 from sarl_dashboard.views.thresholds.combinations import combinations_choice
 from sarl_dashboard.views.thresholds.controls import show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
@@ -31,6 +34,12 @@ st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "
     "have done the same in at least a certain share of those (confidence)."
 )
+without_edits_notice()
+if not rule_base.at_thresholds() and compact is None:
+    st.caption(
+        f":material/info: In force are other rules: {escaped(in_force.title())}. Moving a slider "
+        "puts those at the thresholds in force."
+    )
 top = st.container()
 combinations_choice()
 display = chosen_display(trees, compact, held_out_demonstrations())

@@ -13,7 +13,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.cache import RESULTS
 from sarl_dashboard.jobs import cross_fitting
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
 from sarl_dashboard.text import in_full
@@ -32,7 +32,7 @@ def elsewhere_notice(
         more: HTML to stand below.
     """
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or compact_set.in_force():
+    if demonstrations is None or not rule_base.at_thresholds():
         return
     divider = chosen_divider()
     key = cross_fitting.key_of(demonstrations, divider)

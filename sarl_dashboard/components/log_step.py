@@ -13,7 +13,7 @@ from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.sampling import feature_spans, within
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.text import escaped
@@ -43,12 +43,13 @@ def show_step(held: Audit, row: int, choice: str) -> None:
             st.markdown(
                 f"**{held.rule_set.name_of(rule)}.** {escaped(sentence(rule, held.rule_set))}"
             )
-            if choice in SET_ON_RULES_PAGE:
+            address = in_force.address_of(choice)
+            if address is not None:
                 st.page_link(
                     "rules.py",
                     label=f"Open {held.rule_set.name_of(rule)}",
                     icon=":material/rule:",
-                    query_params={"set": SET_ON_RULES_PAGE[choice], "rule": rule.id},
+                    query_params={**address, "rule": rule.id},
                 )
         for table in lit_paths_html(_finder(held.rule_set), state, held.rules[row]):
             st.html(table)
@@ -67,7 +68,7 @@ def _link_what_if(held: Audit, row: int, choice: str) -> None:
     state = held.observations[row, : len(names)]
     state = within(state, feature_spans(demonstrations.raw_observations))
     values = {f"x{index}": repr(float(value)) for index, value in enumerate(state.tolist())}
-    chosen = {"set": SET_ON_RULES_PAGE[choice]} if choice in SET_ON_RULES_PAGE else {}
+    chosen = in_force.address_of(choice) or {}
     st.page_link(
         "what_if.py",
         label="What if, with this state",

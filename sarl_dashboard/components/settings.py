@@ -6,24 +6,26 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, get_args
 
 import streamlit as st
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
-from sarl_dashboard.state.edits import offered as edits_offered
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
-from sarl_dashboard.state.rule_choice import EDITED
+from sarl_dashboard.state.rule_choice import edits_offered
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
     COMBINED,
     COMPACT,
     COMPACT_ENDINGS,
+    EDITED,
     FEWEST,
+    IN_FORCE,
     NO_RULES,
     NO_SHIELD,
     OWN_FILE,
+    PAPERS,
     UNEDITED,
     compact_sets,
 )
@@ -31,8 +33,11 @@ from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import in_full
 
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
+RULE_SETS = (IN_FORCE, CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, UNEDITED)
+"""The rules that a page may work on, the default first."""
 _RULE_SETS = {
-    CHOSEN: "those in the sidebar",
+    IN_FORCE: "those in the sidebar",
+    CHOSEN: "those at the thresholds, without edits",
     "filtered": "support 0.005, confidence 0.95",
     "unfiltered": "support 0, confidence 1",
     COMPACT: "a small set that is shipped, every condition about one feature",
@@ -40,7 +45,6 @@ _RULE_SETS = {
     FEWEST: "one of that kind with as few rules as do it",
     UNEDITED: "what was edited, as it was",
     EDITED: "what you made of them on the page Edit",
-    OWN_FILE: "rules you saved",
     **dict.fromkeys((NO_RULES, NO_SHIELD), "the agent alone"),
 }
 Width = Literal["stretch"] | int
@@ -56,23 +60,14 @@ def shield_choice(env: str | None) -> tuple[Projection, Outside]:
     return projection, outside_choice()
 
 
-def own_files(
-    agent: str, rules: str, env: str | None
-) -> tuple[PolicyFile | None, UploadedFile | None]:
-    """Ask for the policy and the rule file that were chosen as one's own.
+def own_policy(agent: str, env: str | None) -> PolicyFile | None:
+    """Ask for the policy, where one's own was chosen.
 
     Args:
         agent: What was chosen.
-        rules: Likewise.
         env: As `environment_choice` gives it.
     """
-    policy = policy_upload("Policy", "policy_file", env) if agent == OWN_FILE else None
-    return policy, own_rule_file() if rules == OWN_FILE else None
-
-
-def own_rule_file() -> UploadedFile | None:
-    """Ask for a rule file."""
-    return st.file_uploader("Rule file (.json)", key="rule_file")
+    return policy_upload("Policy", "policy_file", env) if agent == OWN_FILE else None
 
 
 def environment_choice() -> str | None:
@@ -91,12 +86,50 @@ def environment_choice() -> str | None:
 def offered_rule_sets(names: Sequence[str]) -> list[str]:
     """Those of some rule sets that can be had now."""
     missing = COMPACT_ENDINGS.keys() - compact_sets()
-    return [name for name in names if name not in missing and (name != EDITED or edits_offered())]
+    edited = edits_offered()
+    return [
+        name for name in names if name not in missing and (name not in (EDITED, UNEDITED) or edited)
+    ]
 
 
 def rule_sets_help(offered: Sequence[str]) -> str:
     """What the offered rule sets are."""
     return " ".join(f"{name[0].upper()}{name[1:]}: {_RULE_SETS[name]}." for name in offered)
+
+
+def rule_set_choice(
+    key: str,
+    *,
+    without: Sequence[str] = (),
+    more: Sequence[str] = (),
+    about: str = "",
+    width: Width = "stretch",
+    persist_state: Literal["session"] | None = None,
+) -> str:
+    """The rules that a page works on: those in force where nothing else is chosen (URL: the key).
+
+    Args:
+        key: Of the widget.
+        without: What is not offered here.
+        more: What is offered besides.
+        about: A sentence before what is said of the sets.
+        width: Of the widget.
+        persist_state: As Streamlit has it.
+
+    Returns:
+        What it is called: of those in force, what they are.
+    """
+    offered = offered_rule_sets([name for name in (*RULE_SETS, *more) if name not in without])
+    choice = st.selectbox(
+        "Rules",
+        offered,
+        key=key,
+        bind="query-params",
+        width=width,
+        persist_state=persist_state,
+        help=f"{about} {rule_sets_help(offered)}".strip(),
+    )
+    return in_force.kind() if choice in (None, IN_FORCE) else choice
 
 
 def projection_choice(width: Width = "stretch") -> Projection:

@@ -8,10 +8,11 @@ import streamlit as st
 from streamlit.errors import StreamlitAPIException
 
 from sarl_core.environments.formulas import Formula
+from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.components.hold_out import parting_lines
-from sarl_dashboard.state import combining, compact_set
+from sarl_dashboard.state import combining, in_force, rule_base
 from sarl_dashboard.state.data import (
     all_demonstrations,
     choose_dataset,
@@ -60,6 +61,68 @@ def require_data(title: str) -> None:
         st.stop()
 
 
+def require_rules(title: str) -> None:
+    """Where a link names rules or edits that are not here, say so and stop.
+
+    Args:
+        title: Of the page.
+    """
+    if problem := in_force.problem():
+        st.title(title)
+        refuse(problem)
+        st.button(
+            "Go on without them",
+            key="go_on_without",
+            icon=":material/arrow_forward:",
+            on_click=in_force.go_on_without,
+        )
+        st.stop()
+
+
+_FILE = "a rule file …"
+
+
+def _rules_choice() -> None:
+    """Which rules are in force, on every page."""
+    labels = in_force.options()
+    chosen = in_force.chosen()
+    if st.session_state.get("_rules_choice") != _FILE:
+        st.session_state["_rules_choice"] = chosen
+    st.selectbox(
+        "Rules",
+        [*labels, _FILE],
+        format_func=lambda option: labels.get(option, "A rule file …"),
+        key="_rules_choice",
+        on_change=_choose_rules,
+        help="In force on every page, and in every link to one. What was edited is among them, "
+        "and what you keep in the Library.",
+    )
+    if st.session_state["_rules_choice"] == _FILE:
+        st.file_uploader("Rule file (.json)", key="rule_file", on_change=_take_file)
+        if problem := st.session_state.pop("_rule_file_problem", ""):
+            refuse(problem)
+
+
+def _choose_rules() -> None:
+    option = st.session_state["_rules_choice"]
+    if option != _FILE:
+        in_force.choose(option)
+
+
+def _take_file() -> None:
+    """Keep what was uploaded; the rules that were in force stay where it cannot be read."""
+    file = st.session_state.get("rule_file")
+    if file is None:
+        return
+    try:
+        rule_base.take_file(file.getvalue(), file.name)
+    except SarlError as error:
+        st.session_state["_rule_file_problem"] = str(error)
+    else:
+        in_force.name_edits()
+        st.session_state["_rules_choice"] = in_force.chosen()
+
+
 def sidebar(*, with_thresholds: bool = True) -> None:
     """The choice of data, and which rules are in force.
 
@@ -105,14 +168,11 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         # On pages that do not ask for it the choice keeps its place in the URL by this.
         if combining.chosen().on:
             lines.append("**Combinations** of two features on")
-        if compact := compact_set.in_force():
-            lines.append(f"**{compact_set.set_title(compact)}** in force")
-            if with_thresholds:
-                lines.append("Thresholds, set aside:")
-        if not with_thresholds:
-            st.caption("  \n".join(lines))
+        st.caption("  \n".join(lines))
+        _rules_choice()
+        if not with_thresholds or not rule_base.at_thresholds():
             return
-        lines += [
+        lines = [
             f"Support at least **{threshold_text(thresholds.support)}**",
             f"Confidence at least **{threshold_text(thresholds.confidence)}**",
         ]

@@ -18,7 +18,7 @@ from sarl_core.progress import Progress
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
-from sarl_dashboard.state import combining, compact_set
+from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
@@ -49,7 +49,7 @@ def judged(thresholds: Thresholds) -> Judged | None:
 def known() -> CrossFit | None:
     """The trees without each fold of the chosen demonstrations; None while they are not there."""
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or compact_set.in_force():
+    if demonstrations is None or not rule_base.at_thresholds():
         return None
     fit = RESULTS.get(key_of(demonstrations, chosen_divider()))
     return fit if isinstance(fit, CrossFit) else None
@@ -104,7 +104,7 @@ def begin(demonstrations: Demonstrations, divider: int) -> None:
 def make_ready() -> None:
     """Begin to make it, where it is not there and not on its way: once the page is drawn."""
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or compact_set.in_force() or len(demonstrations) > UNASKED:
+    if demonstrations is None or not rule_base.at_thresholds() or len(demonstrations) > UNASKED:
         return
     divider = chosen_divider()
     key = key_of(demonstrations, divider)

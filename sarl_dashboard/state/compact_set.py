@@ -18,31 +18,7 @@ from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.rule_files import (
-    CHOSEN,
-    COMPACT_ENDINGS,
-    compact_rules,
-    compact_sets,
-)
-from sarl_dashboard.state.url import set_url_choice, url_choice
-from sarl_dashboard.text import refuse
-
-THRESHOLDS = "thresholds"
-# Which set the Rules page has to show, to show a rule of a set that was chosen elsewhere.
-SET_ON_RULES_PAGE = {CHOSEN: THRESHOLDS} | {name: name for name in COMPACT_ENDINGS}
-
-
-def set_title(name: str) -> str:
-    """What a compact set is called.
-
-    Args:
-        name: Of the set.
-
-    Returns:
-        As "Compact rules, two features".
-    """
-    size, comma, features = name.partition(",")
-    return f"{size.capitalize()} rules{comma}{features}"
+from sarl_dashboard.state import rule_base
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,34 +46,23 @@ class Compact:
         return self._in_file[rule.dimension, rule.conditions]
 
 
-def in_force() -> str | None:
-    """Name of the set that was chosen (URL: set); None for the rules at the thresholds."""
-    name = url_choice("set", (THRESHOLDS, *compact_sets()), THRESHOLDS)
-    return None if name == THRESHOLDS else name
-
-
-def choose(name: str | None) -> None:
-    """Choose a compact set, or None for the rules at the thresholds; for callbacks."""
-    set_url_choice("set", name or THRESHOLDS, THRESHOLDS)
-
-
 def chosen_compact(demonstrations: Demonstrations) -> Compact | None:
-    """The compact set, if one is in force.
+    """The chosen rules as trees, if they are a compact set, shipped or kept.
 
     Args:
         demonstrations: N pairs to count.
 
     Returns:
-        None where the thresholds are in force. Rules that cannot be used are said on the page,
-        and the thresholds are in force.
+        None where they are others, as where they are not the leaves of trees.
     """
-    name = in_force()
-    if name is None:
+    if rule_base.at_thresholds():
         return None
     try:
-        return _counted(compact_rules(name), demonstrations)
-    except SarlError as error:
-        refuse(error)
+        fixed = rule_base.base()
+        if fixed.rule_set.cut != "leaves":
+            return None
+        return _counted(fixed.rule_set, demonstrations)
+    except SarlError:
         return None
 
 

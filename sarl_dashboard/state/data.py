@@ -18,6 +18,7 @@ from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
 from sarl_dashboard.state import combining, formulas, given_names, hold_out, library
 from sarl_dashboard.state.hold_out import Parts
+from sarl_dashboard.state.thresholds import THRESHOLDS
 from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import refuse
 
@@ -99,9 +100,10 @@ def data_problem() -> str:
 
 
 def choose_dataset(name: str) -> None:
-    """Choose a data set, with all its episodes; for callbacks."""
+    """Choose a data set, with all its episodes and rules at the thresholds; for callbacks."""
     hold_out.leave_out(())
     combining.choose_all()
+    set_url_choice("set", THRESHOLDS, THRESHOLDS)
     set_url_choice("data", name, DEFAULT_DATA)
 
 

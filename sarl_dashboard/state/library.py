@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Any, cast
 
@@ -11,9 +11,17 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
-from sarl_core.library.contents import add_demonstrations, add_rules, demonstrations_of
+from sarl_core.library.contents import (
+    add_demonstrations,
+    add_edits,
+    add_rules,
+    demonstrations_of,
+    edits_of,
+    rules_of,
+)
 from sarl_core.library.items import as_id
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
+from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.cache import cached
 
@@ -55,6 +63,14 @@ def own_demonstrations() -> list[Item]:
         return []
 
 
+def own_rules() -> list[Item]:
+    """The rule sets in a visitor's list, the newest first; [] where there is no library."""
+    try:
+        return library().items(author(), kind="rules")
+    except SarlError:
+        return []
+
+
 def standing_item(identifier: str) -> Item:
     """What is kept under an id.
 
@@ -65,7 +81,7 @@ def standing_item(identifier: str) -> Item:
     if item.removed is not None:
         raise InputError(
             f"{item.name} was removed by {item.author}, who can bring it back on the page Library; "
-            "ask for it, or choose other data"
+            "ask for it, or choose something else"
         )
     return item
 
@@ -86,6 +102,34 @@ def stored_demonstrations(identifier: str) -> Demonstrations:
 def _read(identifier: str, digest: str) -> Demonstrations:
     opened = library()
     return demonstrations_of(opened, opened.item(identifier))
+
+
+def stored_rules(item: Item) -> RuleSet:
+    """A rule set that is kept.
+
+    Raises:
+        SarlError: If it is something else, or cannot be read.
+    """
+    return _read_rules(item.id, item.digest)
+
+
+@cached(show_spinner="Reading the rules …")
+def _read_rules(identifier: str, digest: str) -> RuleSet:
+    opened = library()
+    return rules_of(opened, opened.item(identifier))
+
+
+def stored_edits(item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:
+    """Edits that are kept.
+
+    Args:
+        item: The edits.
+        rule_set: That they were made on.
+
+    Raises:
+        SarlError: If it is something else, or cannot be read.
+    """
+    return edits_of(library(), item, rule_set)
 
 
 def keep(demonstrations: Demonstrations, name: str) -> str:
@@ -147,6 +191,32 @@ def say_once(problem: SarlError) -> None:
 def _ids() -> dict[str, str]:
     """Ids of kept demonstrations by their digest, of this visit."""
     return cast("dict[str, str]", st.session_state.setdefault("_kept_ids", {}))
+
+
+def keep_rule_file(rule_set: RuleSet, name: str) -> Item:
+    """Keep the rules of an uploaded file; where its author keeps the same, that is it.
+
+    Raises:
+        SarlError: If they cannot be kept.
+    """
+    opened = library()
+    for known in opened.with_digest(rules_digest(rule_set), kind="rules"):
+        if known.author == author():
+            return known
+    return add_rules(opened, rule_set, name, author=author())
+
+
+def keep_edits(edits: Sequence[Edit], base: str) -> Item:
+    """Keep edits, for a link.
+
+    Args:
+        edits: The oldest first.
+        base: What tells the rules that they were made on.
+
+    Raises:
+        SarlError: If they cannot be kept.
+    """
+    return add_edits(library(), edits, base, author=author())
 
 
 def keep_rules(rule_set: RuleSet, name: str, demonstrations: Demonstrations) -> Item:

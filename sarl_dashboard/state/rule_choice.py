@@ -1,27 +1,34 @@
-"""Which rule set was chosen, and where it comes from."""
+"""The rules that a page works on: those in force, or others that were chosen there."""
 
 from __future__ import annotations
 
-from streamlit.runtime.uploaded_file_manager import UploadedFile
-
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.state.edits import edited_rules
+from sarl_dashboard.state import edits, in_force, rule_base
 from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (
+    CHOSEN,
     COMPACT_ENDINGS,
+    EDITED,
+    IN_FORCE,
+    KEPT,
     NO_RULES,
     OWN_FILE,
     PAPERS,
-    as_named,
+    UNEDITED,
     compact_rules,
-    rules_in_file,
 )
 
-EDITED = "edited"
+BETWEEN = "|"
+"""Between the names of rule sets that an address compares."""
 
 
-def rules_for(choice: str, uploaded: UploadedFile | None) -> RuleSet | None:
+def comparison_address(*names: str) -> dict[str, str]:
+    """What an address of the page Compare says to compare some rule sets."""
+    return {"sets": BETWEEN.join(names)}
+
+
+def rules_for(choice: str) -> RuleSet | None:
     """The rule set that was chosen, None for none.
 
     Raises:
@@ -29,12 +36,44 @@ def rules_for(choice: str, uploaded: UploadedFile | None) -> RuleSet | None:
     """
     if choice == NO_RULES:
         return None
-    if choice == OWN_FILE:
-        if uploaded is None:
-            raise InputError("no rule file has been uploaded; upload one, or choose other rules")
-        return as_named(rules_in_file(uploaded.getvalue(), uploaded.name))
+    if choice == IN_FORCE:
+        return in_force.rules()
+    if choice in (KEPT, UNEDITED, OWN_FILE):
+        return rule_base.base().rule_set
+    if rule_base.is_kept(choice):
+        return rule_base.kept_rules(choice)
     if choice in COMPACT_ENDINGS:
         return compact_rules(choice)
     if choice == EDITED:
         return edited_rules()
+    if choice != CHOSEN and choice not in PAPERS:
+        raise InputError(f"there are no rules called {choice!r}; choose others")
     return rules_at(PAPERS.get(choice))
+
+
+def rules_called(choice: str) -> str:
+    """What chosen rules are called beside others: of kept ones, and of a file, their name."""
+    return rule_base.base().name if choice in (KEPT, OWN_FILE) else choice
+
+
+def edited_rules() -> RuleSet:
+    """The chosen rules with the edits of this visit, also where these are set aside.
+
+    Raises:
+        InputError: If there are none.
+    """
+    of = rule_base.base()
+    if not edits.history(of).edits:
+        raise InputError("there are no edits of the rules in force; make some on the Edit page")
+    return edits.edited(of)
+
+
+def edits_offered() -> bool:
+    """Whether there is an edited set to choose."""
+    if not edits.any_made():
+        return False
+    try:
+        key = rule_base.base_key(rule_base.base_name())
+    except InputError:
+        return False
+    return bool(edits.history_of(key).edits)

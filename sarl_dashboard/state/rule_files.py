@@ -23,7 +23,8 @@ from sarl_dashboard.state.data import (
     shipped_demonstrations,
 )
 
-OWN_FILE = "own file"
+OWN_FILE, KEPT = "own file", "kept"
+IN_FORCE, EDITED = "in force", "edited"
 CHOSEN, UNEDITED = "at the thresholds", "before the edits"
 NO_RULES, NO_SHIELD = "none", "no shield"
 COMPACT, COMBINED, FEWEST = "compact", "compact, two features", "fewest, two features"

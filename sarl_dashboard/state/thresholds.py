@@ -9,6 +9,8 @@ import streamlit as st
 
 from sarl_core.mining.rules import FILTERED, Thresholds
 
+THRESHOLDS = "thresholds"
+"""In an address: the rules are those at the thresholds."""
 MIN_DIVIDER, MAX_DIVIDER = 2, 16
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit

@@ -38,6 +38,7 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
     Returns:
         The default, or a valid text.
     """
+    st.session_state.setdefault("_url_names", set()).add(name)
     value = st.query_params.get(name)
     if value is not None and _is_late(name, value):
         value = None  # the browser had not heard of the choice when it asked for this run
@@ -87,7 +88,13 @@ def begin_run(page: str) -> None:
         page: Title of the page that runs.
     """
     context = get_script_run_ctx()
-    if st.session_state.get("_page") != page or (context and context.is_history_navigation):
+    went_back = bool(context and context.is_history_navigation)
+    if went_back:
+        # An address that was on screen says everything: what it does not name has its default.
+        for name in st.session_state.get("_url_names", ()):
+            if name not in st.query_params:
+                st.session_state.pop(f"_{name}", None)
+    if st.session_state.get("_page") != page or went_back:
         st.session_state["_page"] = page
         st.session_state.pop("_values_left", None)
 

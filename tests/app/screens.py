@@ -58,6 +58,23 @@ def metrics(app: AppTest) -> dict[str, str]:
     }
 
 
+def chosen_rules(app: AppTest) -> str:
+    """Which rules are in force, as an address says it."""
+    return str(app.selectbox(key="_rules_choice").value)
+
+
+def upload_rules(app: AppTest, name: str, content: bytes) -> None:
+    """Choose a rule file in the sidebar."""
+    app.selectbox(key="_rules_choice").set_value("a rule file …").run()
+    app.file_uploader(key="rule_file").set_value((name, content, "application/json"))
+    app.run()
+
+
+def compare(app: AppTest, *names: str) -> None:
+    """Choose the rule sets of the page Compare."""
+    app.multiselect(key="_sets_choice").set_value(list(names)).run()
+
+
 def run_through(app: AppTest, name: str) -> AppTest:
     """Begin work beside the page, where it is offered, and look in until it is done.
 

@@ -13,7 +13,16 @@ from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.language import sentence, share_text
 from sarl_core.mining.rule_tree import recount
-from tests.app.screens import ROUTER, errors, html, metrics, open_page, run_through, texts
+from tests.app.screens import (
+    ROUTER,
+    chosen_rules,
+    errors,
+    html,
+    metrics,
+    open_page,
+    run_through,
+    texts,
+)
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -60,7 +69,7 @@ def numbers(rules: RuleSet) -> dict[str, str]:
 
 
 def in_force(app: AppTest) -> bool:
-    return "Compact rules** in force" in texts(app)
+    return chosen_rules(app) == "compact"
 
 
 # --- Thresholds --------------------------------------------------------------------------------
@@ -164,7 +173,8 @@ def test_of_several_compact_sets_each_is_a_click_away() -> None:
         app.button(key=key).click().run()
         assert not app.exception
         assert app.query_params["set"] == name
-        assert f"**{title}** in force" in texts(app)
+        assert chosen_rules(app) == name
+        assert title in app.selectbox(key="_rules_choice").options
         assert metrics(app)["Rules"] == str(count)
     assert "few_combined" not in [button.key for button in app.button]
 
@@ -176,9 +186,10 @@ def test_of_several_compact_sets_each_is_a_click_away() -> None:
 def test_rules_about_two_features_are_in_force_on_every_page(page: str) -> None:
     app = open_page(page, data="cartpole", set="compact, two features")
     assert not errors(app)
-    assert "**Compact rules, two features** in force" in texts(app)
+    assert chosen_rules(app) == "compact, two features"
     if page == "export":
-        assert app.selectbox(key="carry").value == "compact, two features"
+        assert app.selectbox(key="carry").value == "in force"
+        assert "pole angle plus 0.27 s of pole angular velocity" in app.code[0].value
     if page == "edit":
         assert "The chosen demonstrations are of something else" not in texts(app)
         assert metrics(app)["Fidelity"].endswith("%")
@@ -218,12 +229,16 @@ def test_a_rule_that_no_demonstrated_state_reaches_says_so(compact: RuleSet) -> 
     assert html(app).count("<tr") == 1 + 1 + rule.length
 
 
-def test_a_link_to_compact_rules_that_are_not_there_shows_the_thresholds(
-    compact: RuleSet, tmp_path: Path
+def test_a_link_to_compact_rules_that_are_not_there_says_so_and_shows_no_others(
+    compact: RuleSet,
 ) -> None:
     app = open_page("rules", data="lunar_lander", set="compact")
-    assert not in_force(app)
+    (said,) = errors(app)
+    assert said.startswith("There are no rules called 'compact' for Lunar Lander")
+    assert not app.dataframe
+    app.button(key="go_on_without").click().run()
     assert not errors(app)
+    assert app.dataframe
     assert "set" not in app.query_params
     assert "compact" not in [
         button.key for button in open_page("thresholds", data="pendulum").button
@@ -231,25 +246,36 @@ def test_a_link_to_compact_rules_that_are_not_there_shows_the_thresholds(
 
 
 @pytest.mark.parametrize("page", ["thresholds", "rules"])
-@pytest.mark.parametrize("damage", ["torn", "cut", "foreign"])
-def test_compact_rules_that_cannot_be_used_are_said_and_the_thresholds_stay(
-    compact: RuleSet, tmp_path: Path, page: str, damage: str
+def test_compact_rules_that_cannot_be_read_are_said_and_nothing_takes_their_place(
+    compact: RuleSet, tmp_path: Path, page: str
 ) -> None:
     file = tmp_path / "cartpole_compact.json"
-    if damage == "torn":
-        file.write_text(file.read_text()[:100])
-    elif damage == "cut":
-        mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95).save(file)
-    else:
-        replace(compact, rules=compact.rules[:2]).save(file)
+    file.write_text(file.read_text()[:100])
     app = open_page(page, data="cartpole", set="compact")
     (sentence_shown,) = errors(app)
     assert "\n" not in sentence_shown
+    assert not app.dataframe
+    app.button(key="go_on_without").click().run()
     filtered = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
     if page == "thresholds":
         assert metrics(app) == numbers(filtered)
     else:
         assert len(app.dataframe[0].value) == len(filtered)
+
+
+@pytest.mark.parametrize("kind", ["cut", "leaves of no tree"])
+def test_rules_that_are_no_leaves_of_a_tree_are_in_force_with_the_numbers_of_their_file(
+    compact: RuleSet, tmp_path: Path, kind: str
+) -> None:
+    rules = replace(compact, rules=compact.rules[:2])
+    if kind == "cut":
+        rules = mine_rules(elsewhere(CARTPOLE), supp_min=0.005, conf_min=0.95)
+    rules.save(tmp_path / "cartpole_compact.json")
+    app = open_page("rules", data="cartpole", set="compact")
+    assert not errors(app)
+    table = app.dataframe[0].value
+    assert table["States"].tolist() == sorted((one.samples for one in rules), reverse=True)
+    assert "its numbers are those of its file" in texts(app)
 
 
 # --- Replay ------------------------------------------------------------------------------------
@@ -276,23 +302,23 @@ def test_two_rules_about_two_features_keep_a_novice_s_pole_up() -> None:
 
 def test_a_browser_that_has_not_heard_of_a_choice_does_not_undo_it(compact: RuleSet) -> None:
     app = open_page("thresholds", data="cartpole", set="compact")
-    assert "Compact rules" in texts(app)
+    assert in_force(app)
     app.select_slider(key="confidence").set_value(0.8).run()
-    assert "Compact rules" not in texts(app)
+    assert not in_force(app)
     # Asked for before the answer to the first move arrived, so with the address from before it.
     app.query_params["set"] = "compact"
     app.select_slider(key="confidence").set_value(0.9).run()
-    assert "Compact rules" not in texts(app)
+    assert not in_force(app)
     assert "set" not in app.query_params
     # Chosen once more, they are in force, and a late address does not take them away either.
     app.button(key="compact").click().run()
     assert app.query_params["set"] == "compact"
     del app.query_params["set"]
     app.run()
-    assert "Compact rules" in texts(app)
+    assert in_force(app)
     # A link from another page means what it says.
     app.select_slider(key="confidence").set_value(0.8).run()
     app.switch_page("rules.py").run()
     app.query_params["set"] = "compact"
     app.switch_page("thresholds.py").run()
-    assert "Compact rules" in texts(app)
+    assert in_force(app)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from itertools import product
 
+import pytest
+
 from sarl_core import Shield, load_demonstrations, mine_rules
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import ROUTER, errors, html, open_page, texts
+from tests.app.screens import ROUTER, compare, errors, html, open_page, texts, upload_rules
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -32,54 +34,84 @@ def test_two_sets_are_compared_on_the_demonstrations() -> None:
     words = ("push left", "push right", "no rule")
     for (title, cell), (row, column) in zip(counted, product(range(3), repeat=2), strict=True):
         count = sum((a, b) == (row, column) for a, b in zip(one, other, strict=True))
-        assert title.startswith(f"at the thresholds: {words[row]}; unfiltered: {words[column]}; ")
+        assert title.startswith(f"in force: {words[row]}; unfiltered: {words[column]}; ")
         assert cell == (f"{count:,}" if count else "")
-    examples = app.dataframe[0].value
+    examples = app.dataframe[1].value
     assert len(examples) == min(50, different)
-    shown = examples[["At the thresholds says", "Unfiltered says"]]
+    shown = examples[["In force says", "Unfiltered says"]]
     assert (shown.iloc[:, 0] != shown.iloc[:, 1]).all()
-    rules = app.dataframe[1].value
+    rules = app.dataframe[2].value
     counts = rules["What"].value_counts()
     assert counts.get("added", 0) - counts.get("removed", 0) == len(FINE) - len(COARSE)
     app.button_group(key="kind").set_value("added").run()
-    assert set(app.dataframe[1].value["What"]) == {"added"}
+    assert set(app.dataframe[2].value["What"]) == {"added"}
 
 
 def test_a_set_that_was_compared_before_shows_the_same_again() -> None:
-    app = open_page("difference", data="cartpole", first="filtered", second="unfiltered")
-    first, rules = html(app), app.dataframe[1].value
+    app = open_page("difference", data="cartpole", sets="filtered|unfiltered")
+    first, rules = html(app), app.dataframe[2].value
     for second in ("compact", "unfiltered"):
-        app.selectbox(key="second").set_value(second).run()
+        compare(app, "filtered", second)
         assert (html(app) == first) == (second == "unfiltered")
-        assert app.dataframe[1].value.equals(rules) == (second == "unfiltered")
+        assert app.dataframe[2].value.equals(rules) == (second == "unfiltered")
 
 
-def test_a_set_and_itself() -> None:
-    app = open_page("difference", data="cartpole", first="filtered", second="filtered")
+def test_a_set_and_one_like_it() -> None:
+    app = open_page("difference", data="cartpole", sets="filtered|at the thresholds")
     assert "decide none" in texts(app)
-    assert len(app.dataframe) == 0
+    assert len(app.dataframe) == 1
 
 
-def test_an_own_file_is_asked_for_and_one_for_something_else_is_refused() -> None:
-    app = open_page("difference", data="cartpole", first="filtered", second="own file")
-    assert "No rule file has been uploaded" in texts(app)
+def test_one_set_is_none_to_compare() -> None:
+    app = open_page("difference", data="cartpole", sets="filtered")
+    assert "at least two rule sets" in texts(app)
+    assert not app.dataframe
+
+
+def test_five_sets_are_held_against_each_other_and_two_are_looked_at_closely() -> None:
+    names = ["unfiltered", "filtered", "compact", "compact, two features", "at the thresholds"]
+    app = open_page("difference", data="cartpole", sets="|".join(names))
+    assert not errors(app)
+    table = app.dataframe[0].value
+    assert table["Rule set"].tolist() == names
+    filtered = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
+    assert table["Rules"].tolist() == [len(FINE), len(filtered), 4, 2, len(filtered)]
+    different = [a != b for a, b in zip(said(FINE), said(filtered), strict=True)]
+    share = sum(different) / len(different)
+    assert table["Otherwise than filtered"][0] == table["Otherwise than unfiltered"][1] == share
+    assert table["Otherwise than at the thresholds"][1] == 0
+    assert "Unfiltered says" in html(app) + " ".join(app.dataframe[1].value)
+    app.button_group(key="against").set_value("compact").run()
+    assert "Compact says" in " ".join(app.dataframe[1].value)
+
+
+def test_a_file_is_compared_and_one_for_something_else_is_refused() -> None:
+    app = open_page("difference", data="cartpole")
     pendulum = mine_rules(
         load_demonstrations(DATA / "pendulum.parquet"), supp_min=0.1, conf_min=0.8
     )
-    content = rules_to_json(pendulum).encode()
-    app.file_uploader(key="second_file").set_value(("far.json", content, "application/json"))
-    app.run()
+    upload_rules(app, "far.json", rules_to_json(pendulum).encode())
     (sentence,) = errors(app)
     assert "different features" in sentence
-    content = rules_to_json(FINE).encode()
-    app.file_uploader(key="second_file").set_value(("fine.json", content, "application/json"))
-    app.run()
+    upload_rules(app, "fine.json", rules_to_json(FINE).encode())
     assert not errors(app)
+    (kept,) = [name for name in app.multiselect(key="_sets_choice").options if "fine" in name]
+    assert kept == "fine.json"
+    identifier = app.query_params["set"]
+    compare(app, "filtered", str(identifier))
     assert "fine.json says" in html(app)
 
 
+@pytest.mark.parametrize("name", ["nonsense", "a" * 26])
+def test_a_link_to_rules_that_are_not_there_says_so(name: str) -> None:
+    app = open_page("difference", data="cartpole", sets=f"filtered|unfiltered|{name}")
+    assert not app.exception
+    assert "There are no rules called" in texts(app) or "has nothing with the id" in texts(app)
+    assert "decide" in texts(app)
+
+
 def test_one_action_of_several_at_a_time() -> None:
-    app = open_page("difference", data="bipedal_walker", first="filtered", second="unfiltered")
+    app = open_page("difference", data="bipedal_walker", sets="filtered|unfiltered")
     names = app.button_group(key="decided").options
     assert len(names) == 4
     app.button_group(key="decided").set_value(names[1]).run()
@@ -89,7 +121,7 @@ def test_one_action_of_several_at_a_time() -> None:
 
 def test_every_rule_set_that_is_offered_is_explained() -> None:
     app = open_page("difference", data="lunar_lander")
-    choice = app.selectbox(key="first")
+    choice = app.multiselect(key="_sets_choice")
     assert len(choice.options) > 5
     for name in choice.options:
         assert f"{name[0].upper()}{name[1:]}: " in choice.help

@@ -11,7 +11,7 @@ from sarl_core.mining.editing.regrowing import next_queries, regrown_trees, way_
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import FILTERED, node_of
 from sarl_core.mining.validation.holding_out import hold_out
-from tests.app.screens import ROUTER, errors, html, metrics, open_page, run_through, texts
+from tests.app.screens import ROUTER, compare, errors, html, metrics, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -147,8 +147,7 @@ def test_other_pages_take_the_regrown_rules() -> None:
     ]
     assert all(rule.box is not None for rule in rules.rules)
     app.switch_page("difference.py").run()
-    app.selectbox(key="first").select("before the edits")
-    app.selectbox(key="second").select("edited").run()
+    compare(app, "before the edits", "edited")
     assert not app.exception
     assert not errors(app)
 
@@ -161,7 +160,6 @@ def test_the_way_of_a_state_is_shown_in_the_tree_that_the_rules_are_of() -> None
     assert set(app.dataframe[0].value["Kind"]) == {"regrown"}
     app.switch_page("what_if.py").run()
     app.selectbox(key="take").set_value("a random covered state").run()
-    app.button_group(key="edits").set_value("edited").run()
     assert not app.exception
     assert not errors(app)
     assert "Its way through the tree" in html(app)

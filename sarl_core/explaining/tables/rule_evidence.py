@@ -115,7 +115,7 @@ def feature_evidence(
     Returns:
         One entry a feature, in the order of the rule's conditions.
     """
-    rows = tree.rows(node_of(rule))
+    rows = tree.rows(_node(tree, rule))
     evidence = []
     for bounds in least_bounds(rule, demonstrations.features):
         values = demonstrations.observations[:, bounds.feature]
@@ -130,6 +130,13 @@ def feature_evidence(
             )
         )
     return tuple(evidence)
+
+
+def _node(tree: PolicyTree, rule: Rule) -> int:
+    """Where a rule was cut; its name tells that of a part that was regrown by a number."""
+    node = tree.place_of(node_of(rule))
+    assert node is not None
+    return node
 
 
 def _edges(
@@ -192,7 +199,7 @@ def example_columns(
         that the rule asks about, rounded for display or in words, those of the rule first, and at
         last episode and step.
     """
-    rows = example_rows(tree, node_of(rule), count)
+    rows = example_rows(tree, _node(tree, rule), count)
     dimension = tree.dimension
     values = tree.demonstrated[rows]
     labels = dimension.labels_of(values)

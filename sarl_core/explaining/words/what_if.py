@@ -261,13 +261,36 @@ def node_of_way(
         That of the rule where it was cut from this tree, else a leaf; None where the rule set was
         not cut from this tree, so that no node of it says anything about the rules.
     """
-    divided = tree.dimension.is_interval and rule_set.divider != tree.divider
-    if rule_set.source.digest != tree.source.digest or divided:
-        return None
-    if (rule_set.cut == "leaves") != leaves:
+    if not _cut_from(rule_set, tree, leaves=leaves):
         return None
     if rule is None or rule.origin == "manual":
         return int(tree.apply(extend(state[None], tree.source.features))[0])
+    return node_in(tree, rule, rule_set, leaves=leaves)
+
+
+def _cut_from(rule_set: RuleSet, tree: PolicyTree, *, leaves: bool) -> bool:
+    divided = tree.dimension.is_interval and rule_set.divider != tree.divider
+    return (
+        rule_set.source.digest == tree.source.digest
+        and not divided
+        and (rule_set.cut == "leaves") == leaves
+    )
+
+
+def node_in(tree: PolicyTree, rule: Rule, rule_set: RuleSet, *, leaves: bool) -> int | None:
+    """The node of a tree at which a rule was cut.
+
+    Args:
+        tree: Of the rule's action dimension.
+        rule: Of the rule set.
+        rule_set: It may have come from a file, and from another tree.
+        leaves: Whether the rules of the tree are its leaves.
+
+    Returns:
+        None for a rule added by hand, and for one of another tree.
+    """
+    if rule.origin == "manual" or not _cut_from(rule_set, tree, leaves=leaves):
+        return None
     # A file may have renamed or rounded it: it is the node's if it asks what the way there asks.
     before, _, number = rule.id.rpartition(".")
     if before != str(tree.index) or not (number.isascii() and number.isdigit()):

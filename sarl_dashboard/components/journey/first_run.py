@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from sarl_dashboard.state.compact_set import THRESHOLDS
 from sarl_dashboard.state.data import DEFAULT_DATA
 from sarl_dashboard.state.rule_files import FEWEST
+from sarl_dashboard.state.thresholds import THRESHOLDS
 
 _STEP, _DONE = "_first_run", "_first_run_done"
 _TASK = {"data": DEFAULT_DATA}

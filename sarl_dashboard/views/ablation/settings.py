@@ -16,21 +16,19 @@ from sarl_dashboard.components.settings import (
     environment_choice,
     no_boxes_notice,
     notes_notice,
-    offered_rule_sets,
-    own_files,
-    rule_sets_help,
+    own_policy,
+    rule_set_choice,
     shield_choice,
 )
 from sarl_dashboard.jobs.ablation import Wanted
 from sarl_dashboard.jobs.episodes import Row
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.agents import FRESH_SEED, agent_for, offered_agents
-from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
 from sarl_dashboard.state.environments import demonstrated, environment_of
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.rule_files import KEPT, OWN_FILE
 
 MOST_EPISODES = 500
-RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +44,15 @@ class AblationChoice:
     rules: str
 
     @property
-    def linked(self) -> str | None:
-        """The set under which its rules are found on the Rules page; None if they are not."""
-        return SET_ON_RULES_PAGE.get(self.rules)
+    def linked(self) -> dict[str, str] | None:
+        """The address of its rules on the Rules page; None if they are not there."""
+        return in_force.address_of(self.rules)
 
     @property
     def on_demonstrated_seeds(self) -> bool:
         """Whether some of its episodes are among the demonstrated ones."""
         row, episodes = self.wanted.row, self.wanted.episodes
-        return self.rules != OWN_FILE and demonstrated(row.env_id, row.seed, episodes)
+        return self.rules not in (KEPT, OWN_FILE) and demonstrated(row.env_id, row.seed, episodes)
 
 
 def settings() -> AblationChoice:
@@ -63,7 +61,6 @@ def settings() -> AblationChoice:
     Raises:
         SarlError: If it cannot be had.
     """
-    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         with st.grid(4, min_column_width=150, gap="small"):
             env = environment_choice()
@@ -75,13 +72,7 @@ def settings() -> AblationChoice:
                 help="Whom the rules hold. With the novice, which acts at random, they have the "
                 "most to do.",
             )
-            rules = st.selectbox(
-                "Rules",
-                offered,
-                key="rules",
-                bind="query-params",
-                help=rule_sets_help(offered),
-            )
+            rules = rule_set_choice("rules")
             most = st.number_input(
                 "Rules to take out",
                 1,
@@ -112,11 +103,11 @@ def settings() -> AblationChoice:
                 "every rule taken out. The same seeds give the same result.",
             )
             projection, outside = shield_choice(env)
-        policy_file, rule_file = own_files(agent, rules, env)
+        policy_file = own_policy(agent, env)
 
     env_id, first = environment_of(env), int(seed or 0)
     describe_environment(env_id)
-    rule_set = rules_for(rules, rule_file)
+    rule_set = rules_for(rules)
     chosen = agent_for(agent, policy_file, env_id, first)
     if rule_set is None or not any(rule.enabled for rule in rule_set.rules):
         raise InputError(

@@ -138,7 +138,7 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
                     "rules.py",
                     label="Open this rule",
                     icon=":material/rule:",
-                    query_params={**query(), "set": choice.linked, "rule": rule.id},
+                    query_params={**query(), **choice.linked, "rule": rule.id},
                 )
 
 

@@ -16,10 +16,9 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.column_form import ColumnForm
-from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
+from sarl_dashboard.components.settings import rule_set_choice
 from sarl_dashboard.state.data import chosen_demonstrations
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.text import escaped, in_full, refuse
 
 
@@ -53,20 +52,9 @@ class Logs:
 
 def chosen_rules() -> ChosenRules:
     """The widgets for the rules; where there are none, the page says so and stops."""
-    offered = offered_rule_sets([CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE])
-    choice = st.selectbox(
-        "Rules",
-        offered,
-        key="audited",
-        bind="query-params",
-        width=320,
-        help=rule_sets_help(offered),
-    )
-    file = None
-    if choice == OWN_FILE:
-        file = st.file_uploader("Rule file (.json)", key="audited_file")
+    choice = rule_set_choice("audited", width=320)
     try:
-        rule_set = rules_for(choice, file)
+        rule_set = rules_for(choice)
     except SarlError as error:
         st.info(in_full(str(error)), icon=":material/upload_file:")
         st.stop()

@@ -26,6 +26,7 @@ from sarl_dashboard.components.tables import action_column, row_height, table_he
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.text import escaped, refuse, together
+from sarl_dashboard.views.difference.overview import show_overview
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
 
 EVERY = "all"
@@ -65,24 +66,47 @@ class RuleSetComparison:
 
 @st.fragment
 def comparison() -> None:
-    """Both choices and what differs; nothing else on the page does."""
+    """The choices and what differs; nothing else on the page does."""
     sides = chosen_sides()
     if len(sides) < 2:
+        st.info("Choose at least two rule sets to compare.", icon=":material/compare_arrows:")
         return
     try:
-        compared = _compare(*sides)
+        show_overview(sides, _different)
+        compared = _compare(*_pair(sides))
         _show_states(compared)
         _show_rules(compared)
     except SarlError as error:
         refuse(error)
 
 
-def _compare(first: Side, second: Side) -> RuleSetComparison:
+def _pair(sides: list[Side]) -> tuple[Side, Side]:
+    """The two that are looked at closely: the first one and another."""
+    others = {side.name: side for side in sides[1:]}
+    name = next(iter(others))
+    if len(others) > 1:
+        st.subheader("Closely")
+        name = st.segmented_control(
+            f"{sides[0].name} against",
+            list(others),
+            default=name,
+            key="against",
+            required=True,
+        )
+    return sides[0], others.get(name, sides[1])
+
+
+def _different(first: Side, second: Side) -> float:
+    """Share of the states that two sets decide differently, in some action dimension."""
+    differs = _compare(first, second, quietly=True).disagreement.differs
+    return float(differs.any(axis=1).mean()) if len(differs) else 0.0
+
+
+def _compare(first: Side, second: Side, *, quietly: bool = False) -> RuleSetComparison:
     names = (first.name, second.name)
-    if first.name == second.name:
-        names = (f"{first.name} (first)", f"{second.name} (second)")
     one, other, notes = in_shared_words(first.rule_set, second.rule_set)
-    notes_notice(notes)
+    if not quietly:
+        notes_notice(notes)
     demonstrations = chosen_demonstrations()
     if demonstrations is not None:
         demonstrations = fitting_demonstrations(one, demonstrations)

@@ -1,4 +1,4 @@
-"""The two rule sets of the page Compare: the choices, and what was chosen."""
+"""The rule sets of the page Compare: two to five of them."""
 
 from __future__ import annotations
 
@@ -8,22 +8,24 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
-from sarl_dashboard.state import edits
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS, UNEDITED
+from sarl_dashboard.components.settings import RULE_SETS, offered_rule_sets, rule_sets_help
+from sarl_dashboard.state import in_force, rule_base
+from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
+from sarl_dashboard.state.rule_files import EDITED, IN_FORCE, UNEDITED
+from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import in_full
 
-SIDES = (("first", "First set", CHOSEN), ("second", "Second set", "unfiltered"))
+MOST = 5
+_LONGEST = 500  # signs of them
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two.
+    """One of the sets.
 
     Attributes:
         rule_set: Its rules.
-        name: On screen.
+        name: On screen; no two are called alike.
     """
 
     rule_set: RuleSet
@@ -31,46 +33,48 @@ class Side:
 
 
 def chosen_sides() -> list[Side]:
-    """The widgets for both, beside each other.
+    """The widget, and what was chosen (URL: sets).
 
     Returns:
-        Both sets; fewer where one cannot be had, which is said on the page.
+        The sets, the one that the others are held against first; without those that cannot be had,
+        which is said on the page.
     """
-    sides, problems = [], []
-    for column, (key, label, default) in zip(st.columns(2), SIDES, strict=True):
-        with column:
-            try:
-                sides.append(_side(key, label, default))
-            except SarlError as error:
-                problems.append(in_full(str(error)))
-    for problem in problems:
-        st.info(problem, icon=":material/upload_file:")
+    chosen = _named()
+    offered = offered_rule_sets(RULE_SETS)
+    kept = {name: label for name, label in rule_base.labels().items() if rule_base.is_kept(name)}
+    for name in chosen:
+        if rule_base.is_kept(name) and name not in kept:
+            kept[name] = rule_base.kept_label(name)
+    st.session_state["_sets_choice"] = chosen
+    st.multiselect(
+        "Rule sets",
+        [*offered, *kept, *(name for name in chosen if name not in (*offered, *kept))],
+        format_func=lambda name: kept.get(name, name),
+        key="_sets_choice",
+        max_selections=MOST,
+        on_change=_choose,
+        help=f"Two to five; the others are held against the first. {rule_sets_help(offered)}",
+    )
+    sides: list[Side] = []
+    for name in chosen:
+        try:
+            rule_set = rules_for(name)
+        except SarlError as error:
+            st.info(in_full(str(error)), icon=":material/link_off:")
+            continue
+        assert rule_set is not None
+        sides.append(Side(rule_set, kept.get(name, name)))
     return sides
 
 
-def _offered() -> list[str]:
-    """The rule sets that can be had."""
-    offered = offered_rule_sets([CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE])
-    if EDITED in offered:
-        offered.insert(offered.index(EDITED), UNEDITED)
-    return offered
+def _named() -> list[str]:
+    usual = (UNEDITED, EDITED) if in_force.is_edited() else (IN_FORCE, "unfiltered")
+    before = [st.query_params.get(name, "") for name in ("first", "second")]
+    if all(before) and "sets" not in st.query_params:  # an address of when there were two
+        usual = (before[0], before[1])
+    text = url_text("sets", BETWEEN.join(usual), lambda text: len(text) <= _LONGEST)
+    return list(dict.fromkeys(filter(None, text.split(BETWEEN))))[:MOST]
 
 
-def _side(key: str, label: str, default: str) -> Side:
-    offered = _offered()
-    choice = st.selectbox(
-        label,
-        offered,
-        offered.index(default),
-        key=key,
-        bind="query-params",
-        help=rule_sets_help(offered),
-    )
-    file = None
-    if choice == OWN_FILE:
-        file = st.file_uploader("Rule file (.json)", key=f"{key}_file")
-    if choice == UNEDITED:
-        return Side(edits.base().rule_set, choice)
-    rule_set = rules_for(choice, file)
-    assert rule_set is not None
-    return Side(rule_set, file.name if file is not None else choice)
+def _choose() -> None:
+    set_url_choice("sets", BETWEEN.join(st.session_state["_sets_choice"]))

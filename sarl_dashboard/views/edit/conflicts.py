@@ -12,7 +12,7 @@ from sarl_core.mining.language import action_text
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.text import escaped
 
 MOST_CONFLICTS = 4
@@ -26,7 +26,7 @@ def conflicts(of: Base, verdicts: Verdicts) -> None:
     if not verdicts.conflicts:
         st.caption("No placed rule takes a state from another rule that says something else.")
         return
-    rule_set, noun = verdicts.rule_set, of.basis.noun
+    rule_set, noun = verdicts.rule_set, edits.basis_of(of).noun
     lines = [conflict_text(one, rule_set, states=noun) for one in verdicts.conflicts]
     st.markdown("\n".join(f"- {escaped(line)}" for line in lines[:MOST_CONFLICTS]))
     if len(lines) > MOST_CONFLICTS:
@@ -48,7 +48,7 @@ def conflicts(of: Base, verdicts: Verdicts) -> None:
 
 
 def _conflict_rows(of: Base, verdicts: Verdicts) -> dict[str, list[Any]]:
-    rule_set, basis = verdicts.rule_set, of.basis
+    rule_set, basis = verdicts.rule_set, edits.basis_of(of)
     rows: dict[str, list[Any]] = {"Rule": [], "Says": [], "Takes from": [], "Which says": []}
     rows["States"] = [one.states for one in verdicts.conflicts]
     for one in verdicts.conflicts:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state import edits, in_force
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.edit import form
 from sarl_dashboard.views.edit.conflicts import conflicts
@@ -19,6 +19,8 @@ from sarl_dashboard.views.edit.totals import bar, numbers
 @st.fragment
 def editing(of: Base) -> None:
     """The edits and all that follows from them; nothing else on the page does."""
+    if in_force.has_changed():
+        st.rerun()  # as a whole: the sidebar says how many edits are in force
     try:
         before = edits.verdicts_of(of, ())
         after = edits.verdicts_of(of, edits.history(of).edits)

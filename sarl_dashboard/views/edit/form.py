@@ -19,8 +19,8 @@ from sarl_core.mining.language import action_text, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
 from sarl_core.shielding.effects import Verdicts, change
-from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state import edits, in_force
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, in_full
 
@@ -170,7 +170,7 @@ def form(base: Base, now: Verdicts) -> None:
 
 
 def _save(of: Base, edit: Add | Change) -> None:
-    edits.do(of, edit)
+    in_force.edit(of, edit)
     if not st.session_state.get("_edit_error"):
         begin(of)
         set_url_choice("rule", edit.rule_id)
@@ -227,7 +227,7 @@ def _ask(base: Base, draft: Draft, row: int, at: int) -> Ask:
         label_visibility="collapsed",
         width=110,
     )
-    values = base.basis.ground.states[:, at]
+    values = edits.basis_of(base).ground.states[:, at]
     least, most = float(values.min()), float(values.max())
     low, high = number_text(least, apart_from=most), number_text(most, apart_from=least)
     threshold = st.number_input(
@@ -294,7 +294,7 @@ def preview(filling: Filling, edit: Add | Change) -> None:
     """What the rule would change, before it is there."""
     base, now, rule = filling.base, filling.now, edit.rule
     then = edits.verdicts_of(base, (*edits.history(base).edits, edit))
-    noun = base.basis.noun
+    noun = edits.basis_of(base).noun
     st.markdown(f"**{escaped(sentence(rule, then.rule_set, evidence=False))}**")
     if not rule.conditions:
         st.warning(

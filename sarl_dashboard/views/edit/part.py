@@ -20,10 +20,10 @@ from sarl_core.mining.tree import PolicyTree, splits_of
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import row_height, table_height
-from sarl_dashboard.state import edits
+from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.data import chosen_demonstrations, held_out_demonstrations
-from sarl_dashboard.state.edits import Base
 from sarl_dashboard.state.mined import Trees, mined_landscape
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.text import escaped, in_full
 
@@ -341,7 +341,7 @@ def _columns() -> dict[str, Any]:
 def _offer(chosen: TreePart, name: str, edit: Regrow, outcome: QueryOutcome) -> None:
     """What taking a query would change, and the button."""
     then = edits.verdicts_of(chosen.base, (*edits.history(chosen.base).edits, edit))
-    noun = chosen.base.basis.noun
+    noun = edits.basis_of(chosen.base).noun
     rules = counted(outcome.below, "rule")
     has = f"still has {rules}"
     if outcome.below != chosen.rules:
@@ -364,7 +364,7 @@ def _offer(chosen: TreePart, name: str, edit: Regrow, outcome: QueryOutcome) -> 
 
 
 def _take(of: Base, edit: Regrow) -> None:
-    edits.do(of, edit)
+    in_force.edit(of, edit)
     set_url_choice("regrow", "")
     trees, rules = edits.trees_with(of, edits.history(of).edits), edits.edited(of).rules
     if trees is None or any(rule.id == st.session_state.get("_rule") for rule in rules):

@@ -13,8 +13,8 @@ from sarl_core.mining.language import counted, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
-from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state import edits, in_force
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.text import escaped
 
 
@@ -45,13 +45,13 @@ def chosen_rule(of: Base, rule: Rule, verdicts: Verdicts) -> str | None:
     with st.container(border=True, key="chosen_rule"):
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
-        decides = f"decides {counted(int(verdicts.decided[at]), of.basis.noun)}"
+        decides = f"decides {counted(int(verdicts.decided[at]), edits.basis_of(of).noun)}"
         st.caption(f"{rule_set.name_of(rule)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             for button in _buttons(rule, rule_set):
                 st.button(
                     button.label,
-                    on_click=edits.do,
+                    on_click=in_force.edit,
                     args=(of, button.edit),
                     icon=f":material/{button.icon}:",
                     key=f"edit_{button.key}",

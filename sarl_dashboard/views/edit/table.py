@@ -18,7 +18,7 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.components.settings import search_box, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.url import set_url_choice, url_choice
 
 TABLE_ROWS = 9

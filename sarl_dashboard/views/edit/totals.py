@@ -12,8 +12,10 @@ from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.state import edits
-from sarl_dashboard.state.edits import Base
+from sarl_dashboard.state import edits, in_force
+from sarl_dashboard.state.rule_base import Base
+from sarl_dashboard.state.rule_choice import comparison_address
+from sarl_dashboard.state.rule_files import EDITED, UNEDITED
 from sarl_dashboard.text import escaped, refuse
 
 
@@ -26,8 +28,8 @@ def bar(of: Base) -> None:
         refuse(error)
     with st.container(horizontal=True, gap="small", vertical_alignment="center"):
         for name, icon, step, waiting in (
-            ("Undo", "undo", edits.undo, history.edits[-1:]),
-            ("Redo", "redo", edits.redo, history.undone[-1:]),
+            ("Undo", "undo", in_force.undo, history.edits[-1:]),
+            ("Redo", "redo", in_force.redo, history.undone[-1:]),
         ):
             sentence = edit_text(waiting[0], _with(of, waiting)) if waiting else ""
             st.button(
@@ -52,7 +54,7 @@ def bar(of: Base) -> None:
                 "difference.py",
                 label="Compare with the unedited set",
                 icon=":material/difference:",
-                query_params={"first": "before the edits", "second": "edited"},
+                query_params=comparison_address(UNEDITED, EDITED),
             )
 
 
@@ -70,10 +72,10 @@ def _short(text: str, most: int = 44) -> str:
 
 def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
     """What the edits change at once, against the unedited set."""
-    changed, noun = change(before, after), of.basis.noun
-    in_force = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
+    changed, noun = change(before, after), edits.basis_of(of).noun
+    on = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
     totals = (
-        ("Rules in force", f"{in_force[1]:,}", f"{in_force[0]:,}"),
+        ("Rules in force", f"{on[1]:,}", f"{on[0]:,}"),
         ("Coverage", *(share_text(one.coverage, decimals=1) for one in (after, before))),
         ("Fidelity", *(share_text(one.fidelity, decimals=1) for one in (after, before))),
         ("Decided differently", f"{changed.different:,}", ""),
@@ -100,7 +102,7 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
 
 def where(of: Base) -> str:
     """Which states these are, where they are not the demonstrated ones."""
-    if of.basis.expert is not None:
+    if edits.basis_of(of).expert is not None:
         return ""
     return (
         " The chosen demonstrations are of something else, so this is counted on random states "

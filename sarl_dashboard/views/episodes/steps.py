@@ -17,9 +17,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.log_step import show_step
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
-from sarl_dashboard.state.compact_set import in_force
-from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import CHOSEN
+from sarl_dashboard.state import in_force
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.episodes.scene import show_scene
 
@@ -37,10 +35,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
     left, right = st.columns(2)
     with left:
         episode = int(episodes[_number("Episode", "episode", len(episodes) - 1)])
-    choice = in_force() or CHOSEN
-    rule_set = rules_for(choice, None)
-    assert rule_set is not None
-    held = _held(rule_set, demonstrations, episode)
+    held = _held(in_force.rules(), demonstrations, episode)
     with right:
         current = _number("Step", "step", held.steps - 1)
     st.caption(
@@ -54,7 +49,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
     _figures(held, rows, current)
     left, right = st.columns(2, gap="medium")
     with right:
-        show_step(held, current, choice)
+        show_step(held, current, in_force.kind())
         features, state = held.rule_set.source.features, held.observations[current]
         asking = [held.rule_set[place] for place in held.rules[current].tolist() if place >= 0]
         st.html(state_table(state_rows(state, features, features, asking)))

@@ -10,11 +10,10 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
-from sarl_dashboard.components.settings import offered_rule_sets, projection_choice, rule_sets_help
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.components.settings import projection_choice, rule_set_choice
 from sarl_dashboard.state.agents import PROJECTIONS
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE
+from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.rule_files import PAPERS
 from sarl_dashboard.text import file_name, refuse
 
 
@@ -69,24 +68,8 @@ class ExportSettings:
 
 def chosen_rules() -> RuleSet:
     """The rules to carry away; where there are none to be had, say why and stop."""
-    choices = offered_rule_sets([CHOSEN, *COMPACT_ENDINGS, EDITED, OWN_FILE])
-    default = compact_set.in_force() or CHOSEN
-    choice = st.selectbox(
-        "Rules",
-        choices,
-        index=choices.index(default),
-        key="carry",
-        bind="query-params",
-        help=rule_sets_help(choices),
-    )
-    uploaded = None
-    if choice == OWN_FILE:
-        uploaded = st.file_uploader("Rule file (.json)", key="carry_file")
-        if uploaded is None:
-            st.info("Upload a rule file to export its rules.", icon=":material/upload_file:")
-            st.stop()
     try:
-        rule_set = rules_for(choice, uploaded)
+        rule_set = rules_for(rule_set_choice("carry", without=tuple(PAPERS)))
     except SarlError as error:
         refuse(error)
         st.stop()

@@ -10,12 +10,11 @@ from sarl_core.learning.arms import ARMS
 from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
 from sarl_core.rollouts.choices import CHOICE_TEXTS
-from sarl_dashboard.components.settings import notes_notice, offered_rule_sets, rule_sets_help
+from sarl_dashboard.components.settings import notes_notice, rule_set_choice
 from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
 from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
 from sarl_dashboard.text import refuse
 
 MOST_STEPS, MOST_SEEDS, MOST_EPISODES = 500_000, 5, 500
@@ -24,17 +23,11 @@ NOBODY = "nobody"
 
 def settings() -> LearningOrder | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
-    offered = offered_rule_sets([*reversed(PAPERS), CHOSEN, *COMPACT_ENDINGS, OWN_FILE])
     with st.container(border=True):
         discrete = is_discrete()
         with st.grid(3 if discrete else 4, min_column_width=150, gap="small"):
-            rules = st.selectbox(
-                "Rules",
-                offered,
-                key="learn_rules",
-                bind="query-params",
-                persist_state="session",
-                help=f"In force while learning. {rule_sets_help(offered)}",
+            rules = rule_set_choice(
+                "learn_rules", about="In force while learning.", persist_state="session"
             )
             steps = st.number_input(
                 "Steps",
@@ -116,14 +109,9 @@ def settings() -> LearningOrder | None:
                 "PPO, DQN and SAC are the usual learners. PPO learns from what it has just done. "
                 "DQN, and SAC where actions are continuous, learn from a memory of all they did."
             )
-        file = (
-            st.file_uploader("Rule file (.json)", key="learn_rule_file")
-            if rules == OWN_FILE
-            else None
-        )
     try:
         env_id = environment_of(None)
-        rule_set = rules_for(rules, file)
+        rule_set = rules_for(rules)
         chosen = tuple(arm for arm in ARMS.values() if arm.name in names)
         if not chosen:
             raise InputError("no way to learn is chosen; choose at least one above")

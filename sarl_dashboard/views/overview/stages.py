@@ -16,7 +16,7 @@ from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.jobs.cross_fitting import known
 from sarl_dashboard.jobs.replays import latest
 from sarl_dashboard.jobs.report import comparison_of_session
-from sarl_dashboard.state import compact_set, edits, formulas, given_names, hold_out
+from sarl_dashboard.state import formulas, given_names, hold_out, in_force, rule_base
 from sarl_dashboard.state.data import (
     UPLOAD,
     chosen_dataset,
@@ -99,8 +99,8 @@ def _names(raw: Demonstrations) -> Stage:
 
 
 def _rules() -> Stage:
-    if name := compact_set.in_force():
-        return Stage("Rules", True, f"{compact_set.set_title(name)} chosen", "thresholds.py")
+    if not rule_base.at_thresholds():
+        return Stage("Rules", True, f"{in_force.title()} chosen", "thresholds.py")
     thresholds = chosen_thresholds()
     at = (
         f"support at least {threshold_text(thresholds.support)}, confidence at least "
@@ -125,7 +125,7 @@ def _evidence() -> Stage:
 
 
 def _edits() -> Stage:
-    made = edits.made()
+    made = in_force.count()
     return Stage("Edits", bool(made), counted(made, "edit") if made else "none", "edit.py")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import streamlit as st
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.environments.description import describe_environment
 from sarl_core.explaining.words.replay import named_description
@@ -14,9 +13,8 @@ from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside, Shield
 from sarl_dashboard.components.settings import (
     environment_choice,
-    offered_rule_sets,
-    own_files,
-    rule_sets_help,
+    own_policy,
+    rule_set_choice,
     shield_choice,
 )
 from sarl_dashboard.jobs.replays import ReplayOrder
@@ -28,10 +26,8 @@ from sarl_dashboard.state.agents import (
 )
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import continuous, environment_of
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, NO_RULES, OWN_FILE, PAPERS
-
-RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE, NO_RULES)
+from sarl_dashboard.state.rule_choice import rules_called, rules_for
+from sarl_dashboard.state.rule_files import NO_RULES
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +38,6 @@ class ReplaySettings:
     agent: str
     policy_file: PolicyFile | None
     rules: str
-    rule_file: UploadedFile | None
     seed: int
     projection: Projection
     outside: Outside
@@ -54,7 +49,7 @@ class ReplaySettings:
             SarlError: If it cannot be had.
         """
         env_id = environment_of(self.env)
-        rule_set = rules_for(self.rules, self.rule_file)
+        rule_set = rules_for(self.rules)
         if rule_set is not None:
             rule_set = shield_for(env_id, Shield(rule_set)).rule_set
         agent = agent_for(self.agent, self.policy_file, env_id, self.seed)
@@ -64,7 +59,7 @@ class ReplaySettings:
         return ReplayOrder(
             env_id,
             agent,
-            self.rules,
+            rules_called(self.rules),
             rule_set,
             self.projection,
             self.seed,
@@ -75,7 +70,6 @@ class ReplaySettings:
 
 def settings() -> ReplaySettings:
     """The widgets."""
-    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         in_a_row = 6 if continuous(st.session_state.get("env")) else 5
         with st.grid(in_a_row, min_column_width=150, gap="small"):
@@ -89,13 +83,7 @@ def settings() -> ReplaySettings:
                 "Expert: the one that is shipped for this environment. Own file: a policy "
                 "of yours.",
             )
-            rules = st.selectbox(
-                "Rules",
-                offered,
-                key="rules",
-                bind="query-params",
-                help=rule_sets_help(offered),
-            )
+            rules = rule_set_choice("rules", more=[NO_RULES])
             seed = st.number_input(
                 "Seed",
                 0,
@@ -107,7 +95,5 @@ def settings() -> ReplaySettings:
                 "same seed gives the same replay.",
             )
             projection, outside = shield_choice(env)
-        policy_file, rule_file = own_files(agent, rules, env)
-    return ReplaySettings(
-        env, agent, policy_file, rules, rule_file, int(seed or 0), projection, outside
-    )
+        policy_file = own_policy(agent, env)
+    return ReplaySettings(env, agent, policy_file, rules, int(seed or 0), projection, outside)

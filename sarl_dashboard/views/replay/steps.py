@@ -28,7 +28,7 @@ from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import pace_of_played
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.jobs.replays import ALONE, WITH, WITHOUT, Played, ReplayPair
-from sarl_dashboard.state.compact_set import SET_ON_RULES_PAGE
+from sarl_dashboard.state import in_force
 from sarl_dashboard.views.replay.fork import fork_section
 from sarl_dashboard.views.replay.player import film_at
 from sarl_dashboard.views.replay.recorder import flight_recorder
@@ -109,7 +109,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
     # Under which set the Rules page has these rules.
-    linked = SET_ON_RULES_PAGE.get(replay.order.rules)
+    linked = in_force.address_of(replay.order.rules)
     last = len(steps) - 1
     if "_step" in st.session_state:
         st.session_state["step"] = st.session_state.pop("_step")
@@ -192,7 +192,7 @@ def flips_text(episodes: Episodes) -> str:
     )
 
 
-def link_rules(view: StepView, linked: str) -> None:
+def link_rules(view: StepView, linked: dict[str, str]) -> None:
     """A way to each rule in force, on the Rules page under the set that is shown there."""
     names = {action.rule_id: action.rule_name for action in view.actions if action.rule}
     for rule_id, name in names.items():
@@ -200,5 +200,5 @@ def link_rules(view: StepView, linked: str) -> None:
             "rules.py",
             label="Open this rule" if len(names) == 1 else f"Open {name}",
             icon=":material/rule:",
-            query_params={**st.query_params.to_dict(), "set": linked, "rule": rule_id},
+            query_params={**st.query_params.to_dict(), **linked, "rule": rule_id},
         )

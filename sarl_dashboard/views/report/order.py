@@ -11,8 +11,10 @@ from sarl_core.explaining.report.provenance import command_line, mining_command
 from sarl_core.explaining.report.report import Wishes
 from sarl_core.explaining.report.tally import report_rules
 from sarl_core.explaining.report.thresholds import read_card
+from sarl_core.library.items import PREFIX
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.jobs.report import ReportOrder, as_results, comparison_of_session
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import (
     SHIPPED_SETS,
     chosen_dataset,
@@ -24,6 +26,7 @@ from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import (
     COMPACT_ENDINGS,
+    KEPT,
     OWN_FILE,
     compact_file,
     fitting_demonstrations,
@@ -50,7 +53,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     Raises:
         InputError: If it cannot be had.
     """
-    rule_set = rules_for(choices.rules, choices.rule_file)
+    rule_set = rules_for(choices.rules)
     if rule_set is None:
         raise InputError("there are no rules to report; choose some")
     # With what the rules derive; where they are of others, what is wrong is said.
@@ -103,8 +106,10 @@ def file_names(choices: ReportChoices) -> tuple[str, str]:
     rules = "rules.json"
     if choices.rules in COMPACT_ENDINGS:
         rules = f"data/rules/{compact_file(choices.rules).name}"
-    elif choices.rule_file is not None:
-        rules = choices.rule_file.name
+    elif choices.rules == KEPT:
+        rules = f"{PREFIX}{rule_base.base_name()}"
+    elif choices.rules == OWN_FILE:
+        rules = rule_base.base().name
     return rules, data
 
 
@@ -116,7 +121,7 @@ def commands(
     if raw is None or raw.digest != demonstrations.deriving(raw.derived).digest:
         return ()  # episodes are held out or left out, or things have other names
     mined = None
-    if choices.rules not in (*COMPACT_ENDINGS, OWN_FILE):
+    if choices.rules not in (*COMPACT_ENDINGS, KEPT, OWN_FILE):
         mined = mining_command(
             rule_set, named.rules, named.demonstrations, demonstrations, read=raw
         )

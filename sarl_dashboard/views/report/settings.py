@@ -7,11 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-from sarl_dashboard.components.settings import offered_rule_sets, rule_sets_help
-from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, OWN_FILE, PAPERS
-
-RULE_SETS = (CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, OWN_FILE)
+from sarl_dashboard.components.settings import rule_set_choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +15,6 @@ class ReportChoices:
     """What the widgets say."""
 
     rules: str
-    rule_file: UploadedFile | None
     in_full: int
     frames: int
     with_session: bool
@@ -32,16 +27,9 @@ def settings(has_comparison: bool) -> ReportChoices:
     Args:
         has_comparison: Whether this visitor has run one on the page Measure.
     """
-    offered = offered_rule_sets(RULE_SETS)
     with st.container(border=True):
         with st.grid(3, min_column_width=150, gap="small"):
-            rules = st.selectbox(
-                "Rules",
-                offered,
-                key="report_rules",
-                bind="query-params",
-                help=rule_sets_help(offered),
-            )
+            rules = rule_set_choice("report_rules")
             in_full = st.number_input(
                 "Rules in full",
                 0,
@@ -62,9 +50,6 @@ def settings(has_comparison: bool) -> ReportChoices:
                 help="States in which the rule applies, from episodes that the shipped expert "
                 "plays, or a novice held to the rules.",
             )
-        rule_file = None
-        if rules == OWN_FILE:
-            rule_file = st.file_uploader("Rule file (.json)", key="report_rule_file")
         with_session = False
         if has_comparison:
             with_session = st.checkbox(
@@ -79,4 +64,4 @@ def settings(has_comparison: bool) -> ReportChoices:
                 accept_multiple_files=True,
                 key="report_results",
             )
-    return ReportChoices(rules, rule_file, int(in_full or 0), int(frames or 0), with_session, files)
+    return ReportChoices(rules, int(in_full or 0), int(frames or 0), with_session, files)

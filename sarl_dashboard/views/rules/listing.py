@@ -49,7 +49,8 @@ def listed_rules(rule_set: RuleSet) -> Listed:
     import pyarrow as pa
 
     rules = tuple(sorted(rule_set.rules, key=lambda rule: -rule.samples))
-    table = frame(rules, rule_set, list(map(rule_set.name_of, rules)))
+    names = [f"{rule_set.name_of(rule)}{'' if rule.enabled else ', off'}" for rule in rules]
+    table = frame(rules, rule_set, names)
     return Listed(
         rules,
         pa.Table.from_pandas(table, preserve_index=False),
@@ -82,7 +83,7 @@ def matching(listed: Listed, in_force: InForce) -> list[int]:
         least = lower_bound_choice() if tried else 0.0
         sure = [place for place, bound in enumerate(listed.lower) if bound >= least]
         stem = f"rules-{in_force.demonstrations.env_id.replace('/', '-') or 'unnamed'}"
-        if compact is not None:
+        if compact is not None and not in_force.edits:
             downloads(stem, len(compact.shipped), lambda: compact.shipped)
         else:
             downloads(

@@ -23,11 +23,12 @@ from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.tables.rule_evidence import feature_evidence, path_steps
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule, node_of
+from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture
-from sarl_dashboard.views.rules.in_force import InForce
+from sarl_dashboard.state import rule_base
+from sarl_dashboard.views.rules.in_force import InForce, Place
 
 
 def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> None:
@@ -38,43 +39,56 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
         in_force: All of them, and what they come from.
         buttons: Draws what leads to other rules.
     """
-    tree, compact = in_force.tree(rule), in_force.compact
+    place, compact = in_force.place(rule), in_force.compact
     with st.container(border=True, key="sentence"):
         buttons()
-        threshold = in_force.thresholds.confidence if compact is None else None
+        at_thresholds = rule_base.at_thresholds() and rule.origin == "mined"
+        threshold = in_force.thresholds.confidence if at_thresholds else None
         st.html(rule_card(rule, in_force.rule_set, threshold=threshold))
-        if compact is not None:
+        if compact is not None and not in_force.edits:
             show_origin(compact.as_shipped(rule), compact.shipped)
+        if not rule.enabled:
+            st.markdown(":orange[:material/block: Switched off: a shield does not use this rule.]")
         if not rule.samples:
             st.info(
                 "No demonstrated state reaches this rule. It is for states that the expert never "
                 "came into by itself and was asked about.",
                 icon=":material/explore:",
             )
-        if not rule.conditions and compact is None:
+        if not rule.conditions and at_thresholds:
             st.info(
                 "This rule has no conditions: over all states the expert's most frequent action "
                 "is already as frequent as the minimum confidence asks, so the tree is cut at "
                 "its root. Raise the minimum confidence to see what it depends on.",
                 icon=":material/lightbulb:",
             )
+    if place is None:
+        st.caption(
+            "Added by hand: no path of the tree leads to it."
+            if rule.origin == "manual"
+            else "Not of the trees that the chosen demonstrations grow, so its numbers are those "
+            "of its file, and there is no path to show."
+        )
+        return
     left, right = st.columns([6, 7], gap="medium")
     with left:
-        steps = path_steps(tree, node_of(rule))
+        steps = path_steps(place.tree, place.node)
         st.html(
             heading("From the root to the rule")
-            + path_table(steps, tree.dimension, leaf=compact is not None)
+            + path_table(steps, place.tree.dimension, leaf=compact is not None)
         )
     with right:
-        place(rule, in_force)
-    st.html(features_of(tree, rule, in_force.demonstrations))
+        st.html(heading("Its place in the tree"))
+        tree_picture.show_tree(path_of(place, in_force), around="Around this rule", widget="tree")
+    st.html(features_of(place.tree, rule, in_force.demonstrations))
 
 
 def make_ready(rule: Rule, in_force: InForce) -> None:
     """Make what takes longest to make of a rule that may be looked at next."""
-    tree = in_force.tree(rule)
-    features_of(tree, rule, in_force.demonstrations)
-    tree_picture.make_ready(path_of(rule, in_force))
+    place = in_force.place(rule)
+    if place is not None:
+        features_of(place.tree, rule, in_force.demonstrations)
+        tree_picture.make_ready(path_of(place, in_force))
 
 
 def show_origin(rule: Rule, rule_set: RuleSet) -> None:
@@ -89,20 +103,13 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
     )
 
 
-def place(rule: Rule, in_force: InForce) -> None:
-    """The path lit in the tree."""
-    st.html(heading("Its place in the tree"))
-    tree_picture.show_tree(path_of(rule, in_force), around="Around this rule", widget="tree")
-
-
-def path_of(rule: Rule, in_force: InForce) -> tree_picture.PathInTree:
+def path_of(place: Place, in_force: InForce) -> tree_picture.PathInTree:
     """The path to a rule."""
-    tree = in_force.tree(rule)
     return tree_picture.PathInTree(
-        tree=tree,
+        tree=place.tree,
         cut_at=in_force.thresholds if in_force.compact is None else None,
-        node=node_of(rule),
-        note=note_of(tree, in_force),
+        node=place.node,
+        note=note_of(place.tree, in_force),
     )
 
 

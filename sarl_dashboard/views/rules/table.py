@@ -8,6 +8,7 @@ from sarl_core.mining.language import threshold_text
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.components.tables import column_config, row_height, table_height
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.url import set_url_choice, url_choice
 from sarl_dashboard.views.rules.in_force import InForce
 from sarl_dashboard.views.rules.listing import Listed, listed_rules, matching
@@ -122,7 +123,7 @@ def rule_rows(listed: Listed, places: list[int], in_force: InForce, row: int | N
 def count_text(matching: int, listed: Listed, in_force: InForce) -> str:
     """How many rules there are, and how many of them match."""
     total = len(listed.rules)
-    kind = "" if in_force.compact is None else "compact "
+    kind = "" if rule_base.compact_name() is None else "compact "
     count = f"{total:,} {kind}rules" if total > 1 else f"One {kind}rule"
     return f"{matching:,} of {count.lower()} match." if matching < total else f"{count}."
 

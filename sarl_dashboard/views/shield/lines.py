@@ -20,14 +20,34 @@ from sarl_dashboard.state.agents import (
     offered_agents,
     own_agents,
 )
-from sarl_dashboard.state.rule_choice import EDITED, rules_for
-from sarl_dashboard.state.rule_files import CHOSEN, COMBINED, COMPACT, FEWEST, NO_SHIELD, OWN_FILE
+from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.rule_files import (
+    CHOSEN,
+    COMBINED,
+    COMPACT,
+    EDITED,
+    FEWEST,
+    IN_FORCE,
+    NO_SHIELD,
+    OWN_FILE,
+    UNEDITED,
+)
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.settings import ShieldChoices
 
 # Their places give them their colours, the paper's where it has them.
 AGENT_PLACES = ("novice", "expert", "untrained", OWN_FILE)
-RULES_PLACES = ("filtered", "unfiltered", COMPACT, CHOSEN, OWN_FILE, EDITED, COMBINED, FEWEST)
+RULES_PLACES = (
+    "filtered",
+    "unfiltered",
+    COMPACT,
+    CHOSEN,
+    IN_FORCE,
+    EDITED,
+    COMBINED,
+    FEWEST,
+    UNEDITED,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +124,9 @@ def guards(choices: ShieldChoices) -> list[Guard]:
     for choice in choices.shields:
         if choice == NO_SHIELD:
             chosen.append(Guard(choice, None, None))
-        elif choice == OWN_FILE and choices.rule_file is None:
-            continue  # an empty place to put a file says enough
         else:
             try:
-                rules = rules_for(choice, choices.rule_file)
+                rules = rules_for(choice)
             except SarlError as error:
                 problems.append(str(error))
             else:

@@ -6,17 +6,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import streamlit as st
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.errors import SarlError
+from sarl_core.mining.rules import FILTERED, UNFILTERED
 from sarl_core.shielding.shield import Outside, Projection
 from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
-    own_rule_file,
     rule_sets_help,
     shield_choice,
 )
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.agents import (
     FRESH_SEED,
     PolicyFile,
@@ -25,8 +25,17 @@ from sarl_dashboard.state.agents import (
     policy_uploads,
 )
 from sarl_dashboard.state.environments import continuous, environment_of
-from sarl_dashboard.state.rule_choice import EDITED
-from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, NO_SHIELD, OWN_FILE, PAPERS
+from sarl_dashboard.state.rule_files import (
+    CHOSEN,
+    COMPACT_ENDINGS,
+    EDITED,
+    IN_FORCE,
+    NO_SHIELD,
+    OWN_FILE,
+    PAPERS,
+    UNEDITED,
+)
+from sarl_dashboard.state.thresholds import chosen_thresholds
 
 MOST_EPISODES = 1_000
 
@@ -43,7 +52,6 @@ class ShieldChoices:
     agents: list[str]
     shields: list[str]
     policy_files: list[PolicyFile]
-    rule_file: UploadedFile | None
 
     @property
     def from_demonstrations(self) -> bool:
@@ -57,6 +65,12 @@ def _usual_agents(env: str | None) -> list[str]:
         if has_expert(environment_of(env)):
             return ["novice", "expert"]
     return ["novice"]
+
+
+def _usual_shields() -> list[str]:
+    """What is compared where nothing else is said: the paper's two, or what was chosen instead."""
+    usual = in_force.kind() == CHOSEN and chosen_thresholds() in (FILTERED, UNFILTERED)
+    return [NO_SHIELD, *(PAPERS if usual else [IN_FORCE])]
 
 
 def settings() -> ShieldChoices:
@@ -101,18 +115,17 @@ def settings() -> ShieldChoices:
         if OWN_FILE in agents:
             policy_files = policy_uploads("Policies", "policy_files", env)
         offered = offered_rule_sets(
-            [NO_SHIELD, *PAPERS, CHOSEN, *COMPACT_ENDINGS, EDITED, OWN_FILE]
+            [NO_SHIELD, *PAPERS, IN_FORCE, CHOSEN, *COMPACT_ENDINGS, EDITED, UNEDITED]
         )
         shields = st.pills(
             "Shields",
             offered,
             selection_mode="multi",
-            default=[NO_SHIELD, *PAPERS],
+            default=_usual_shields(),
             key="shields",
             bind="query-params",
             help=rule_sets_help(offered),
         )
-        rule_file = own_rule_file() if OWN_FILE in shields else None
     return ShieldChoices(
         env,
         int(episodes or 1),
@@ -122,5 +135,4 @@ def settings() -> ShieldChoices:
         [name for name in offered_agents() if name in agents],
         [name for name in offered if name in shields],
         policy_files,
-        rule_file,
     )

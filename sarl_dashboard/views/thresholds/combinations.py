@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.mining.language import counted
-from sarl_dashboard.state import combining, compact_set
+from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.combining import CombinationChoice
 from sarl_dashboard.state.data import data_parts, uncombined_parts
 from sarl_dashboard.text import escaped, in_full
@@ -61,12 +61,12 @@ def combinations_choice() -> None:
 
 
 def _switch() -> None:
-    compact_set.choose(None)
+    rule_base.choose()
     combining.choose(
         CombinationChoice(st.session_state["_combinations"], combining.chosen().features)
     )
 
 
 def _choose_features() -> None:
-    compact_set.choose(None)
+    rule_base.choose()
     combining.choose(CombinationChoice(True, tuple(st.session_state[_FEATURES])))

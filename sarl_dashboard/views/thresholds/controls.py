@@ -22,7 +22,7 @@ from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.journey.words import word_help
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.rule_files import (
     COMBINED,
     COMPACT,
@@ -61,7 +61,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     # A callback that asks for more than this fragment costs a run; most moves need none.
     alone = table is not None and not display.surfaces
     moved: Callable[[], None] | Literal["rerun"] = (
-        leave_compact if display.compact is not None else "rerun" if alone else follow
+        leave_compact if not rule_base.at_thresholds() else "rerun" if alone else follow
     )
     jumps = neat_jumps(display.trees, thresholds)
     left, middle, right = st.columns([4, 4, 3])
@@ -101,7 +101,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
                 on_change=leave_compact,
                 help=word_help("divider"),
             )
-        named_settings(thresholds, compact_set.in_force() if display.compact else None)
+        named_settings(thresholds, rule_base.compact_name() if display.compact else None)
     point = display.point(thresholds)
     everything = display.dimension is None
     show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
@@ -166,6 +166,6 @@ def named_settings(thresholds: Thresholds, compact: str | None) -> None:
                 on_click=use_compact,
                 args=(name,),
                 type="primary" if compact == name else "secondary",
-                help=f"{compact_set.set_title(name)}: a small set that comes with these data. It "
+                help=f"{rule_base.set_title(name)}: a small set that comes with these data. It "
                 "has a rule for every state, and was chosen by what a novice achieves with it",
             )

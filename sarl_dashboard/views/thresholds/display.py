@@ -16,7 +16,7 @@ from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.journey.words import word_help
 from sarl_dashboard.components.settings import switch
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import mined_landscape
 from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT
@@ -148,8 +148,7 @@ def more() -> None:
             step=0.1,
             key="lift",
             bind="query-params",
-            on_change=compact_set.choose,
-            args=(None,),
+            on_change=rule_base.choose,
             help=word_help("lift", "Here: how much of it a rule must have at least; 0: no limit."),
         )
         st.slider(
@@ -159,8 +158,7 @@ def more() -> None:
             value=0,
             key="depth",
             bind="query-params",
-            on_change=compact_set.choose,
-            args=(None,),
+            on_change=rule_base.choose,
             help="Most conditions of a rule. 0: no limit.",
         )
 

@@ -7,7 +7,7 @@ import streamlit as st
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.steps import neat_point
 from sarl_core.mining.tree import PolicyTree
-from sarl_dashboard.state import compact_set
+from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits
 from sarl_dashboard.views.thresholds.display import SURFACES, TRADE_OFFS
 
@@ -28,7 +28,7 @@ def move(**thresholds: float) -> None:
     slider does not reach the browser when it asks for another run.
     """
     st.session_state["_moved"] = thresholds
-    if compact_set.in_force():
+    if not rule_base.at_thresholds():
         leave_compact()
     follow()
 
@@ -47,19 +47,19 @@ def jump(name: str, value: float) -> None:
 def use(setting: Thresholds) -> None:
     """Put a named setting in force."""
     choose_thresholds(setting)
-    compact_set.choose(None)
+    rule_base.choose()
     st.rerun()  # lift and depth, which it resets, are part of the maps
 
 
 def use_compact(name: str) -> None:
     """Put a compact set in force."""
-    compact_set.choose(name)
+    rule_base.choose(name)
     st.rerun()  # the maps lose their ring
 
 
 def leave_compact() -> None:
     """Go back to the thresholds; for callbacks, and the last thing they do."""
-    compact_set.choose(None)
+    rule_base.choose()
     st.rerun()  # the ring comes back to the maps, and the sidebar says what is in force
 
 

@@ -11,12 +11,10 @@ from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.settings import notes_notice
-from sarl_dashboard.state import compact_set, edits
+from sarl_dashboard.state import compact_set, edits, in_force, rule_base
 from sarl_dashboard.state.mined import grown_trees, rules_at
 from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
-
-IN_FORCE, EDITED = "as mined", "edited"
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,36 +33,25 @@ class RulesOnTrees:
 
 
 def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
-    """The set in force, or the same with the edits."""
+    """The rules in force, with their edits; where they are of something else, the page stops."""
     compact = compact_set.chosen_compact(demonstrations)
-    if compact is not None:
-        in_force = RulesOnTrees(compact.counted, compact.trees, True)
-    else:
-        trees = grown_trees(demonstrations, chosen_divider())
-        in_force = RulesOnTrees(rules_at(), trees, False)
-    if (
-        not edits.offered()
-        or st.segmented_control(
-            "Rules",
-            [IN_FORCE, EDITED],
-            default=IN_FORCE,
-            key="edits",
-            bind="query-params",
-            required=True,
+    trees = compact.trees if compact is not None else grown_trees(demonstrations, chosen_divider())
+    if not in_force.is_edited():
+        if compact is not None:
+            return RulesOnTrees(compact.counted, trees, True)
+        if rule_base.at_thresholds():
+            return RulesOnTrees(rules_at(), trees, False)
+    rules = in_force.rules()
+    fitted = fitting_demonstrations(rules, demonstrations)
+    if fitted is None:
+        st.info(
+            "The rules in force speak of other features or actions than the chosen demonstrations; "
+            "choose the demonstrations of their environment, or other rules, in the sidebar.",
+            icon=":material/swap_horiz:",
         )
-        != EDITED
-    ):
-        return in_force
-    edited = edits.edited_rules()
-    fitted = fitting_demonstrations(edited, demonstrations)
-    if fitted is not None:
-        edited, notes = rules_for(edited, fitted)
-        notes_notice(notes)
-        return RulesOnTrees(edited, edits.edited_trees() or in_force.trees, in_force.leaves)
-    st.info(
-        "The edited rules speak of other features or actions than the chosen demonstrations, "
-        "so the rules in force are shown instead; choose the demonstrations of their "
-        "environment in the sidebar.",
-        icon=":material/swap_horiz:",
-    )
-    return in_force
+        st.stop()
+    rules, notes = rules_for(rules, fitted)
+    notes_notice(notes)
+    base = rule_base.base()
+    own = edits.trees_with(base, edits.history(base).edits)
+    return RulesOnTrees(rules, own or trees, compact is not None)
