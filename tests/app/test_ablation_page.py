@@ -54,7 +54,7 @@ def test_called_off_it_says_so() -> None:
     [
         ({"env": "Nowhere-v9"}, "Nowhere-v9"),
         ({"agent": "own file"}, "policy has been uploaded"),
-        ({"rules": "own file"}, "rule file has been uploaded"),
+        ({"set": "own file"}, "rule file that was chosen was not kept"),
         ({"support": "1", "confidence": "1"}, "no rule that could be taken out"),
         ({"data": "upload"}, "demonstrations do not say"),
     ],

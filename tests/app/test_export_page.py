@@ -1,14 +1,12 @@
 from __future__ import annotations
 
-from typing import Any
-
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.exports.code_c import rules_to_c
 from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts, upload_rules
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 
@@ -73,12 +71,8 @@ def test_an_empty_set_is_refused_in_one_sentence() -> None:
 
 
 def test_rules_of_other_features_are_refused_and_go_without_rounding() -> None:
-    app = open_page("export", data="cartpole", carry="own file")
-    assert "Upload a rule file" in texts(app)
-    content = rules_to_json(filtered("pendulum")).encode()
-    upload: Any = app.get("file_uploader")[0]
-    upload.set_value([("rules.json", content, "application/json")])
-    app.run()
+    app = open_page("export", data="cartpole")
+    upload_rules(app, "rules.json", rules_to_json(filtered("pendulum")).encode())
     (error,) = errors(app)
     assert "ask about 3 features and the demonstrations have 4" in error
     assert "Or switch rounding off" in error

@@ -193,7 +193,7 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
 
 def test_what_was_learned_is_chosen_from_again_by_what_comes_first() -> None:
     """Mask returns more, and handover fails less; both are safe and good."""
-    app = own("none", "mask", "handover", learn_steps="1000")
+    app = own("none", "mask", "handover", learn_steps="1000", learn_rules="unfiltered")
     rules = mine_rules(
         load_demonstrations(ROOT / "data" / "demonstrations" / "cartpole.parquet"),
         supp_min=0.0,
@@ -279,7 +279,7 @@ REAL = subprocess.Popen
 @pytest.mark.parametrize(
     ("arms", "query", "fragment"),
     [
-        ((), {"learn_rules": "own file"}, "rule file has been uploaded"),
+        ((), {"set": "own file"}, "rule file that was chosen was not kept"),
         (("mask",), {"data": "pendulum"}, "continuous"),
         (("none",), {"data": "pendulum", "learn_choose": "failures first"}, "chosen by failures"),
         ((), {"data": "upload"}, "demonstrations do not say"),

@@ -9,7 +9,7 @@ from sarl_core import load_demonstrations, mine_rules
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts
+from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts, upload_rules
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 
@@ -98,11 +98,8 @@ def test_new_names_reach_the_replay_its_files_and_a_rule_file_of_ones_own() -> N
     type_into(app, 2, {0: {"Name": "west"}, 1: {"Name": "east"}})
     app.switch_page("replay.py").run()
     app.selectbox(key="agent").select("novice")
-    app.selectbox(key="rules").select("own file").run()
-    app.file_uploader(key="rule_file").set_value(
-        ("mine.json", content.encode(), "application/json")
-    ).run()
-    for rules in ("own file", "unfiltered", "none"):
+    upload_rules(app, "mine.json", content.encode())
+    for rules in ("in force", "unfiltered", "none"):
         app.selectbox(key="rules").select(rules).run()
         run_through(app, "replay")
         assert not errors(app)

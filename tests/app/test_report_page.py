@@ -9,7 +9,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.cli.app import main
 from sarl_core.mining.rule_set import rules_to_json
-from tests.app.screens import errors, open_page, texts
+from tests.app.screens import errors, open_page, texts, upload_rules
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
@@ -66,10 +66,9 @@ def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkey
 
 
 def test_rules_for_other_features_are_refused_in_place() -> None:
-    app = open_page("report", data="lunar_lander", report_rules="own file")
-    assert "Upload the rule file" in texts(app)
+    app = open_page("report", data="lunar_lander")
     content = rules_to_json(mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)).encode()
-    app.file_uploader(key="report_rule_file").set_value(("cart.json", content, "")).run()
+    upload_rules(app, "cart.json", content)
     (sentence,) = errors(app)
     assert "4 features and the demonstrations have 8" in sentence
     assert "run_report" not in [button.key for button in app.button]

@@ -17,7 +17,7 @@ from sarl_core import load_demonstrations, mine_rules
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.studies.comparison import Arm, compare
-from tests.app.screens import errors, finished, open_page, texts
+from tests.app.screens import errors, finished, open_page, texts, upload_rules
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
@@ -203,7 +203,8 @@ def test_a_number_of_episodes_that_cannot_be_is_the_usual_one(episodes: str) -> 
 
 
 def test_with_nothing_chosen_the_page_says_so() -> None:
-    app = open_page("shield", data="cartpole", shields="own file")
+    app = open_page("shield", data="cartpole")
+    app.pills(key="shields").set_value([]).run()
     assert "at least one agent and one shield" in texts(app)
     assert not app.main.button
 
@@ -213,7 +214,7 @@ def test_a_policy_and_rules_of_one_s_own(tmp_path: Path) -> None:
         "shield", data="lunar_lander", env="CartPole-v1", episodes="2", first_seed="5000"
     )
     app.pills(key="agents").set_value(["own file"]).run()
-    app.pills(key="shields").set_value(["no shield", "own file"]).run()
+    app.pills(key="shields").set_value(["no shield", "in force"]).run()
     policy = (DATA / "experts" / "cartpole.npz").read_bytes()
     learned = MlpPolicy.load(DATA / "experts" / "cartpole.npz")
     # It pushes the other way, and is named as one of the agents that are always there.
@@ -223,13 +224,11 @@ def test_a_policy_and_rules_of_one_s_own(tmp_path: Path) -> None:
     files = [("mine.npz", policy, ""), ("again.npz", policy, ""), ("novice.npz", other, "")]
     app.file_uploader(key="policy_files").set_value(files).run()
     rules = mine_rules(CARTPOLE, supp_min=0.0, conf_min=1.0)
-    app.file_uploader(key="rule_file").set_value(
-        ("r.json", rules_to_json(rules).encode(), "")
-    ).run()
+    upload_rules(app, "r.json", rules_to_json(rules).encode())
     run(app)
     assert not errors(app)
     assert rows(app)["mine, no shield"]["Mean return"] == 500.0
-    assert rows(app)["mine, own file"]["Rules"] == f"{len(rules):,}"
+    assert rows(app)["mine, in force"]["Rules"] == f"{len(rules):,}"
     assert rows(app)["novice (2), no shield"]["Mean return"] < 50.0
     assert not any(name.startswith("again") for name in rows(app))  # one file, uploaded twice
 
@@ -260,10 +259,10 @@ def test_statistics_go_to_the_policy_whose_name_they_have(tmp_path: Path) -> Non
 
 def test_a_rule_file_of_another_version_and_a_foreign_policy_are_named() -> None:
     app = open_page("shield", data="cartpole", episodes="2", first_seed="6000")
-    app.pills(key="shields").set_value(["no shield", "own file"]).run()
+    app.pills(key="shields").set_value(["no shield"]).run()
     document = json.loads(rules_to_json(mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)))
     content = json.dumps(document | {"version": 99}).encode()
-    app.file_uploader(key="rule_file").set_value(("new.json", content, "")).run()
+    upload_rules(app, "new.json", content)
     (sentence,) = errors(app)
     assert "new.json has version 99" in sentence
     app.pills(key="agents").set_value(["novice", "own file"]).run()
