@@ -1,0 +1,100 @@
+"""The rules in force in a browser: edited, sent to somebody else, and gone back from."""
+
+from __future__ import annotations
+
+import json
+
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser.walking import no_trace, parameters, settle, visit
+
+
+def rules_choice(screen: Page) -> Locator:
+    return screen.get_by_test_id("stSidebar").get_by_role("combobox", name="Rules")
+
+
+def data_choice(screen: Page) -> Locator:
+    return screen.get_by_test_id("stSidebar").get_by_role("combobox", name="Data")
+
+
+def choose(screen: Page, choice: Locator, option: str) -> None:
+    choice.click()
+    screen.get_by_role("option", name=option, exact=True).click()
+    settle(screen)
+
+
+def test_an_edit_is_in_force_at_once_and_in_a_link_for_somebody_else(
+    screen: Page, chromium: Browser, address: str
+) -> None:
+    visit(screen, "/edit?data=cartpole", "Edit")
+    expect(rules_choice(screen)).to_have_value("At the thresholds")
+    screen.get_by_role("button", name="Switch off").click()
+    expect(rules_choice(screen)).to_have_value("At the thresholds, with 1 edit")
+    settle(screen)
+    named = parameters(screen)["edits"]
+    screen.get_by_role("link", name="Rules", exact=True).click()
+    expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
+    expect(screen.get_by_text("Switched off: a shield does not use this rule.")).to_be_visible()
+    assert parameters(screen)["edits"] == named
+    other = chromium.new_context(base_url=address)
+    theirs = other.new_page()
+    visit(theirs, f"/rules?{screen.url.partition('?')[2]}", "Rules")
+    expect(rules_choice(theirs)).to_have_value("At the thresholds, with 1 edit")
+    expect(theirs.get_by_text("Switched off: a shield does not use this rule.")).to_be_visible()
+    visit(theirs, f"/export?{screen.url.partition('?')[2]}", "Export")
+    with theirs.expect_download() as download:
+        theirs.get_by_role("button", name="Download .json").click()
+    rules = json.loads(download.value.path().read_text())["rules"]
+    assert [rule["enabled"] for rule in rules].count(False) == 1
+    no_trace(theirs)
+    other.close()
+
+
+def test_edits_that_are_not_here_are_said_and_nothing_takes_their_place(screen: Page) -> None:
+    visit(screen, f"/rules?data=cartpole&edits={'a' * 26}", "Rules")
+    expect(screen.get_by_text("has nothing with the id")).to_be_visible()
+    expect(screen.get_by_test_id("stDataFrame")).to_have_count(0)
+    screen.get_by_role("button", name="Go on without them").click()
+    expect(screen.get_by_test_id("stDataFrame").first).to_be_visible()
+    settle(screen)
+    assert "edits" not in parameters(screen)
+
+
+def test_back_and_forward_bring_data_rules_page_and_selection(screen: Page) -> None:
+    visit(screen, "/rules?data=cartpole", "Rules")
+    first = screen.locator(".st-key-sentence").first.inner_text()
+    screen.get_by_role("button", name="Next rule").click()
+    settle(screen)
+    second = screen.locator(".st-key-sentence").first.inner_text()
+    assert second != first
+    choose(screen, rules_choice(screen), "Compact rules")
+    assert parameters(screen)["set"] == "compact"
+    choose(screen, data_choice(screen), "Pendulum")
+    expect(rules_choice(screen)).to_have_value("At the thresholds")
+    screen.get_by_role("link", name="Thresholds", exact=True).click()
+    expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()
+    settle(screen)
+
+    screen.go_back()
+    expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
+    expect(data_choice(screen)).to_have_value("Pendulum")
+    for _ in range(3):  # an address for each of the choices that other data take along
+        if parameters(screen).get("set") == "compact":
+            break
+        screen.go_back()
+        settle(screen)
+    expect(data_choice(screen)).to_have_value("Cart Pole")
+    expect(rules_choice(screen)).to_have_value("Compact rules")
+    screen.go_back()
+    expect(rules_choice(screen)).to_have_value("At the thresholds")
+    settle(screen)
+    assert screen.locator(".st-key-sentence").first.inner_text() == second
+    screen.go_back()
+    settle(screen)
+    assert screen.locator(".st-key-sentence").first.inner_text() == first
+    screen.go_forward()
+    settle(screen)
+    assert screen.locator(".st-key-sentence").first.inner_text() == second
+    screen.go_forward()
+    expect(rules_choice(screen)).to_have_value("Compact rules")
+    no_trace(screen)
