@@ -13,7 +13,7 @@ from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.journey.words import words_button
 from sarl_dashboard.components.sidebar import require_data, require_rules, sidebar
 from sarl_dashboard.session import settle
-from sarl_dashboard.state.in_force import take_up
+from sarl_dashboard.state import data_words, in_force
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -93,7 +93,8 @@ if absurd := absurd_parameters():
 st.html(style_sheet())
 show_logo()
 show_left_out(page.title)
-take_up()
+data_words.take_up()
+in_force.take_up()
 sidebar(with_thresholds=page.title != "Thresholds")
 words_button()
 try:

@@ -220,4 +220,5 @@ _SAID = {
     "result": "a result",
     "note": "a note",
     "edits": "edits of rules",
+    "names": "names given to data",
 }

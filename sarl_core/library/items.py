@@ -12,9 +12,9 @@ from typing import Any, Literal, get_args
 
 from sarl_core.errors import InputError, quoted
 
-Kind = Literal["demonstrations", "rules", "result", "note", "edits"]
+Kind = Literal["demonstrations", "rules", "result", "note", "edits", "names"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-UNLISTED: tuple[Kind, ...] = ("edits",)
+UNLISTED: tuple[Kind, ...] = ("edits", "names")
 """What links need and nobody looks for: in a list only where it is asked for."""
 
 PREFIX = "library:"

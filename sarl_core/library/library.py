@@ -255,7 +255,7 @@ class Library:
 
         Args:
             author: Their own things, and those that are shared; everything where None.
-            kind: Of this kind only; all but edits where not given.
+            kind: Of this kind only; all that lists show where not given.
             removed: What they removed and may have back, in place of what is there.
 
         Raises:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 
 import streamlit as st
 from streamlit.errors import StreamlitAPIException
@@ -12,7 +13,7 @@ from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.components.hold_out import parting_lines
-from sarl_dashboard.state import combining, in_force, rule_base
+from sarl_dashboard.state import combining, data_words, in_force, rule_base
 from sarl_dashboard.state.data import (
     all_demonstrations,
     choose_dataset,
@@ -59,6 +60,11 @@ def require_data(title: str) -> None:
         refuse(problem)
         st.page_link("library.py", label="Go to Library", icon=":material/arrow_forward:")
         st.stop()
+    if problem := data_words.problem():
+        st.title(title)
+        refuse(problem)
+        _go_on_without(data_words.go_on_without)
+        st.stop()
 
 
 def require_rules(title: str) -> None:
@@ -70,13 +76,17 @@ def require_rules(title: str) -> None:
     if problem := in_force.problem():
         st.title(title)
         refuse(problem)
-        st.button(
-            "Go on without them",
-            key="go_on_without",
-            icon=":material/arrow_forward:",
-            on_click=in_force.go_on_without,
-        )
+        _go_on_without(in_force.go_on_without)
         st.stop()
+
+
+def _go_on_without(leave: Callable[[], None]) -> None:
+    st.button(
+        "Go on without them",
+        key="go_on_without",
+        icon=":material/arrow_forward:",
+        on_click=leave,
+    )
 
 
 _FILE = "a rule file …"

@@ -172,10 +172,7 @@ def _with_notes(raw: Demonstrations) -> Demonstrations:
         details = library.details_of(raw)
         # What does not fit was written by another version; the data themselves are here.
         with suppress(SarlError, KeyError, TypeError):
-            if details.get(formulas.DETAIL):
-                formulas.restore(raw, details[formulas.DETAIL])
-            if details.get(given_names.DETAIL):
-                given_names.restore(raw, details[given_names.DETAIL])
+            given_names.restore_noted(raw, details)
     return raw
 
 

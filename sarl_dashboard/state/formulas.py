@@ -43,8 +43,14 @@ def put(raw: Demonstrations, derived: Derived) -> None:
         _written().pop(raw.digest, None)
     else:
         _written()[raw.digest] = derived
-    changed = _written().get(raw.digest)
-    library.annotate(raw, {DETAIL: None if changed is None else list(formula_texts(changed))})
+    texts = changed(raw)
+    library.annotate(raw, {DETAIL: None if texts is None else list(texts)})
+
+
+def changed(raw: Demonstrations) -> tuple[str, ...] | None:
+    """All that is derived, as text; None where a visitor has changed nothing of it."""
+    written = _written().get(raw.digest)
+    return None if written is None else formula_texts(written)
 
 
 def restore(raw: Demonstrations, texts: Sequence[str]) -> None:

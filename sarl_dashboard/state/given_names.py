@@ -92,6 +92,24 @@ def restore(raw: Demonstrations, names: Mapping[str, Any]) -> None:
     _given()[raw.digest] = put
 
 
+def restore_noted(raw: Demonstrations, details: Mapping[str, Any]) -> None:
+    """Derive and name what was derived and named in another visit.
+
+    Args:
+        raw: As they were read.
+        details: What was noted of them; what is not there stays as it is.
+
+    Raises:
+        InputError: If it does not fit.
+        KeyError: If it was written by another version.
+        TypeError: Likewise.
+    """
+    if details.get(formulas.DETAIL):
+        formulas.restore(raw, details[formulas.DETAIL])
+    if details.get(DETAIL):
+        restore(raw, details[DETAIL])
+
+
 @cached()
 def _renamed(ready: Demonstrations, names: Names) -> Demonstrations:
     return renamed(ready, names)

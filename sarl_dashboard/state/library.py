@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Any, cast
@@ -24,6 +25,7 @@ from sarl_core.library.place import LibraryPlace, place_of, usual_author
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.cache import cached
+from sarl_dashboard.text import digest_of
 
 _OPENED: dict[LibraryPlace, Library] = {}
 _LOCK = Lock()
@@ -164,6 +166,31 @@ def details_of(demonstrations: Demonstrations) -> Mapping[str, Any]:
         return library().item(identifier).details
     except SarlError:
         return {}
+
+
+def is_own(demonstrations: Demonstrations) -> bool:
+    """Whether demonstrations are kept and are the visitor's, who may say more of them."""
+    identifier = _ids().get(demonstrations.digest)
+    try:
+        return identifier is not None and library().item(identifier).author == author()
+    except SarlError:
+        return False
+
+
+def keep_names(details: Mapping[str, Any]) -> Item:
+    """Keep names and formulas of data that are not the visitor's, for a link.
+
+    Args:
+        details: What they are of, and what was given.
+
+    Raises:
+        SarlError: If they cannot be kept.
+    """
+    digest = digest_of(json.dumps(details, sort_keys=True).encode())
+    for known in library().with_digest(digest, kind="names"):
+        if known.author == author():
+            return known
+    return library().add("names", "names", {}, author=author(), digest=digest, details=details)
 
 
 def annotate(demonstrations: Demonstrations, details: Mapping[str, Any]) -> None:
