@@ -8,6 +8,7 @@ from itertools import product
 import pytest
 
 from sarl_core import Shield, load_demonstrations, mine_rules
+from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, compare, errors, html, open_page, texts, upload_rules
 
@@ -77,12 +78,13 @@ def test_five_sets_are_held_against_each_other_and_two_are_looked_at_closely() -
     filtered = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95)
     assert table["Rules"].tolist() == [len(FINE), len(filtered), 4, 2, len(filtered)]
     different = [a != b for a, b in zip(said(FINE), said(filtered), strict=True)]
-    share = sum(different) / len(different)
-    assert table["Otherwise than filtered"][0] == table["Otherwise than unfiltered"][1] == share
-    assert table["Otherwise than at the thresholds"][1] == 0
-    assert "Unfiltered says" in html(app) + " ".join(app.dataframe[1].value)
+    share = share_text(sum(different) / len(different), decimals=1)
+    against = app.dataframe[1].value
+    assert against["filtered"][0] == against["unfiltered"][1] == share
+    assert against["at the thresholds"][1] == "0 %"
+    assert "Filtered says" in " ".join(app.dataframe[2].value)
     app.button_group(key="against").set_value("compact").run()
-    assert "Compact says" in " ".join(app.dataframe[1].value)
+    assert "Compact says" in " ".join(app.dataframe[2].value)
 
 
 def test_a_file_is_compared_and_one_for_something_else_is_refused() -> None:

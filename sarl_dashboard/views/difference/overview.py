@@ -7,43 +7,24 @@ from collections.abc import Callable, Sequence
 import pandas as pd
 import streamlit as st
 
+from sarl_core.mining.language import share_text
 from sarl_dashboard.state import edits
 from sarl_dashboard.views.difference.sides import Side
 
 
 def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float]) -> None:
-    """A line a set.
+    """A line a set, and of more than two a table of every set against every other.
 
     Args:
         sides: The one that the others are held against first.
         different: Share of the states that two of them decide differently.
     """
-    rows: dict[str, list[object]] = {
-        name: [] for name in ("Rule set", "Rules", "Mean length", "Coverage", "Fidelity")
-    }
-    for side in sides:
-        verdicts = edits.verdicts_of_set(side.rule_set)
-        for name, value in zip(
-            rows,
-            (
-                side.name,
-                sum(rule.enabled for rule in side.rule_set.rules),
-                side.rule_set.mean_length,
-                verdicts.coverage,
-                verdicts.fidelity,
-            ),
-            strict=True,
-        ):
-            rows[name].append(value)
-    against = sides if len(sides) > 2 else sides[:1]
-    columns = {f"Otherwise than {one.name}": one for one in against}
-    for name, one in columns.items():
-        rows[name] = [None if side is one else different(one, side) for side in sides]
     column = st.column_config
     share = column.NumberColumn(format="percent", width="small")
     st.dataframe(
-        pd.DataFrame(rows),
+        pd.DataFrame([_line(side) for side in sides]),
         hide_index=True,
+        width="content",
         key="compared_sets",
         alt="What each rule set comes to",
         column_config={
@@ -54,13 +35,35 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
             "Mean length": column.NumberColumn(format="%.1f", width="small"),
             "Coverage": share,
             "Fidelity": share,
-            **{
-                name: column.NumberColumn(
-                    format="percent",
-                    width="small",
-                    help="Share of the states that the two decide differently",
-                )
-                for name in columns
-            },
         },
     )
+    if len(sides) > 2:
+        st.caption("Share of the states that two of them decide differently:")
+        st.dataframe(
+            _differences(sides, different),
+            hide_index=True,
+            width="content",
+            key="different_decisions",
+            alt="How often two of the rule sets decide differently",
+        )
+
+
+def _line(side: Side) -> dict[str, object]:
+    verdicts = edits.verdicts_of_set(side.rule_set)
+    return {
+        "Rule set": side.name,
+        "Rules": sum(rule.enabled for rule in side.rule_set.rules),
+        "Mean length": side.rule_set.mean_length,
+        "Coverage": verdicts.coverage,
+        "Fidelity": verdicts.fidelity,
+    }
+
+
+def _differences(sides: Sequence[Side], different: Callable[[Side, Side], float]) -> pd.DataFrame:
+    columns: dict[str, list[str]] = {"Rule set": [side.name for side in sides]}
+    for one in sides:
+        columns[one.name] = [
+            "–" if one is other else share_text(different(one, other), decimals=1)
+            for other in sides
+        ]
+    return pd.DataFrame(columns)
