@@ -17,7 +17,7 @@ from sarl_core.documents import Count, MisfitError, conformed, parse_json
 from sarl_core.errors import InputError, quoted
 from sarl_core.files import as_path, whole_file
 from sarl_core.library.contents import digest_of_files
-from sarl_core.library.items import Approval, Item, ItemFile, Kind
+from sarl_core.library.items import UNLISTED, Approval, Item, ItemFile, Kind
 from sarl_core.library.library import Library
 from sarl_core.limits import limited_bytes, require_memory
 
@@ -88,6 +88,10 @@ def export_bundle(library: Library, identifiers: Sequence[str], path: str | Path
     left = list(identifiers)
     while left:
         item = library.item(left.pop(0))
+        if item.kind in UNLISTED:
+            raise InputError(
+                f"{quoted(item.name)} is kept for links alone; export the rules or the data"
+            )
         if item.id not in items:
             items[item.id] = item
             left += [*item.came_from, *([item.parent] if item.parent else [])]
@@ -163,8 +167,10 @@ def import_bundle(library: Library, path: str | Path, *, author: str) -> list[It
 
 
 def _require_content(item: Item, files: Mapping[str, bytes], path: Path) -> None:
-    """Refuse demonstrations and rules that are not what the list says."""
+    """Refuse demonstrations and rules that are not what the list says, and what links need."""
     where = f"{path}: {quoted(item.name)}"
+    if item.kind in UNLISTED:  # nobody could check whether these are what they say they are
+        raise InputError(f"{where} is nothing that is exported; export the rest again")
     try:
         digest = digest_of_files(item.kind, files)
     except InputError as error:

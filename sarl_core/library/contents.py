@@ -221,4 +221,5 @@ _SAID = {
     "note": "a note",
     "edits": "edits of rules",
     "names": "names given to data",
+    "episodes": "finished episodes",
 }

@@ -12,9 +12,9 @@ from typing import Any, Literal, get_args
 
 from sarl_core.errors import InputError, quoted
 
-Kind = Literal["demonstrations", "rules", "result", "note", "edits", "names"]
+Kind = Literal["demonstrations", "rules", "result", "note", "edits", "names", "episodes"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-UNLISTED: tuple[Kind, ...] = ("edits", "names")
+UNLISTED: tuple[Kind, ...] = ("edits", "names", "episodes")
 """What links need and nobody looks for: in a list only where it is asked for."""
 
 PREFIX = "library:"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from threading import Lock
@@ -16,6 +17,7 @@ from typing import Protocol
 
 import streamlit as st
 
+from sarl_core import __version__
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import SarlError
@@ -28,7 +30,10 @@ from sarl_core.shielding.shield import Outside, Projection, Shield
 from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.state import library
+from sarl_dashboard.text import digest_of
 
+MOST_EPISODES = 10_000  # of a row; no page asks for as many
 MOST_RESULTS = 1_000  # a hundred episodes take about 10 kB
 
 
@@ -71,6 +76,11 @@ class Row:
         shield = (self.rules, self.projection, self.outside)
         return key_of((self.env_id, self.seed, self.agent.digest, shield))
 
+    @cached_property
+    def digest(self) -> str:
+        """The same for a library, which outlives this process; other versions run anew."""
+        return digest_of(repr((__version__, self.key)).encode())
+
     def shield(self) -> Shield | None:
         """Make the shield."""
         if self.rules is None:
@@ -85,6 +95,15 @@ class Results:
         self._lock = Lock()
         self._episodes: OrderedDict[object, Episodes] = OrderedDict()
         self._cuts: dict[object, Episodes] = {}
+        self._looked_for: set[object] = set()
+
+    def is_new(self, key: object) -> bool:
+        """Whether nothing is kept under a key and nobody has looked in the library for it."""
+        with self._lock:
+            if key in self._episodes or key in self._looked_for:
+                return False
+            self._looked_for.add(key)
+            return True
 
     def get(self, key: object, most: int) -> Episodes | None:
         """The first of the episodes that are kept.
@@ -204,7 +223,12 @@ def _run(
         job.text = f"{row.name}: {count(row)} of {batch.episodes} episodes"
         if not job.wanted():
             work.close()
-            return
+            break
+    for row in incomplete:
+        episodes = known_episodes.get(row.key, MOST_EPISODES)
+        if episodes is not None:
+            with suppress(SarlError):  # here they are all the same; a page has said that it fails
+                library.keep_episodes(episodes, row.name, row.digest)
 
 
 def _task(row: Row, have: int, episodes: int) -> Task:
@@ -223,4 +247,7 @@ def known(rows: Sequence[Row], episodes: int) -> list[Episodes | None]:
     Returns:
         One entry a row.
     """
+    for row in rows:
+        if results().is_new(row.key) and (stored := library.stored_episodes(row.digest)):
+            results().add(row, stored)
     return [results().get(row.key, episodes) for row in rows]

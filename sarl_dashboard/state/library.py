@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from threading import Lock
 from typing import Any, cast
 
@@ -18,12 +19,16 @@ from sarl_core.library.contents import (
     add_rules,
     demonstrations_of,
     edits_of,
+    file_of,
     rules_of,
 )
 from sarl_core.library.items import as_id
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
+from sarl_core.limits import limited_bytes
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
+from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.cache import cached
 from sarl_dashboard.text import digest_of
 
@@ -191,6 +196,48 @@ def keep_names(details: Mapping[str, Any]) -> Item:
         if known.author == author():
             return known
     return library().add("names", "names", {}, author=author(), digest=digest, details=details)
+
+
+def stored_episodes(digest: str) -> Episodes | None:
+    """Episodes that this author has run before; None where there are none, or no library.
+
+    Args:
+        digest: Of everything that they depend on.
+    """
+    with suppress(SarlError):
+        for item in library().with_digest(digest, kind="episodes"):
+            if item.author == author():
+                path = file_of(library(), item, "episodes")
+                return episodes_from_json(limited_bytes(path), name=f"what is kept as {item.id}")
+    return None
+
+
+def keep_episodes(episodes: Episodes, name: str, digest: str) -> None:
+    """Keep episodes in the place of the fewer ones that were kept before.
+
+    Args:
+        episodes: All that have been run.
+        name: What they are called.
+        digest: Of everything that they depend on.
+
+    Raises:
+        SarlError: If they cannot be kept.
+    """
+    before = [
+        item for item in library().with_digest(digest, kind="episodes") if item.author == author()
+    ]
+    if any(item.details.get("episodes", 0) >= len(episodes) for item in before):
+        return
+    library().add(
+        "episodes",
+        name,
+        {"episodes": (episodes_to_json(episodes).encode(), ".json")},
+        author=author(),
+        digest=digest,
+        details={"episodes": len(episodes)},
+    )
+    for item in before:
+        library().remove(item.id, author=author())
 
 
 def annotate(demonstrations: Demonstrations, details: Mapping[str, Any]) -> None:

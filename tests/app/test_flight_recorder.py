@@ -14,6 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Shield, load_demonstrations, mine_rules, rollout
 from sarl_core.rendering.fork import fork
 from sarl_core.rollouts.episodes import Episodes
+from sarl_dashboard.jobs import replays
 from tests.app.screens import errors, finished, html, metrics, open_page, run_through, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
@@ -158,3 +159,20 @@ def test_the_steps_of_all_episodes_and_the_way_to_another() -> None:
     assert everything.flips is not None
     rate = everything.flips.sum() * 50 / everything.lengths.sum()
     assert float(flips["Flips a second"].iloc[0]) == pytest.approx(rate, abs=0.01)
+
+
+def test_a_link_to_a_fork_runs_it_and_shows_it(wanted: Episodes) -> None:
+    assert wanted.steps is not None
+    step = int(np.flatnonzero(wanted.steps.intervened)[2])
+    app = run_through(replayed(step=str(step)), "fork")
+    assert "Return without it" in metrics(app)
+    values = dict(app.query_params.items())
+    address = {name: one if isinstance(one, str) else one[0] for name, one in values.items()}
+    assert address["fork"] == f"{step}:shielded"
+    replays.fork_cache().clear()  # as a server that was started anew
+    other = finished(finished(open_page("replay", **address), "replay"), "fork")
+    assert not errors(other)
+    assert metrics(other)["Return without it"] == metrics(app)["Return without it"]
+    # At another step nothing is run unasked.
+    other.slider(key="step").set_value(step + 1).run()
+    assert "Return without it" not in metrics(other)

@@ -17,6 +17,7 @@ from sarl_core import load_demonstrations, mine_rules
 from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.studies.comparison import Arm, compare
+from sarl_dashboard.jobs import episodes as episode_jobs
 from tests.app.screens import errors, finished, open_page, texts, upload_rules
 
 DATA = Path(__file__).parents[2] / "data"
@@ -309,3 +310,18 @@ def test_compact_rules_are_offered_where_there_are_some(
     mine_rules(CARTPOLE, supp_min=0.1, conf_min=0.5).save(tmp_path / "cartpole_compact.json")
     app = run(open_page("shield", **query, shields="compact"))
     assert list(rows(app)) == ["novice, compact"]
+
+
+def test_a_link_to_a_comparison_shows_it_after_a_restart_and_runs_nothing_again() -> None:
+    query = {"data": "cartpole", "agents": "novice", "episodes": "4", "first_seed": "7000"}
+    app = run(open_page("shield", **query))
+    before = rows(app)
+    assert before
+    episode_jobs.results.clear()  # as a server that was started anew
+    again = open_page("shield", **query)
+    assert rows(again) == before
+    assert again.button(key="run_comparison").disabled
+    # Of more episodes the first ones are known.
+    more = open_page("shield", **query | {"episodes": "6"})
+    assert rows(more) == before
+    assert not more.button(key="run_comparison").disabled

@@ -11,10 +11,13 @@ from sarl_core.explaining.words.fork import REST_TEXT, fork_text
 from sarl_core.rendering.fork import Fork, Rest
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
+from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.replays import FORK, Played, fork_cache, forking, movie
+from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import digest_of, escaped
 from sarl_dashboard.views.replay.player import film_player
 
+_LONGEST = 40  # signs of a fork in an address
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
 
 
@@ -50,9 +53,23 @@ def fork_section(played: Played, current: int) -> None:
         f"{REST_TEXT[rest]} Up to step {current:,} both are the same episode, and the agent draws "
         "the same random numbers in both."
     )
+    name = f"{current}:{rest}"
+
+    def start() -> Job[Fork]:
+        set_url_choice("fork", name)
+        return forking(order, current, rest)
+
+    if (
+        url_text("fork", "", lambda text: len(text) <= _LONGEST) == name
+        and key not in fork_cache()
+        and not FORK.at_work
+        and st.session_state.get("_fork_opened") != key
+    ):  # a link to it; cancelled, it is not begun again
+        st.session_state["_fork_opened"] = key
+        FORK.begin(start)
     offer = Offer(
         key=key,
-        start=lambda: forking(order, current, rest),
+        start=start,
         about=about,
         complete=False,
         cancelled="Cancelled; nothing was kept.",
