@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.walking import metric, no_trace, parameters, settle, visit
+from tests.browser.walking import metric, no_trace, parameters, rules_choice, settle, visit
 
 
 def press(screen: Page, name: str) -> None:
@@ -54,27 +54,34 @@ def test_rules_are_edited_saved_and_compared(screen: Page, tmp_path: Path) -> No
     expect(screen.get_by_role("heading", name="Compare", level=1)).to_be_visible()
     expect(screen.locator(".st-key-confusion table")).to_be_visible()
     settle(screen)
-    assert parameters(screen)["second"] == "edited"
+    expect(
+        screen.get_by_text("Before the edits says").or_(screen.get_by_text("edited says")).first
+    ).to_be_visible()
     expect(screen.get_by_text("1 rule added, none removed, 1 rule changed")).to_be_visible()
     screen.get_by_role("link", name="Rules", exact=True).click()
-    expect(screen.get_by_text("You have made 3 edits of these rules")).to_be_visible()
-    screen.get_by_role("link", name="See the edited set").click()
+    expect(rules_choice(screen)).to_have_value("At the thresholds, with 3 edits")
+    expect(screen.locator(".st-key-sentence")).to_be_visible()
+    settle(screen)
+    screen.get_by_role("link", name="Edit", exact=True).click()
     expect(screen.get_by_role("button", name="Undo: add a rule")).to_be_visible()
     no_trace(screen)
 
 
-def test_another_second_set_is_compared_and_a_link_shows_the_same(screen: Page) -> None:
+def test_another_set_is_compared_and_a_link_shows_the_same(screen: Page) -> None:
     visit(screen, "/compare?data=cartpole", "Compare")
     table = screen.locator(".st-key-confusion table")
     expect(table).to_be_visible()
     before = table.inner_text()
-    screen.get_by_role("combobox", name="Second set").click()
+    screen.get_by_role("combobox", name="Rule sets").click()
     screen.get_by_role("option", name="compact", exact=True).click()
+    screen.keyboard.press("Escape")
+    close = screen.get_by_test_id("stRadio").or_(screen.get_by_role("radiogroup"))
+    close.get_by_text("compact", exact=True).click()
     expect(table).not_to_have_text(before)
     settle(screen)
     now = table.inner_text()
     assert now != before
-    assert parameters(screen)["second"] == "compact"
+    assert parameters(screen)["sets"] == "in force|unfiltered|compact"
     visit(screen, screen.url, "Compare")
     expect(table).to_be_visible()
     assert table.inner_text() == now

@@ -8,7 +8,7 @@ from pathlib import Path
 from playwright.sync_api import Page, expect
 
 from sarl_core import RuleSet, load_demonstrations
-from tests.browser.walking import metric, no_trace, parameters, settle, visit
+from tests.browser.walking import metric, no_trace, parameters, rules_choice, settle, visit
 
 SMALL = "data=cartpole&max_rules=4&rounds=2&round_episodes=6&validation=16"
 RULES = Path(__file__).parents[2] / "data" / "rules"
@@ -57,7 +57,7 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
     assert screen.evaluate(ring) != "none"
     filtered = metric(screen, "Rules")
     screen.get_by_role("button", name="Compact", exact=True).click()
-    expect(screen.get_by_text("Compact rules in force")).to_be_visible()
+    expect(rules_choice(screen)).to_have_value("Compact rules")
     settle(screen)
     assert metric(screen, "Rules") == str(len(rules))
     assert metric(screen, "Coverage") == "100 %"
@@ -72,17 +72,17 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
     slider = screen.get_by_role("slider", name="Minimum confidence")
     for _ in range(12):
         slider.press("ArrowLeft")
-    expect(screen.get_by_text("Compact rules in force")).to_have_count(0)
+    expect(rules_choice(screen)).to_have_value("At the thresholds")
     settle(screen)
     screen.wait_for_url(lambda url: "set=" not in url)
     assert screen.evaluate(ring) != "none"
     assert metric(screen, "Rules") not in (filtered, str(len(rules)))
     # A click on a map does the same.
     screen.get_by_role("button", name="Compact", exact=True).click()
-    expect(screen.get_by_text("Compact rules in force")).to_be_visible()
+    expect(rules_choice(screen)).to_have_value("Compact rules")
     settle(screen)
     screen.locator(".st-key-map_rule_count .nsewdrag").click(position={"x": 60, "y": 40})
-    expect(screen.get_by_text("Compact rules in force")).to_have_count(0)
+    expect(rules_choice(screen)).to_have_value("At the thresholds")
     settle(screen)
     assert screen.evaluate(ring) != "none"
     no_trace(screen)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from urllib.parse import parse_qs, urlsplit
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 PATIENCE = 60_000
 
@@ -51,6 +51,11 @@ def metric(screen: Page, label: str) -> str:
 def parameters(screen: Page) -> dict[str, str]:
     """What the URL says."""
     return {name: values[0] for name, values in parse_qs(urlsplit(screen.url).query).items()}
+
+
+def rules_choice(screen: Page) -> Locator:
+    """Which rules are in force, in the sidebar."""
+    return screen.get_by_test_id("stSidebar").get_by_role("combobox", name="Rules")
 
 
 def no_trace(screen: Page) -> None:

@@ -91,6 +91,7 @@ def _pair(sides: list[Side]) -> tuple[Side, Side]:
             list(others),
             default=name,
             key="against",
+            bind="query-params",
             required=True,
         )
     return sides[0], others.get(name, sides[1])

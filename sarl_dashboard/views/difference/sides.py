@@ -72,9 +72,10 @@ def _named() -> list[str]:
     before = [st.query_params.get(name, "") for name in ("first", "second")]
     if all(before) and "sets" not in st.query_params:  # an address of when there were two
         usual = (before[0], before[1])
-    text = url_text("sets", BETWEEN.join(usual), lambda text: len(text) <= _LONGEST)
+    text = url_text("sets", "", lambda text: len(text) <= _LONGEST) or BETWEEN.join(usual)
     return list(dict.fromkeys(filter(None, text.split(BETWEEN))))[:MOST]
 
 
 def _choose() -> None:
-    set_url_choice("sets", BETWEEN.join(st.session_state["_sets_choice"]))
+    # Nothing chosen is a choice too, and not the usual one.
+    set_url_choice("sets", BETWEEN.join(st.session_state["_sets_choice"]) or BETWEEN)
