@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from sarl_core.auditing.growing import GrowingLog
     from sarl_core.auditing.guards import GuardCondition
     from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.explaining.words.sign_off import SignOff
 
 _FAILED = 3  # a condition of --fail-on holds
 _LISTED = 12
@@ -112,10 +113,13 @@ def audit(
         from sarl_core.auditing.audit import audit as against
         from sarl_core.auditing.comparison import LogComparison
         from sarl_core.auditing.guards import guard
+        from sarl_core.explaining.exports.audit import audit_document
+        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
+        sign_off = sign_off_at_hand(rule_set)
         mined_from = (
             None
             if demonstrations is None
@@ -153,12 +157,15 @@ def audit(
                 out,
                 title=f"{path_of(logs, short=True)} against {rules.name}",
                 comparison=comparison,
+                sign_off=sign_off,
             )
-    document = _document(held, comparison, guards)
     if as_json:
+        document = audit_document(held, comparison, sign_off)
+        if guards:
+            document["failed_on"] = [one.text for one in guards if one.holds(held)]
         terminal.print_json(document)
     else:
-        _print(held, comparison, f"{path_of(logs)} against {rules}")
+        _print(held, comparison, f"{path_of(logs)} against {rules}", sign_off)
         if out is not None:
             terminal.print_lines([f"Wrote {out}."])
     if stopped is not None:
@@ -202,17 +209,6 @@ def _with_path(error: InputError, path: str) -> str:
     return str(error) if path in str(error) else f"{path}: {error}"
 
 
-def _document(
-    held: Audit, comparison: LogComparison | None, guards: list[GuardCondition]
-) -> dict[str, Any]:
-    document = held.to_dict()
-    if comparison is not None:
-        document["comparison"] = comparison.to_dict()
-    if guards:
-        document["failed_on"] = [one.text for one in guards if one.holds(held)]
-    return document
-
-
 def _guard(held: Audit, guards: list[GuardCondition]) -> None:
     """End with a code of its own where a condition holds."""
     failed = [one for one in guards if one.holds(held)]
@@ -226,7 +222,9 @@ def _guard(held: Audit, guards: list[GuardCondition]) -> None:
         raise typer.Exit(_FAILED)
 
 
-def _print(held: Audit, comparison: LogComparison | None, title: str) -> None:
+def _print(
+    held: Audit, comparison: LogComparison | None, title: str, sign_off: SignOff | None
+) -> None:
     from sarl_core.cli.answers.summaries import print_notes
     from sarl_core.explaining.words.audit import (
         audit_facts,
@@ -235,9 +233,10 @@ def _print(held: Audit, comparison: LogComparison | None, title: str) -> None:
         interval_text,
         stretch_text,
     )
+    from sarl_core.explaining.words.sign_off import sign_off_text
     from sarl_core.mining.language import share_text
 
-    terminal.print_lines([title, ""])
+    terminal.print_lines([title, *([sign_off_text(sign_off)] if sign_off else []), ""])
     terminal.print_facts(audit_facts(held))
     table = held.rule_table()
     broken = table[table["broken"] > 0].sort_values("broken", ascending=False)

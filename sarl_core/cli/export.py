@@ -84,7 +84,8 @@ def export(
             else "--demonstrations are for --rounded; give both, or neither"
         )
     with terminal.working("Exporting"):
-        from sarl_core.explaining.exports.export import export_rules
+        from sarl_core.explaining.exports.export import prepare, save_export
+        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
@@ -93,21 +94,22 @@ def export(
             if demonstrations is None
             else read_demonstrations(demonstrations, env, columns, missing)
         )
-        vectors, prepared = export_rules(
-            rule_set,
-            out,
-            merged=merged,
-            demonstrations=given,
-            projection=projection,
-            on_invalid=on_invalid,
-        )
+        prepared = prepare(rule_set, merged=merged, demonstrations=given)
+        sign_off = sign_off_at_hand(prepared.rule_set)  # rounded or merged they are other rules
+        vectors = save_export(prepared, out, projection, on_invalid, sign_off)
         notes = (*(given.notes if given is not None else ()), *prepared.notes)
     if as_json:
-        terminal.print_json({**_document(prepared, out, vectors), "notes": list(notes)})
+        from sarl_core.explaining.words.sign_off import approvals_document
+
+        document = _document(prepared, out, vectors)
+        approved = approvals_document(sign_off)
+        terminal.print_json({**document, "notes": list(notes), "approved": approved})
     else:
         from sarl_core.cli.answers.summaries import print_notes
+        from sarl_core.explaining.words.sign_off import sign_off_text
 
         terminal.print_lines(_lines(prepared, out, vectors))
+        terminal.print_lines([sign_off_text(sign_off)] if sign_off else [])
         print_notes(notes)
 
 

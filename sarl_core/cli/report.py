@@ -109,12 +109,14 @@ def report(
         from sarl_core.explaining.report.provenance import command_line, mining_command
         from sarl_core.explaining.report.report import make_report
         from sarl_core.explaining.report.thresholds import read_card
+        from sarl_core.explaining.words.sign_off import approvals_document
+        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
         read = read_demonstrations(demonstrations, env, columns, missing)
         given = recoded(read, rule_set.source.features, called=str(demonstrations))
-        card = read_card(rules)
+        card, sign_off = read_card(rules), sign_off_at_hand(rule_set)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
             "--demonstrations": demonstrations,
@@ -157,6 +159,7 @@ def report(
             ),
             rules_name=rules.name,
             demonstrations_name=demonstrations.name,
+            sign_off=sign_off,
             card=card,
             comparison=results,
             progress=advance,
@@ -172,6 +175,7 @@ def report(
                 "pictures": document.pictures,
                 "without_pictures": document.without or None,
                 "bytes": size,
+                "approved": approvals_document(sign_off),
                 "notes": list(document.notes),
             }
         )

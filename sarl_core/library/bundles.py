@@ -15,9 +15,10 @@ import msgspec
 from sarl_core.archives import entry_content, opened
 from sarl_core.documents import Count, MisfitError, conformed, parse_json
 from sarl_core.errors import InputError, quoted
+from sarl_core.explaining.words.sign_off import Approval
 from sarl_core.files import as_path, whole_file
 from sarl_core.library.contents import digest_of_files
-from sarl_core.library.items import UNLISTED, Approval, Item, ItemFile, Kind
+from sarl_core.library.items import UNLISTED, Item, ItemFile, Kind
 from sarl_core.library.library import Library
 from sarl_core.limits import limited_bytes, require_memory
 

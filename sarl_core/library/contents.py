@@ -13,9 +13,12 @@ from sarl_core.demonstrations.formats import (
     read_demonstrations,
     save_demonstrations,
 )
-from sarl_core.errors import InputError, quoted
+from sarl_core.errors import InputError, SarlError, quoted
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_of
+from sarl_core.library.database import is_there
 from sarl_core.library.items import Item, Kind
 from sarl_core.library.library import Library
+from sarl_core.library.place import place_of
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
 from sarl_core.mining.editing.edits import Edit
@@ -173,6 +176,44 @@ def rules_of(library: Library, item: Item) -> RuleSet:
         InputError: If it is something else, or its file is missing or damaged.
     """
     return RuleSet.load(file_of(library, item, "rules"))
+
+
+def rules_sign_off(library: Library, rule_set: RuleSet) -> SignOff:
+    """Who approved rules as they stand, whatever file they came in.
+
+    Args:
+        library: Where that is known.
+        rule_set: With every edit.
+
+    Returns:
+        Of all times that it holds these very rules.
+
+    Raises:
+        WorkError: If it cannot be read.
+    """
+    items = library.with_digest(rules_digest(rule_set), kind="rules")
+    if not items:
+        return SignOff()
+    return sign_off_of(approval for item in items for approval in item.approvals)
+
+
+def sign_off_at_hand(rule_set: RuleSet) -> SignOff | None:
+    """Who approved rules as they stand, by the library of this machine; none is made for it.
+
+    Args:
+        rule_set: With every edit.
+
+    Returns:
+        Nobody where there is no library; None where there is one and it cannot be read.
+    """
+    try:
+        place = place_of()
+        if not is_there(place):
+            return SignOff()
+        with Library(place) as library:
+            return rules_sign_off(library, rule_set)
+    except SarlError:  # what was asked for can be done without it
+        return None
 
 
 def digest_of_files(kind: Kind, files: Mapping[str, bytes]) -> str | None:

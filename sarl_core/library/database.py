@@ -15,6 +15,7 @@ from sarl_core.library.place import LibraryPlace
 from sarl_core.library.tables import NEWEST
 
 _PATIENCE = 30  # seconds that a writer waits for another
+_REACHED_IN = 10  # seconds, or a server counts as out of reach
 _WRITERS = 7_205_759_403  # the lock that writers of one PostgreSQL library take, one at a time
 _VERSION = "alembic_version"
 
@@ -35,7 +36,7 @@ class Database:
         self._said = place.said
         self._engine = _engine(place)
         try:
-            with self._in_words():
+            with _in_words(self._said):
                 self._bring_up_to_date()
         except BaseException:
             self.close()
@@ -48,7 +49,7 @@ class Database:
         Raises:
             WorkError: If it cannot be read.
         """
-        with self._in_words(), self._engine.begin() as connection:
+        with _in_words(self._said), self._engine.begin() as connection:
             yield connection
 
     @contextmanager
@@ -60,7 +61,7 @@ class Database:
         """
         options = {"sarl_writes": True}
         with (
-            self._in_words(),
+            _in_words(self._said),
             self._engine.connect().execution_options(**options) as connection,
             connection.begin(),
         ):
@@ -95,33 +96,56 @@ class Database:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
 
-    @contextmanager
-    def _in_words(self) -> Iterator[None]:
-        """Say in a sentence what a database says in its own words."""
-        try:
-            yield
-        except DBAPIError as error:
-            reason = " ".join(str(error.orig).split())
-            if "not a database" in reason:
-                raise InputError(
-                    f"in {self._said} lies a file that is no library; choose another place with "
-                    "SARL_LIBRARY"
-                ) from error
-            raise WorkError(
-                f"the library in {self._said} cannot be used ({reason}); look after its disk, or "
-                "choose another place with SARL_LIBRARY"
+
+def is_there(place: LibraryPlace) -> bool:
+    """Whether there is a library; nothing is made by looking.
+
+    Args:
+        place: Where it would be.
+
+    Raises:
+        WorkError: If the database cannot be reached.
+    """
+    if place.is_folder:
+        return place.database_file.is_file()
+    engine = _engine(place)
+    try:
+        with _in_words(place.said), engine.connect() as connection:
+            return _version(connection) is not None
+    finally:
+        engine.dispose()
+
+
+@contextmanager
+def _in_words(place: str) -> Iterator[None]:
+    """Say in a sentence what a database says in its own words."""
+    try:
+        yield
+    except DBAPIError as error:
+        reason = " ".join(str(error.orig).split())
+        if "not a database" in reason:
+            raise InputError(
+                f"in {place} lies a file that is no library; choose another place with SARL_LIBRARY"
             ) from error
-        except SQLAlchemyError as error:
-            raise WorkError(
-                f"the library in {self._said} cannot be used ({' '.join(str(error).split())}); "
-                "choose another place with SARL_LIBRARY"
-            ) from error
+        raise WorkError(
+            f"the library in {place} cannot be used ({reason}); look after its disk, or choose "
+            "another place with SARL_LIBRARY"
+        ) from error
+    except SQLAlchemyError as error:
+        raise WorkError(
+            f"the library in {place} cannot be used ({' '.join(str(error).split())}); choose "
+            "another place with SARL_LIBRARY"
+        ) from error
 
 
 def _engine(place: LibraryPlace) -> Engine:
     if not place.is_folder:
         try:
-            return create_engine(place.address, pool_pre_ping=True)
+            return create_engine(
+                place.address,
+                pool_pre_ping=True,
+                connect_args={"connect_timeout": _REACHED_IN},
+            )
         except ModuleNotFoundError as error:
             raise WorkError(
                 "a library in PostgreSQL needs psycopg, which is not installed; run pip install "

@@ -11,6 +11,7 @@ from datetime import datetime
 from typing import Any, Literal, get_args
 
 from sarl_core.errors import InputError, quoted
+from sarl_core.explaining.words.sign_off import Approval
 
 Kind = Literal["demonstrations", "rules", "result", "note", "edits", "names", "episodes"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -39,21 +40,6 @@ class ItemFile:
     digest: str
     ending: str
     size: int
-
-
-@dataclass(frozen=True)
-class Approval:
-    """That somebody has approved an item.
-
-    Attributes:
-        author: Who.
-        note: What was said to it.
-        created: When.
-    """
-
-    author: str
-    note: str
-    created: datetime
 
 
 @dataclass(frozen=True)
@@ -121,10 +107,7 @@ class Item:
                 {"role": one.role, "digest": one.digest, "ending": one.ending, "size": one.size}
                 for one in self.files
             ],
-            "approvals": [
-                {"author": one.author, "note": one.note, "created": one.created.isoformat()}
-                for one in self.approvals
-            ],
+            "approvals": [one.document for one in self.approvals],
         }
 
 

@@ -12,13 +12,13 @@ from typing import Any, Self
 from sqlalchemy import Connection, delete, or_, select, update
 
 from sarl_core.errors import InputError, quoted
+from sarl_core.explaining.words.sign_off import Approval
 from sarl_core.library import tables
 from sarl_core.library.database import Database
 from sarl_core.library.file_store import FileStore
 from sarl_core.library.items import (
     KINDS,
     UNLISTED,
-    Approval,
     Item,
     ItemFile,
     Kind,

@@ -35,6 +35,11 @@ class LibraryPlace:
         """Whether the database is a file in that folder."""
         return self.address.startswith("sqlite")
 
+    @property
+    def database_file(self) -> Path:
+        """The file of the database, where it is one."""
+        return self.folder.absolute() / _DATABASE
+
 
 def place_of(text: str | Path | None = None) -> LibraryPlace:
     """Where a library is.

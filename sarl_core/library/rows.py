@@ -9,8 +9,9 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, func, insert, select
 
+from sarl_core.explaining.words.sign_off import Approval
 from sarl_core.library import tables
-from sarl_core.library.items import Approval, Item, ItemFile
+from sarl_core.library.items import Item, ItemFile
 
 
 def insert_item(connection: Connection, item: Item) -> None:

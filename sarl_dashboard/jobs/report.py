@@ -12,6 +12,7 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.report.comparison import Result, results_of
 from sarl_core.explaining.report.report import Report, Wishes, make_report
+from sarl_core.explaining.words.sign_off import sign_off_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
@@ -48,7 +49,8 @@ class ReportOrder:
         """Equal keys give equal reports; no agent is among the wishes."""
         wishes = self.wishes
         names = (wishes.rules_name, wishes.demonstrations_name)
-        contents = (wishes.in_full, wishes.frames, wishes.commands, names)
+        sign_off = sign_off_text(wishes.sign_off)
+        contents = (wishes.in_full, wishes.frames, wishes.commands, names, sign_off)
         return key_of((self.rule_set, self.demonstrations, contents, self.comparison))
 
 

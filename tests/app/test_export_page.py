@@ -4,6 +4,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.exports.code_c import rules_to_c
+from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
 from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts, upload_rules
@@ -39,7 +40,8 @@ def test_the_rules_in_force_are_rounded_and_no_decision_changes() -> None:
 
 def test_c_is_shown_as_it_is_downloaded() -> None:
     app = open_page("export", data="cartpole", format="C", merged="true")
-    assert code(app).strip() == rules_to_c(merged_rules(filtered("cartpole"))).strip()
+    rules = merged_rules(filtered("cartpole"))
+    assert code(app).strip() == rules_to_c(rules, sign_off=SignOff()).strip()
 
 
 def test_a_model_says_what_goes_in_and_out() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sarl_core.auditing.audit import Audit
 from sarl_core.auditing.comparison import LogComparison
@@ -20,6 +20,7 @@ from sarl_core.explaining.words.audit import (
     interval_text,
     stretch_text,
 )
+from sarl_core.explaining.words.sign_off import SignOff, approvals_document, sign_off_text
 from sarl_core.files import whole_file
 from sarl_core.mining.language import sentence, share_text
 
@@ -31,7 +32,12 @@ _MOST_ROWS = 100  # of a table that is read
 
 
 def save_audit(
-    audit: Audit, folder: Path, *, title: str, comparison: LogComparison | None = None
+    audit: Audit,
+    folder: Path,
+    *,
+    title: str,
+    comparison: LogComparison | None = None,
+    sign_off: SignOff | None = None,
 ) -> None:
     """Write an audit into a folder: `audit.json`, `audit.html`, and three tables as CSV.
 
@@ -40,6 +46,7 @@ def save_audit(
         folder: Made if it is not there; the folder above it has to be.
         title: Of the page.
         comparison: With another log, or None.
+        sign_off: Who approved the rules; None to say nothing of it.
 
     Raises:
         InputError: If the folder cannot be made.
@@ -51,23 +58,48 @@ def save_audit(
         raise InputError(
             f"the folder {folder} cannot be made ({error.strerror}); choose another"
         ) from error
-    document = audit.to_dict()
-    if comparison is not None:
-        document["comparison"] = comparison.to_dict()
+    document = audit_document(audit, comparison, sign_off)
     _write(folder / "audit.json", json.dumps(document, allow_nan=False, indent=1) + "\n")
-    _write(folder / "audit.html", audit_html(audit, title=title, comparison=comparison))
+    page = audit_html(audit, title=title, comparison=comparison, sign_off=sign_off)
+    _write(folder / "audit.html", page)
     _write_table(audit.rule_table(), folder / "rules.csv")
     _write_table(audit.episodes, folder / "episodes.csv")
     _write_table(audit.to_frame(), folder / "steps.csv")
 
 
-def audit_html(audit: Audit, *, title: str, comparison: LogComparison | None = None) -> Markup:
+def audit_document(
+    audit: Audit, comparison: LogComparison | None = None, sign_off: SignOff | None = None
+) -> dict[str, Any]:
+    """An audit as JSON has it.
+
+    Args:
+        audit: Rules against a log.
+        comparison: With another log, or None.
+        sign_off: Who approved the rules; None where that is not known.
+
+    Returns:
+        `Audit.to_dict`, with `comparison` where there is one, and `approved`.
+    """
+    document = audit.to_dict()
+    if comparison is not None:
+        document["comparison"] = comparison.to_dict()
+    return {**document, "approved": approvals_document(sign_off)}
+
+
+def audit_html(
+    audit: Audit,
+    *,
+    title: str,
+    comparison: LogComparison | None = None,
+    sign_off: SignOff | None = None,
+) -> Markup:
     """A page without script that opens by itself.
 
     Args:
         audit: Rules against a log.
         title: Of the page.
         comparison: With another log, or None.
+        sign_off: Who approved the rules; None to say nothing of it.
 
     Returns:
         The document.
@@ -76,6 +108,7 @@ def audit_html(audit: Audit, *, title: str, comparison: LogComparison | None = N
         "documents/audit",
         title=title,
         sheet=style_sheet(),
+        sign_off=sign_off_text(sign_off),
         facts=audit_facts(audit),
         stretches=[stretch_text(audit, one) for one in audit.worst],
         rules=broken_rules_html(audit),

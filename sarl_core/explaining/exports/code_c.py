@@ -14,8 +14,10 @@ from sarl_core.explaining.exports.program import (
     parts_of,
     program_of,
     query_name,
+    sign_off_lines,
     state_lines,
 )
+from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.language import action_text, conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
@@ -46,7 +48,7 @@ _HEAD = """\
  *
  * Made by `python -m sarl_core export`: {rules}{projection}.
  * The rules were learned from examples and guarantee nothing.
- */
+{approved} */
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
@@ -87,7 +89,10 @@ _INVALID: dict[OnInvalid, str] = {
 
 
 def rules_to_c(
-    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+    rule_set: RuleSet,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+    sign_off: SignOff | None = None,
 ) -> str:
     """A rule set as C.
 
@@ -96,6 +101,7 @@ def rules_to_c(
         projection: What a continuous action that breaks a rule becomes.
         on_invalid: Whether an action passes where it or the state is none, or nothing is given
             to be executed; what is returned says so either way.
+        sign_off: Who approved the rules; None to say nothing of it.
 
     Returns:
         A source file with the function `shield_decide`, which decides as a `Shield` does.
@@ -111,7 +117,7 @@ def rules_to_c(
     ]
     return "\n".join(
         [
-            _head(program),
+            _head(program, sign_off),
             _names(program),
             _table(program),
             *functions,
@@ -142,7 +148,7 @@ def _kind(program: Program) -> str:
     return "float" if program.continuous else "int64_t"
 
 
-def _head(program: Program) -> str:
+def _head(program: Program, sign_off: SignOff | None) -> str:
     rule_set = program.rule_set
     signature = _SIGNATURE.format(kind=_kind(program)).replace("\n", "\n *   ")
     if program.continuous:
@@ -166,6 +172,7 @@ def _head(program: Program) -> str:
         rules=f"{counted(len(rule_set), 'rule')} for "
         f"{comment(rule_set.source.env_id) or 'an unnamed environment'}",
         projection=projection,
+        approved="".join(f" * {comment(line)}\n" for line in sign_off_lines(sign_off)),
     )
 
 

@@ -15,8 +15,10 @@ from sarl_core.explaining.exports.program import (
     parts_of,
     program_of,
     query_name,
+    sign_off_lines,
     state_lines,
 )
+from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.language import action_text, conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
@@ -168,7 +170,10 @@ def shield(state, action):
 
 
 def rules_to_python(
-    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+    rule_set: RuleSet,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+    sign_off: SignOff | None = None,
 ) -> str:
     """A rule set as Python.
 
@@ -177,6 +182,7 @@ def rules_to_python(
         projection: What a continuous action that breaks a rule becomes.
         on_invalid: Whether a state or an action that is none raises an error or lets the action
             pass.
+        sign_off: Who approved the rules; None to say nothing of it.
 
     Returns:
         A module with the function `shield`, which decides as a `Shield` does.
@@ -197,6 +203,7 @@ def rules_to_python(
         "\n".join(
             [
                 _HEAD.format(invalid=docstring, functions=_imported(program)),
+                *[f"# {line}" for line in sign_off_lines(sign_off)],
                 *_names(program),
                 *_table(program),
                 *functions,

@@ -17,6 +17,7 @@ from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError, require
 from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
+from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.evidence import HeldOut
@@ -148,6 +149,7 @@ def export_content(
     suffix: str,
     projection: Projection = "centre",
     on_invalid: OnInvalid = "raise",
+    sign_off: SignOff | None = None,
 ) -> bytes:
     """A rule set in one of the formats.
 
@@ -157,6 +159,8 @@ def export_content(
         projection: What a continuous action that breaks a rule becomes; for code.
         on_invalid: What becomes of a step whose state is no state, or whose action is none; for
             code.
+        sign_off: Who approved these very rules; said in all but .json and .csv, which hold rules
+            and nothing else. None to say nothing.
 
     Returns:
         The content of the file.
@@ -170,9 +174,10 @@ def export_content(
     if suffix == ".onnx":
         from sarl_core.explaining.exports.onnx_model import rules_to_onnx
 
-        return rules_to_onnx(rule_set, projection, on_invalid)
+        return rules_to_onnx(rule_set, projection, on_invalid, sign_off)
     # A file may have brought half of a pair that UTF-8 cannot write.
-    return _text(rule_set, suffix, projection, on_invalid).encode("utf-8", errors="replace")
+    text = _text(rule_set, suffix, projection, on_invalid, sign_off)
+    return text.encode("utf-8", errors="replace")
 
 
 def export_vectors(
@@ -236,18 +241,50 @@ def export_rules(
             folder does not exist.
         WorkError: If it cannot be written to, or a package is missing that the format needs.
     """
-    path = as_path(path)
     prepared = prepare(rule_set, merged=merged, demonstrations=demonstrations)
-    content = export_content(prepared.rule_set, path.suffix.lower(), projection, on_invalid)
-    vectors = export_vectors(prepared.rule_set, projection, on_invalid)
+    return Exported(save_export(prepared, path, projection, on_invalid), prepared)
+
+
+def save_export(
+    prepared: Prepared,
+    path: str | Path,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+    sign_off: SignOff | None = None,
+) -> Path:
+    """Write rules that are ready to be carried away, and test vectors beside them.
+
+    Args:
+        prepared: As `prepare` gives them.
+        path: As of `export_rules`.
+        projection: As of `export_rules`.
+        on_invalid: As of `export_rules`.
+        sign_off: As of `export_content`.
+
+    Returns:
+        Where the test vectors are.
+
+    Raises:
+        InputError: As of `export_rules`.
+        WorkError: As of `export_rules`.
+    """
+    path, rule_set = as_path(path), prepared.rule_set
+    content = export_content(rule_set, path.suffix.lower(), projection, on_invalid, sign_off)
+    vectors = export_vectors(rule_set, projection, on_invalid)
     beside = path.with_name(vectors_name(path.name))
     for place, data in ((beside, vectors), (path, content)):
         with whole_file(place) as unfinished:
             unfinished.write_bytes(data)
-    return Exported(beside, prepared)
+    return beside
 
 
-def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: OnInvalid) -> str:
+def _text(
+    rule_set: RuleSet,
+    suffix: str,
+    projection: Projection,
+    on_invalid: OnInvalid,
+    sign_off: SignOff | None,
+) -> str:
     if suffix == ".json":
         from sarl_core.mining.rule_set import rules_to_json
 
@@ -257,15 +294,15 @@ def _text(rule_set: RuleSet, suffix: str, projection: Projection, on_invalid: On
     if suffix == ".md":
         from sarl_core.explaining.exports.markdown import rules_to_markdown
 
-        return rules_to_markdown(rule_set)
+        return rules_to_markdown(rule_set, sign_off)
     if suffix == ".py":
         from sarl_core.explaining.exports.code_python import rules_to_python
 
-        return rules_to_python(rule_set, projection, on_invalid)
+        return rules_to_python(rule_set, projection, on_invalid, sign_off)
     if suffix == ".c":
         from sarl_core.explaining.exports.code_c import rules_to_c
 
-        return rules_to_c(rule_set, projection, on_invalid)
+        return rules_to_c(rule_set, projection, on_invalid, sign_off)
     raise InputError(f"the format {suffix!r} is none of {', '.join(FORMATS)}; choose one of them")
 
 

@@ -7,6 +7,7 @@ import math
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.explaining.words.evidence import held_out_interval_text, held_out_text
 from sarl_core.explaining.words.markdown import markdown_text
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.language import (
@@ -23,11 +24,12 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
 
 
-def rules_to_markdown(rule_set: RuleSet) -> str:
+def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str:
     """A rule set as Markdown.
 
     Args:
         rule_set: Any number of rules.
+        sign_off: Who approved them; None to say nothing of it.
 
     Returns:
         What it was mined from and how, then a table for each action dimension: rules that a
@@ -50,6 +52,7 @@ def rules_to_markdown(rule_set: RuleSet) -> str:
         f"{counted(source.episodes, 'episode')}: {limits_text(rule_set)}. {summary}",
         "",
         "They were learned from examples and guarantee nothing.",
+        *(["", markdown_text(signed)] if (signed := sign_off_text(sign_off)) else []),
     ]
     if formulas := formula_texts(rule_set):
         lines += [

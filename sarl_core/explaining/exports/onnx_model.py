@@ -29,6 +29,7 @@ from sarl_core.explaining.exports.program import (
     largest_float32,
     program_of,
 )
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
@@ -42,7 +43,10 @@ _FURTHER = 10_000_000  # numbers of nodes that no rule has
 
 
 def rules_to_onnx(
-    rule_set: RuleSet, projection: Projection = "centre", on_invalid: OnInvalid = "raise"
+    rule_set: RuleSet,
+    projection: Projection = "centre",
+    on_invalid: OnInvalid = "raise",
+    sign_off: SignOff | None = None,
 ) -> bytes:
     """A rule set as an ONNX model.
 
@@ -52,6 +56,7 @@ def rules_to_onnx(
         on_invalid: Whether the action passes where it or the state is none (``pass``). A model
             cannot stop with an error: for ``raise``, `executed` is then no action at all, NaN or
             the least int64.
+        sign_off: Who approved the rules; None to say nothing of it.
 
     Returns:
         A model with the inputs `state` (B, d) float32 and `proposed` (B, m), int64 or float32,
@@ -116,6 +121,7 @@ def rules_to_onnx(
         {
             "environment": rule_set.source.env_id,
             "on_invalid": on_invalid,
+            **({"approved": signed} if (signed := sign_off_text(sign_off)) else {}),
             "features": json.dumps(
                 [{"name": f.name, "unit": f.unit} for f in observed_features(features)]
             ),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Feature, observed_features
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError, require
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import one_line
 from sarl_core.mining.rule_order import without_idle
@@ -28,6 +30,7 @@ from sarl_core.shielding.shield import OnInvalid
 
 # Nested deeper than this, code goes on in a function of its own: Python ends at a hundred levels.
 _MOST_LEVELS = 20
+_COMMENT = 88  # signs of a line in a comment
 
 
 class Replacement(NamedTuple):
@@ -172,6 +175,11 @@ def action_lines(dimensions: Sequence[LabelledDimension]) -> list[str]:
             labels = zip(dimension.actions, dimension.label_names, strict=True)
             lines += [f"     {action:>3}  {one_line(name)}" for action, name in labels]
     return lines
+
+
+def sign_off_lines(sign_off: SignOff | None) -> list[str]:
+    """Who approved the rules, for a comment; [] where nothing is to be said of it."""
+    return [one_line(line) for line in wrap(sign_off_text(sign_off), _COMMENT)]
 
 
 def query_name(feature: Feature) -> str:

@@ -28,6 +28,7 @@ from sarl_core.explaining.report.tally import Tally, report_rules, same_environm
 from sarl_core.explaining.report.thresholds import thresholds_part
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.combining.choice import pairs_chosen_from
 from sarl_core.mining.editing.renaming import renamed_rules
@@ -67,6 +68,7 @@ class Wishes:
     commands: tuple[str, ...] = ()
     rules_name: str = ""
     demonstrations_name: str = ""
+    sign_off: SignOff | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no report can hold.
@@ -134,6 +136,7 @@ def make_report(
     commands: Sequence[str] = (),
     rules_name: str = "",
     demonstrations_name: str = "",
+    sign_off: SignOff | None = None,
     card: Mapping[str, Any] | None = None,
     comparison: Sequence[Result] = (),
     trees: Sequence[PolicyTree] | None = None,
@@ -155,6 +158,7 @@ def make_report(
         commands: How the rules and the report are made again, one line each.
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
+        sign_off: Who approved these very rules; None to say nothing of it.
         card: Of the rule file, as `read_card` gives it.
         comparison: Results to show.
         trees: Grown from the demonstrations with the rules' divider; grown here where not given
@@ -184,6 +188,7 @@ def make_report(
         commands=tuple(commands),
         rules_name=rules_name,
         demonstrations_name=demonstrations_name,
+        sign_off=sign_off,
     )
     as_given = rule_set
     demonstrations = recoded(demonstrations, rule_set.source.features, called="the demonstrations")
@@ -202,6 +207,7 @@ def make_report(
         "documents/report",
         title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
         key_numbers=_key_numbers(rule_set, counts),
+        sign_off=sign_off_text(wishes.sign_off),
         elsewhere=_elsewhere(as_given, demonstrations, trees),
         demonstrations=demonstrations_part(rule_set, demonstrations, counts),
         thresholds=thresholds_part(rule_set, counts, trees, card),

@@ -9,14 +9,21 @@ from pathlib import PurePath
 import streamlit as st
 
 from sarl_core.auditing.audit import Audit
-from sarl_core.explaining.exports.audit import audit_html, broken_rules_html, moved_html
+from sarl_core.explaining.exports.audit import (
+    audit_document,
+    audit_html,
+    broken_rules_html,
+    moved_html,
+)
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.html.number_cards import Number, number_cards
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
 from sarl_core.explaining.words.audit import audit_facts, comparison_text, drift_text
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.language import share_text
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.state.sign_off import sign_off_here
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.audit.logs import Logs
 
@@ -27,8 +34,10 @@ def show_answer(logs: Logs) -> None:
     Args:
         logs: What was audited.
     """
-    held = logs.first
+    held, sign_off = logs.first, sign_off_here(logs.rule_set)
     notes_notice(held.notes)
+    if sign_off is not None:
+        st.caption(escaped(sign_off_text(sign_off)))
     facts = dict(audit_facts(held))
     numbers = [
         ("Steps", f"{held.steps:,}", "steps"),
@@ -58,7 +67,7 @@ def show_answer(logs: Logs) -> None:
     if held.broken:
         st.html(heading("By rule"))
         st.html(broken_rules_html(held))
-    _downloads(logs)
+    _downloads(logs, sign_off)
 
 
 def _sentence(text: str, *, warns: bool) -> None:
@@ -68,28 +77,30 @@ def _sentence(text: str, *, warns: bool) -> None:
         st.info(escaped(text), icon=":material/info:")
 
 
-def _downloads(logs: Logs) -> None:
+def _downloads(logs: Logs, sign_off: SignOff | None) -> None:
     stem = f"audit-{PurePath(logs.name).stem}"
     held = logs.first
     with st.container(horizontal=True, gap="small"):
         download(
             "Report",
             lambda: str(
-                audit_html(held, title=f"Audit of {logs.name}", comparison=logs.comparison)
+                audit_html(
+                    held,
+                    title=f"Audit of {logs.name}",
+                    comparison=logs.comparison,
+                    sign_off=sign_off,
+                )
             ),
             f"{stem}.html",
             key="audit_html",
             meaning="One page that opens by itself",
         )
-        download("JSON", partial(_json, logs), f"{stem}.json", key="audit_json")
+        download("JSON", partial(_json, logs, sign_off), f"{stem}.json", key="audit_json")
         download("Steps as CSV", partial(_steps, held), f"{stem}.csv", key="audit_csv")
 
 
-def _json(logs: Logs) -> str:
-    document = logs.first.to_dict()
-    if logs.comparison is not None:
-        document["comparison"] = logs.comparison.to_dict()
-    return json.dumps(document, indent=1)
+def _json(logs: Logs, sign_off: SignOff | None) -> str:
+    return json.dumps(audit_document(logs.first, logs.comparison, sign_off), indent=1)
 
 
 def _steps(held: Audit) -> str:

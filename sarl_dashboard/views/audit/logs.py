@@ -43,11 +43,13 @@ class Logs:
         first: Of the log.
         comparison: With another one, or None.
         name: Of the first file.
+        rule_set: As it was chosen; an audit orders it as the log is.
     """
 
     first: Audit
     comparison: LogComparison | None
     name: str
+    rule_set: RuleSet
 
 
 def chosen_rules() -> ChosenRules:
@@ -107,7 +109,8 @@ def chosen_logs(rules: ChosenRules) -> Logs:
         other = _answer(rules, after, after.stated or said)
     if held is None or (second is not None and other is None):
         st.stop()
-    return Logs(held, None if other is None else LogComparison(held, other), first.name)
+    comparison = None if other is None else LogComparison(held, other)
+    return Logs(held, comparison, first.name, rules.rule_set)
 
 
 _Roles = tuple[tuple[str, ColumnRole], ...]

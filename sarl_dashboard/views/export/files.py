@@ -15,11 +15,13 @@ from sarl_core.explaining.exports.export import (
     prepare,
     vectors_name,
 )
+from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
-from sarl_dashboard.text import refuse
+from sarl_dashboard.state.sign_off import sign_off_here
+from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.export.settings import ExportSettings
 
 LINES = 150
@@ -45,10 +47,12 @@ def prepared_for(
     return prepare(rule_set, merged=merged, demonstrations=demonstrations)
 
 
-@cached(show_spinner="Writing …")
-def content_of(rule_set: RuleSet, suffix: str, projection: Projection) -> bytes:
+@cached(show_spinner="Writing …", hash_funcs={SignOff: sign_off_text})
+def content_of(
+    rule_set: RuleSet, suffix: str, projection: Projection, sign_off: SignOff | None
+) -> bytes:
     """The file."""
-    return export_content(rule_set, suffix, projection)
+    return export_content(rule_set, suffix, projection, sign_off=sign_off)
 
 
 @cached()
@@ -65,8 +69,9 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
         settings: What was asked for.
     """
     form, projection = settings.form, settings.projection
+    sign_off = sign_off_here(rule_set)
     try:
-        content = content_of(rule_set, form.suffix, projection)
+        content = content_of(rule_set, form.suffix, projection, sign_off)
     except SarlError as error:
         refuse(error)
         return
@@ -83,6 +88,8 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
             "action that must come out",
         )
         st.caption(f"{form.meaning} {len(content) / 1024:,.1f} kB.")
+    if sign_off is not None:
+        st.caption(escaped(sign_off_text(sign_off)))
     if form.suffix == ".onnx":
         kind = "int64" if not rule_set.actions[0].is_interval else "float32"
         width = len(observed_features(rule_set.source.features))

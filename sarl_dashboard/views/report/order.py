@@ -31,6 +31,7 @@ from sarl_dashboard.state.rule_files import (
     compact_file,
     fitting_demonstrations,
 )
+from sarl_dashboard.state.sign_off import sign_off_here
 from sarl_dashboard.views.report.settings import ReportChoices
 
 
@@ -68,6 +69,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
         commands=commands(choices, rule_set, demonstrations, named),
         rules_name=named.rules.rsplit("/", 1)[-1],
         demonstrations_name=named.demonstrations.rsplit("/", 1)[-1],
+        sign_off=sign_off_here(rule_set),
     )
     trees = None
     if rule_set.cut == "thresholds":

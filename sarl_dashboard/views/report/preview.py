@@ -7,6 +7,7 @@ import base64
 import streamlit as st
 
 from sarl_core.explaining.report.report import Report
+from sarl_core.explaining.words.sign_off import sign_off_text
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
@@ -42,6 +43,8 @@ def report_of(order: ReportOrder, name: str) -> None:
                 icon=":material/summarize:",
             ),
         )
+        if order.wishes.sign_off is not None:
+            st.caption(escaped(sign_off_text(order.wishes.sign_off)))
         if report is not None and not at_work:
             show(report, name)
         elif not at_work and not order.comparison:
