@@ -30,6 +30,7 @@ from sarl_core.cli.options import (
     with_derived,
     with_played_environment,
 )
+from sarl_core.cli.stand_ins import said
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -381,5 +382,5 @@ def _command(context: typer.Context) -> str:
             continue
         option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
         for one in value if isinstance(value, (list, tuple)) else [value]:
-            words += [*option, shlex.quote(str(one))]
+            words += [*option, shlex.quote(said(str(one)))]
     return " ".join(words)

@@ -21,6 +21,7 @@ from sarl_core.cli.options import (
     out_option,
     with_columns,
 )
+from sarl_core.cli.stand_ins import called, said
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -135,8 +136,8 @@ def audit(
                     demonstrations=mined_from,
                 )
             except InputError as error:
-                called = path_of(path) if isinstance(path, list) else str(path)
-                raise InputError(_with_path(error, called)) from error
+                name = path_of(path if isinstance(path, list) else [path])
+                raise InputError(_with_path(error, name)) from error
 
         stopped: InputError | None = None
         if follow:
@@ -155,7 +156,7 @@ def audit(
             save_audit(
                 held,
                 out,
-                title=f"{path_of(logs, short=True)} against {rules.name}",
+                title=f"{path_of(logs, short=True)} against {called(rules, short=True)}",
                 comparison=comparison,
                 sign_off=sign_off,
             )
@@ -165,7 +166,7 @@ def audit(
             document["failed_on"] = [one.text for one in guards if one.holds(held)]
         terminal.print_json(document)
     else:
-        _print(held, comparison, f"{path_of(logs)} against {rules}", sign_off)
+        _print(held, comparison, f"{path_of(logs)} against {called(rules)}", sign_off)
         if out is not None:
             terminal.print_lines([f"Wrote {out}."])
     if stopped is not None:
@@ -206,7 +207,8 @@ def _followed(
 
 
 def _with_path(error: InputError, path: str) -> str:
-    return str(error) if path in str(error) else f"{path}: {error}"
+    text = said(str(error))
+    return text if path in text else f"{path}: {text}"
 
 
 def _guard(held: Audit, guards: list[GuardCondition]) -> None:

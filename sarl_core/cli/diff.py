@@ -10,6 +10,7 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import read_demonstrations
 from sarl_core.cli.options import Columns, Json, MissingName, with_columns
+from sarl_core.cli.stand_ins import called
 
 
 @with_columns
@@ -56,20 +57,22 @@ def diff(
             )
         else:
             recorded = read_demonstrations(demonstrations, None, columns, missing)
-            recorded = recoded(recorded, one.source.features, called=str(demonstrations))
+            recorded = recoded(recorded, one.source.features, called=called(demonstrations))
             one, more = rules_for(one, recorded, called="the states")
             other, notes = comparable(one, other)[0], (*recorded.notes, *notes, *more)
             states = recorded.observations
-            states_from = f"The states are those of {demonstrations}."
+            states_from = f"The states are those of {called(demonstrations)}."
         difference = disagreement(one, other, states)
     from sarl_core.explaining.words.difference import difference_document, difference_lines
 
-    names = (str(first), str(second))
+    names = (called(first), called(second))
     if as_json:
         document = difference_document(
             difference,
             names=names,
-            states_from=str(demonstrations or "random over the range of the thresholds"),
+            states_from=called(demonstrations)
+            if demonstrations
+            else "random over the range of the thresholds",
         )
         terminal.print_json({**document, "notes": [*words, *notes]})
     else:

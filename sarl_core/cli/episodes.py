@@ -24,6 +24,7 @@ from sarl_core.cli.options import (
     out_option,
     with_played_environment,
 )
+from sarl_core.cli.stand_ins import called
 from sarl_core.errors import InputError
 
 
@@ -83,7 +84,7 @@ def evaluate(
     else:
         from sarl_core.cli.answers.summaries import print_episodes
 
-        shielded = "unshielded" if rules is None else f"shielded by {rules}"
+        shielded = "unshielded" if rules is None else f"shielded by {called(rules)}"
         print_episodes(document, str(env), f"{played.agent} in {env}, {shielded}", shield)
     if fault is not None:
         raise InputError(f"{fault}; the answer is of the {len(played)} before that one")

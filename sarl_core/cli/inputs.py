@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from sarl_core.cli import terminal
 from sarl_core.cli.options import EVERY_PAIR, Derived
+from sarl_core.cli.stand_ins import called
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError
 
@@ -64,7 +65,7 @@ def path_of(files: Sequence[Path], *, short: bool = False) -> str:
     Returns:
         The path of one; of several, that of the first, and how many more there are.
     """
-    first = files[0].name if short else str(files[0])
+    first = called(files[0], short=short)
     return first if len(files) == 1 else f"{first} and {len(files) - 1:,} more"
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sarl_core.cli import terminal
+from sarl_core.cli import stand_ins, terminal
 from sarl_core.cli.options import Json, out_option
 from sarl_core.errors import InputError
-from sarl_core.library.place import usual_author
 
 if TYPE_CHECKING:
     from sarl_core.library import Item, Library
@@ -36,22 +36,40 @@ class CommandGroup(typer.core.TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As Typer does, with the files in the place of the ids."""
+        stand_ins.put({})
         if args[:1] != ["library"]:
-            args = [_with_file(argument) for argument in args]
+            args = _with_files(args)
         return super().parse_args(ctx, args)
 
 
-def _with_file(argument: str) -> str:
-    """An argument, or an option with its value, with the path of a file that is kept."""
-    option, equals, value = (
-        argument.partition("=") if argument.startswith("--") else ("", "", argument)
-    )
-    if not value.startswith(_PREFIX):
-        return argument
-    from sarl_core.library.contents import file_of
+def _with_files(arguments: Sequence[str]) -> list[str]:
+    """Arguments, and options with their values, with the paths of files that are kept."""
+    files: dict[str, Path] = {}
+    changed, before = [], ""
+    for argument in arguments:
+        option, equals, value = (
+            argument.partition("=") if argument.startswith("--") else ("", "", argument)
+        )
+        if value.startswith(_PREFIX):
+            if (option or before) == "--out":
+                raise InputError(
+                    f"--out {value}: what is kept never changes; give the path of a file, and add "
+                    "that with `library add`"
+                )
+            if value not in files:
+                files[value] = _file_of(value)
+            argument = f"{option}{equals}{files[value]}"
+        changed.append(argument)
+        before = argument
+    stand_ins.put({path: name for name, path in files.items()})
+    return changed
 
-    with _opened() as opened:
-        return f"{option}{equals}{file_of(opened, opened.item(value))}"
+
+def _file_of(value: str) -> Path:
+    from sarl_core.library.contents import annotated_file
+
+    with _opened() as opened:  # what is put aside goes when the command ends
+        return annotated_file(opened, opened.item(value), Path(tempfile.mkdtemp()))
 
 
 @library.command("list")
@@ -95,7 +113,7 @@ def list_items(
             for item in items
         ],
     )
-    usage = opened.usage(usual_author())
+    usage = opened.usage(_author())
     if usage.warning:
         terminal.print_notes([usage.warning])
 
@@ -157,9 +175,9 @@ def import_file(
     Example: `python -m sarl_core library import data/rules/cartpole_compact.json`
     """
     from sarl_core.library.bundles import import_bundle
-    from sarl_core.library.contents import add_demonstrations, add_rules
+    from sarl_core.library.contents import add_demonstrations, add_rules, sources_of
 
-    opened, author = _opened(), usual_author()
+    opened, author = _opened(), _author()
     if file.suffix.lower() == _BUNDLE:
         if name is not None:
             raise InputError("what was exported has names; leave --name out")
@@ -168,14 +186,13 @@ def import_file(
         from sarl_core.mining.rule_set import RuleSet
 
         rules = RuleSet.load(file)
-        made_of = opened.with_digest(rules.source.digest, kind="demonstrations")
         items = [
             add_rules(
                 opened,
                 rules,
                 name or file.stem,
                 author=author,
-                came_from=[one.id for one in made_of[:1]],
+                came_from=sources_of(opened, rules),
             )
         ]
     else:
@@ -197,7 +214,7 @@ def remove_item(
 
     Example: `python -m sarl_core library remove ID`
     """
-    opened, author = _opened(), usual_author()
+    opened, author = _opened(), _author()
     if undo:
         _tell([opened.restore(identifier, author=author)], "is back", as_json)
         return
@@ -216,7 +233,7 @@ def approve_item(
 
     Example: `python -m sarl_core library approve ID --note "Held against the logs of March."`
     """
-    author = usual_author()
+    author = _author()
     _tell([_opened().approve(identifier, author=author, note=note)], "is approved", as_json)
 
 
@@ -224,6 +241,12 @@ def _opened() -> Library:
     from sarl_core.library import Library
 
     return Library()
+
+
+def _author() -> str:
+    from sarl_core.library.place import usual_author
+
+    return usual_author()
 
 
 def _tell(items: Sequence[Item], what: str, as_json: bool) -> None:

@@ -20,6 +20,7 @@ from sarl_core.cli.options import (
     with_columns,
     with_played_environment,
 )
+from sarl_core.cli.stand_ins import called
 from sarl_core.environments.environment import Environment, EnvironmentOrId
 
 if TYPE_CHECKING:
@@ -115,14 +116,14 @@ def report(
 
         rule_set = RuleSet.load(rules)
         read = read_demonstrations(demonstrations, env, columns, missing)
-        given = recoded(read, rule_set.source.features, called=str(demonstrations))
+        given = recoded(read, rule_set.source.features, called=called(demonstrations))
         card, sign_off = read_card(rules), sign_off_at_hand(rule_set)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
-            "--demonstrations": demonstrations,
+            "--demonstrations": called(demonstrations),
             "--column": as_options(columns),
             "--missing": None if missing == "refuse" else missing,
-            "--comparison": comparison,
+            "--comparison": [called(path) for path in comparison or ()],
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
             **({} if env is None else env.options),
@@ -135,8 +136,8 @@ def report(
         }
         mined = mining_command(
             rule_set,
-            rules,
-            demonstrations,
+            _written_rules(rules),
+            called(demonstrations),
             given,
             env=env,
             columns=columns,
@@ -155,10 +156,10 @@ def report(
             max_steps=max_steps,
             commands=(
                 *([mined] if mined else []),
-                command_line("report", rules, options),
+                command_line("report", called(rules), options),
             ),
-            rules_name=rules.name,
-            demonstrations_name=demonstrations.name,
+            rules_name=called(rules, short=True),
+            demonstrations_name=called(demonstrations, short=True),
             sign_off=sign_off,
             card=card,
             comparison=results,
@@ -190,6 +191,12 @@ def report(
 
     terminal.print_lines(lines)
     print_notes(document.notes)
+
+
+def _written_rules(rules: Path) -> str:
+    """Where a command would write the rules; what is kept is not written to."""
+    name = called(rules)
+    return "rules.json" if name != str(rules) else name
 
 
 def _player(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from sarl_core.cli.stand_ins import said
 from sarl_core.cli.streams import interruptible, lasting_streams
 from sarl_core.documents import plain
 from sarl_core.errors import InputError, SarlError, needing_extras
@@ -93,7 +94,7 @@ def _failed(error: BaseException) -> int:
 
 
 def _complain(sentence: str) -> None:
-    print(f"error: {' '.join(sentence.split())}", file=sys.stderr)  # noqa: T201
+    print(f"error: {' '.join(said(sentence).split())}", file=sys.stderr)  # noqa: T201
 
 
 def _sentence_and_code(error: BaseException) -> tuple[str, int]:
@@ -207,7 +208,7 @@ def print_notes(notes: Iterable[str]) -> None:
         notes: Sentences.
     """
     for note in notes:
-        print(f"note: {' '.join(note.split())}", file=sys.stderr)  # noqa: T201
+        print(f"note: {' '.join(said(note).split())}", file=sys.stderr)  # noqa: T201
 
 
 def check_output(path: Path, suffixes: Sequence[str]) -> None:

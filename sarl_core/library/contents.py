@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from sarl_core.demonstrations.formats import (
 )
 from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_of
+from sarl_core.library.annotations import annotated, is_annotated
 from sarl_core.library.database import is_there
 from sarl_core.library.items import Item, Kind
 from sarl_core.library.library import Library
@@ -161,12 +163,72 @@ def edits_of(library: Library, item: Item, rule_set: RuleSet) -> tuple[Edit, ...
 
 
 def demonstrations_of(library: Library, item: Item) -> Demonstrations:
-    """The demonstrations that are kept.
+    """The demonstrations that are kept, as they were when they were added.
 
     Raises:
         InputError: If it is something else, or its file is missing or damaged.
     """
     return load_demonstrations(file_of(library, item, "demonstrations"))
+
+
+def annotated_file(library: Library, item: Item, folder: Path) -> Path:
+    """The file that a command takes in the place of a thing.
+
+    Args:
+        library: Where it is.
+        item: The thing.
+        folder: Where a file may be made.
+
+    Returns:
+        Its main file; of demonstrations that were given names or formulas one in the folder, which
+        has them.
+
+    Raises:
+        InputError: If it has no one file, it is missing, or what was given does not fit.
+        WorkError: If it cannot be written.
+    """
+    path = file_of(library, item)
+    if item.kind != "demonstrations" or not is_annotated(item.details):
+        return path
+    demonstrations = load_demonstrations(path)
+    try:
+        demonstrations = annotated(demonstrations, item.details)
+    except (InputError, KeyError, TypeError) as error:
+        raise InputError(
+            f"the names and formulas that were given to {quoted(item.name)} do not fit it "
+            f"({error}); give them anew on the page Names, or use its file {path}"
+        ) from error
+    path = folder / f"{item.id}.parquet"
+    save_demonstrations(demonstrations, path)
+    return path
+
+
+def sources_of(library: Library, rule_set: RuleSet) -> list[str]:
+    """Ids of the demonstrations that rules say they were mined from, as far as they are here.
+
+    Args:
+        library: Where to look.
+        rule_set: The rules.
+
+    Returns:
+        One, or none.
+
+    Raises:
+        WorkError: If the library cannot be read.
+    """
+    source = rule_set.source
+    same = library.with_digest(source.digest, kind="demonstrations")
+    if same:
+        return [same[0].id]
+    for item in library.items(kind="demonstrations"):
+        details = item.details
+        size = (details.get("steps"), details.get("episodes"))
+        if size == (source.steps, source.episodes) and is_annotated(details):
+            with suppress(SarlError, KeyError, TypeError):
+                demonstrations = annotated(demonstrations_of(library, item), details)
+                if demonstrations.digest == source.digest:
+                    return [item.id]
+    return []
 
 
 def rules_of(library: Library, item: Item) -> RuleSet:
@@ -239,7 +301,7 @@ def digest_of_files(kind: Kind, files: Mapping[str, bytes]) -> str | None:
 
 
 def file_of(library: Library, item: Item, role: str | None = None) -> Path:
-    """The file that a command takes in the place of a thing.
+    """The file of a thing as it was kept.
 
     Args:
         library: Where it is.

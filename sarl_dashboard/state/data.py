@@ -172,7 +172,8 @@ def _with_notes(raw: Demonstrations) -> Demonstrations:
         details = library.details_of(raw)
         # What does not fit was written by another version; the data themselves are here.
         with suppress(SarlError, KeyError, TypeError):
-            given_names.restore_noted(raw, details)
+            formulas.restore(raw, details)
+            given_names.restore(raw, details)
     return raw
 
 

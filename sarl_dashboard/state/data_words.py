@@ -14,6 +14,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, SarlError
+from sarl_core.library.annotations import formulas_details, is_annotated, names_details
 from sarl_dashboard.state import formulas, given_names, library
 from sarl_dashboard.state.data import UPLOAD, chosen_dataset, data_problem, raw_demonstrations
 from sarl_dashboard.state.url import set_url_choice, url_text
@@ -73,17 +74,16 @@ def _give(raw: Demonstrations, named: str) -> None:
             "for a new link, or go on without them"
         )
     try:
-        given_names.restore_noted(raw, item.details)
+        formulas.restore(raw, item.details)
+        given_names.restore(raw, item.details)
     except (KeyError, TypeError) as error:  # written by another version
         raise InputError("the names of this address cannot be read; give them again") from error
 
 
 def _given(raw: Demonstrations) -> dict[str, Any]:
     """What was given to data in this visit, as JSON has it."""
-    names, derived = given_names.given_names(raw), formulas.changed(raw)
-    return ({} if names is None else {given_names.DETAIL: names._asdict()}) | (
-        {} if derived is None else {formulas.DETAIL: list(derived)}
-    )
+    given = names_details(given_names.given_names(raw)) | formulas_details(formulas.changed(raw))
+    return given if is_annotated(given) else {}
 
 
 def _name_of(raw: Demonstrations) -> str:

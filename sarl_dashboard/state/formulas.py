@@ -6,19 +6,17 @@ changes no formula.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import cast
+from collections.abc import Mapping
+from typing import Any, cast
 
 import streamlit as st
 
-from sarl_core.demonstrations.dataset import Demonstrations, formula_feature
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature, formula_texts
 from sarl_core.environments.formulas import Formula
+from sarl_core.library.annotations import derived_in, formulas_details
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state import library
-
-DETAIL = "formulas"
-"""Where formulas stand among what is said of kept demonstrations."""
 
 Derived = tuple[DerivedFeature, ...]
 
@@ -43,19 +41,19 @@ def put(raw: Demonstrations, derived: Derived) -> None:
         _written().pop(raw.digest, None)
     else:
         _written()[raw.digest] = derived
-    texts = changed(raw)
-    library.annotate(raw, {DETAIL: None if texts is None else list(texts)})
+    library.annotate(raw, formulas_details(changed(raw)))
 
 
-def changed(raw: Demonstrations) -> tuple[str, ...] | None:
-    """All that is derived, as text; None where a visitor has changed nothing of it."""
-    written = _written().get(raw.digest)
-    return None if written is None else formula_texts(written)
+def changed(raw: Demonstrations) -> Derived | None:
+    """All that is derived; None where a visitor has changed nothing of it."""
+    return _written().get(raw.digest)
 
 
-def restore(raw: Demonstrations, texts: Sequence[str]) -> None:
-    """Let that be derived which was written in another visit."""
-    _written()[raw.digest] = tuple(formula_feature(text, raw.observed) for text in texts)
+def restore(raw: Demonstrations, details: Mapping[str, Any]) -> None:
+    """Let that be derived which was written in another visit, if something was."""
+    derived = derived_in(details, raw)
+    if derived is not None:
+        _written()[raw.digest] = derived
 
 
 def without(derived: Derived, place: int) -> Derived:

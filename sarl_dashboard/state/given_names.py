@@ -13,11 +13,9 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, names_of, renamed, tidy
 from sarl_core.errors import InputError
+from sarl_core.library.annotations import names_details, names_in
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state import formulas, library
-
-DETAIL = "names"
-"""Where names stand among what is said of kept demonstrations."""
 
 
 def _given() -> dict[str, Names]:
@@ -70,44 +68,22 @@ def give(raw: Demonstrations, names: Names) -> None:
             _given().pop(raw.digest, None)
         else:
             _given()[raw.digest] = put
-        library.annotate(raw, {DETAIL: None if own else put._asdict()})
+        library.annotate(raw, names_details(None if own else put))
 
 
 def reset(raw: Demonstrations) -> None:
     """Go back to the names that the data came with; for callbacks."""
     _drafts().pop(raw.digest, None)
     _given().pop(raw.digest, None)
-    library.annotate(raw, {DETAIL: None})
+    library.annotate(raw, names_details(None))
 
 
-def restore(raw: Demonstrations, names: Mapping[str, Any]) -> None:
-    """Give the names that were given in another visit, if they fit."""
-    put = Names(
-        features=tuple(names["features"]),
-        units=tuple(names["units"]),
-        actions=tuple(names["actions"]),
-        labels=tuple(tuple(one) for one in names["labels"]),
-    )
-    _renamed(formulas.deriving(raw), put)
-    _given()[raw.digest] = put
-
-
-def restore_noted(raw: Demonstrations, details: Mapping[str, Any]) -> None:
-    """Derive and name what was derived and named in another visit.
-
-    Args:
-        raw: As they were read.
-        details: What was noted of them; what is not there stays as it is.
-
-    Raises:
-        InputError: If it does not fit.
-        KeyError: If it was written by another version.
-        TypeError: Likewise.
-    """
-    if details.get(formulas.DETAIL):
-        formulas.restore(raw, details[formulas.DETAIL])
-    if details.get(DETAIL):
-        restore(raw, details[DETAIL])
+def restore(raw: Demonstrations, details: Mapping[str, Any]) -> None:
+    """Give the names that were given in another visit, if there are some and they fit."""
+    put = names_in(details)
+    if put is not None:
+        _renamed(formulas.deriving(raw), put)
+        _given()[raw.digest] = put
 
 
 @cached()

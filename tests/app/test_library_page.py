@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from streamlit.testing.v1 import AppTest
 
+from sarl_core import load_demonstrations
 from sarl_core.errors import InputError
 from sarl_core.library import Library
-from sarl_core.library.contents import rules_of
+from sarl_core.library.contents import annotated_file, rules_of
 from sarl_core.library.items import new_id
 from sarl_dashboard.state import library as state
 from tests.app.screens import errors, metrics, open_page, texts
@@ -39,7 +40,7 @@ def upload(app: AppTest, content: bytes = ROWS, name: str = "crane.csv") -> str:
     return str(app.query_params["data"])
 
 
-def test_an_upload_is_there_after_a_reload_with_its_names_and_formulas() -> None:
+def test_an_upload_is_there_after_a_reload_with_its_names_and_formulas(tmp_path: Path) -> None:
     app = open_page("demonstrations")
     identifier = upload(app)
     app.switch_page("names.py").run()
@@ -54,6 +55,10 @@ def test_an_upload_is_there_after_a_reload_with_its_names_and_formulas() -> None
     sidebar = fresh.selectbox(key="_data_choice")
     assert sidebar.value == identifier
     assert "crane.csv" in sidebar.options
+    # A command that is given its id works with them, too.
+    with Library() as library:
+        path = annotated_file(library, library.item(identifier), tmp_path)
+    assert [one.name for one in load_demonstrations(path).features] == ["speed", "twice"]
 
 
 def test_two_files_of_one_name_are_told_apart() -> None:
